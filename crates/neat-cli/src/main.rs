@@ -1,0 +1,2 @@
+//! neat
+fn main() {}

@@ -1,0 +1,160 @@
+//! Pinhole cameras with pose.
+
+use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Pinhole intrinsics: the matrix `[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Intrinsics {
+    /// Focal length along x, in pixels.
+    pub fx: f64,
+    /// Focal length along y, in pixels.
+    pub fy: f64,
+    /// Principal point, x.
+    pub cx: f64,
+    /// Principal point, y.
+    pub cy: f64,
+    /// Skew, in pixels.
+    pub skew: f64,
+}
+
+impl Intrinsics {
+    /// From the upper left 3×3 of an intrinsic matrix.
+    pub fn from_matrix(k: &Matrix3<f64>) -> Self {
+        let scale = k[(2, 2)];
+        Self {
+            fx: k[(0, 0)] / scale,
+            fy: k[(1, 1)] / scale,
+            cx: k[(0, 2)] / scale,
+            cy: k[(1, 2)] / scale,
+            skew: k[(0, 1)] / scale,
+        }
+    }
+
+    /// As a matrix.
+    pub fn matrix(&self) -> Matrix3<f64> {
+        Matrix3::new(
+            self.fx, self.skew, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0,
+        )
+    }
+
+    /// Image coordinates → calibrated coordinates (on z = 1).
+    pub fn calibrate(&self, point_in_image: &Vector2<f64>) -> Vector2<f64> {
+        let y = (point_in_image.y - self.cy) / self.fy;
+        Vector2::new((point_in_image.x - self.cx - self.skew * y) / self.fx, y)
+    }
+
+    /// Calibrated coordinates → image coordinates.
+    pub fn decalibrate(&self, calibrated: &Vector2<f64>) -> Vector2<f64> {
+        Vector2::new(
+            self.fx * calibrated.x + self.skew * calibrated.y + self.cx,
+            self.fy * calibrated.y + self.cy,
+        )
+    }
+}
+
+/// A half-line in space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where the ray starts.
+    pub origin: Vector3<f64>,
+    /// Unit direction.
+    pub direction: Vector3<f64>,
+}
+
+/// Where a world point appears in a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Projection {
+    /// Image coordinates in pixels.
+    pub pixel: Vector2<f64>,
+    /// Coordinates on the plane z = 1.
+    pub calibrated: Vector2<f64>,
+    /// z in the camera frame: positive in front of the camera.
+    pub depth: f64,
+}
+
+/// A posed pinhole camera of a `width × height` image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Camera {
+    /// Focal lengths, principal point and skew.
+    pub intrinsics: Intrinsics,
+    /// Rotation part of the camera-to-world pose.
+    pub world_from_camera: Matrix3<f64>,
+    /// Centre of projection in the world.
+    pub center_in_world: Vector3<f64>,
+    /// Image width in pixels.
+    pub width: u32,
+    /// Image height in pixels.
+    pub height: u32,
+}
+
+/// Depths nearer to the camera plane than this are pushed away from zero before
+/// the perspective division, as the published code does.
+const DEPTH_GUARD: f64 = 1e-8;
+
+impl Camera {
+    /// From intrinsics and a 4×4 camera-to-world matrix.
+    pub fn from_matrices(
+        intrinsics: Intrinsics,
+        world_from_camera: &Matrix4<f64>,
+        width: u32,
+        height: u32,
+    ) -> Self {
+        Self {
+            intrinsics,
+            world_from_camera: world_from_camera.fixed_view::<3, 3>(0, 0).into_owned(),
+            center_in_world: world_from_camera.fixed_view::<3, 1>(0, 3).into_owned(),
+            width,
+            height,
+        }
+    }
+
+    /// The 4×4 camera-to-world matrix.
+    pub fn matrix_world_from_camera(&self) -> Matrix4<f64> {
+        let mut m = Matrix4::identity();
+        m.fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&self.world_from_camera);
+        m.fixed_view_mut::<3, 1>(0, 3)
+            .copy_from(&self.center_in_world);
+        m
+    }
+
+    /// World point → camera frame.
+    pub fn to_camera(&self, point_in_world: &Vector3<f64>) -> Vector3<f64> {
+        self.world_from_camera
+            .tr_mul(&(point_in_world - self.center_in_world))
+    }
+
+    /// World point → image. Points behind the camera project too; look at
+    /// [`Projection::depth`].
+    pub fn project(&self, point_in_world: &Vector3<f64>) -> Projection {
+        let p = self.to_camera(point_in_world);
+        let z = if p.z.abs() < DEPTH_GUARD {
+            p.z + if p.z < 0.0 { -DEPTH_GUARD } else { DEPTH_GUARD }
+        } else {
+            p.z
+        };
+        let calibrated = Vector2::new(p.x / z, p.y / z);
+        Projection {
+            pixel: self.intrinsics.decalibrate(&calibrated),
+            calibrated,
+            depth: p.z,
+        }
+    }
+
+    /// The ray through a point given in image coordinates.
+    pub fn ray_through(&self, point_in_image: &Vector2<f64>) -> Ray {
+        let calibrated = self.intrinsics.calibrate(point_in_image);
+        let direction =
+            self.world_from_camera * Vector3::new(calibrated.x, calibrated.y, 1.0);
+        Ray {
+            origin: self.center_in_world,
+            direction: direction.normalize(),
+        }
+    }
+
+    /// Viewing direction (+Z of the camera) in the world.
+    pub fn forward(&self) -> Vector3<f64> {
+        self.world_from_camera.column(2).into_owned()
+    }
+}

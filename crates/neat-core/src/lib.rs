@@ -1,0 +1,27 @@
+//! Cameras, line segments, 2D wireframes and posed scenes.
+//!
+//! Everything here is plain `f64` geometry on [`nalgebra`] types: no learning
+//! framework, so any program can embed it.
+//!
+//! Conventions (all of neat):
+//! - OpenCV camera axes: +X right, +Y down, +Z forward.
+//! - *Image coordinates* are the coordinates that the intrinsics speak of. A
+//!   pixel with integer index `(column, row)` has its centre at
+//!   `(column, row) + pixel_center`, where [`Scene::pixel_center`] is 0 or 0.5.
+//!   2D wireframes are stored in image coordinates.
+//! - *Calibrated* means image coordinates after `K⁻¹`, on the plane z = 1.
+//! - *World* is the frame of a scene's cameras; [`Scene::original_from_world`]
+//!   leads back to the frame of the user's files.
+
+pub mod assignment;
+pub mod camera;
+pub mod line_segment;
+pub mod scene;
+pub mod wireframe2d;
+pub mod wireframe3d;
+
+pub use camera::{Camera, Intrinsics, Projection, Ray};
+pub use line_segment::{LineSegment, LineSegment2, LineSegment3};
+pub use scene::{Scene, Similarity, View};
+pub use wireframe2d::{ScoredSegment2, Wireframe2d};
+pub use wireframe3d::Wireframe3d;

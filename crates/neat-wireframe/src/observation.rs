@@ -1,0 +1,31 @@
+//! What the images say: the 2D segments and junctions seen by each camera.
+
+use nalgebra::Vector2;
+use neat_core::{Camera, Scene, ScoredSegment2};
+
+/// One view's camera and the 2D evidence in it.
+#[derive(Clone, Debug)]
+pub struct ViewObservation {
+    /// Intrinsics and pose.
+    pub camera: Camera,
+    /// Detected segments with scores, in image coordinates.
+    pub segments: Vec<ScoredSegment2>,
+    /// All detected junctions, in image coordinates.
+    pub junctions: Vec<Vector2<f64>>,
+}
+
+impl ViewObservation {
+    /// The evidence of every view of a scene: segments with a score above
+    /// `min_score`, and all junctions.
+    pub fn from_scene(scene: &Scene, min_score: f64) -> Vec<Self> {
+        scene
+            .views
+            .iter()
+            .map(|view| Self {
+                camera: view.camera,
+                segments: view.wireframe.segments(min_score),
+                junctions: view.wireframe.vertices.clone(),
+            })
+            .collect()
+    }
+}
