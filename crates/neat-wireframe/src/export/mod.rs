@@ -1,0 +1,70 @@
+//! Wireframes as files: JSON, OBJ and PLY.
+//!
+//! All formats keep shared vertices shared, write every float so that it reads
+//! back as the same number, and replace an existing file only when the new one is
+//! complete.
+
+mod atomic_file;
+mod json;
+mod obj;
+mod ply;
+
+pub use atomic_file::write_atomically;
+pub use json::{WireframeDocument, read_json, write_json};
+pub use obj::write_obj;
+pub use ply::write_ply;
+
+use crate::validity::{WireframeFlaw, check_wireframe};
+use nalgebra::Vector3;
+use std::path::{Path, PathBuf};
+
+/// Why a wireframe could not be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The graph has a point that is no point or an edge that leads nowhere.
+    #[error("{path}: not a valid wireframe")]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: WireframeFlaw,
+    },
+    /// An extra field does not hold one finite number per junction or edge.
+    #[error("{path}: the field `{field}` must hold {expected} finite numbers, one per {of}")]
+    BadField {
+        /// The file.
+        path: PathBuf,
+        /// Name of the field.
+        field: String,
+        /// How many numbers it must hold.
+        expected: usize,
+        /// What it describes: "junction" or "edge".
+        of: &'static str,
+    },
+    /// The text is not the JSON of a wireframe.
+    #[error("{path}: not a wireframe in JSON")]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What the parser says, with line and column.
+        source: serde_json::Error,
+    },
+    /// The file system refused.
+    #[error("{path}: cannot {action}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}
+
+/// [`check_wireframe`], with the file's name in the error.
+fn check(path: &Path, junctions: &[Vector3<f64>], edges: &[[usize; 2]]) -> Result<(), ExportError> {
+    check_wireframe(junctions, edges).map_err(|source| ExportError::Invalid {
+        path: path.into(),
+        source,
+    })
+}

@@ -1,0 +1,45 @@
+//! How good a wireframe is: precision and recall against a true wireframe,
+//! accuracy and completeness against a scanned surface.
+
+mod evaluation;
+mod precision_recall;
+mod surface_distance;
+mod table;
+
+pub use evaluation::{
+    Evaluation, EvaluationConfig, SurfaceScores, WireframeCounts, WireframeScores,
+};
+pub use precision_recall::{
+    Matching, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,
+    segment_distances,
+};
+pub use surface_distance::{PointCloud, mean_nearest_distance, sample_segments};
+
+use crate::validity::WireframeFlaw;
+use neat_core::assignment::AssignmentError;
+
+/// Why a wireframe could not be measured.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MetricsError {
+    /// The wireframe to measure is broken.
+    #[error("the wireframe to evaluate is not valid")]
+    Predicted(#[source] WireframeFlaw),
+    /// The true wireframe is broken.
+    #[error("the ground-truth wireframe is not valid")]
+    Truth(#[source] WireframeFlaw),
+    /// A point of the surface is NaN or infinite.
+    #[error("point {point} of the surface is not finite")]
+    NonFiniteSurface {
+        /// Index of the point.
+        point: usize,
+    },
+    /// The surface has more points than can be indexed.
+    #[error("the surface has {points} points, which is too many: thin it out")]
+    TooManyPoints {
+        /// How many there are.
+        points: usize,
+    },
+    /// Distances that cannot be matched.
+    #[error("the distances cannot be matched")]
+    Assignment(#[from] AssignmentError),
+}

@@ -1,0 +1,174 @@
+//! Precision and recall of junctions and segments under distance thresholds
+//! (supplement E, Table 6; `evaluation/eval-abc.py`).
+
+use super::MetricsError;
+use crate::distance_matrix::DistanceMatrix;
+use nalgebra::Vector3;
+use neat_core::LineSegment3;
+use serde::{Deserialize, Serialize};
+
+/// The distance of two segments, from the two distances of their ends in the
+/// better order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SegmentDistance {
+    /// The mean of the two: the published code.
+    Mean,
+    /// The larger of the two: the paper's text, and stricter.
+    Max,
+}
+
+/// How predictions are paired with the truth, one to one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Matching {
+    /// One assignment with the smallest sum of distances serves all thresholds,
+    /// as in the published code. A spurious prediction can take the partner of a
+    /// good one when that shortens the sum, so recall may be too low.
+    #[default]
+    MinimumSum,
+    /// For each threshold the largest possible number of pairs below it.
+    /// Predictions beyond the threshold have no influence.
+    PerThreshold,
+}
+
+/// Precision and recall at one threshold.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PrecisionRecall {
+    /// Pairs count when their distance is strictly smaller than this.
+    pub threshold: f64,
+    /// How many pairs count.
+    pub matched: usize,
+    /// `matched` by the number of predictions; 0 without predictions.
+    pub precision: f64,
+    /// `matched` by the number of true elements; 0 without any.
+    pub recall: f64,
+}
+
+/// Distances of all predicted from all true junctions, `[predicted, truth]`.
+pub fn junction_distances(predicted: &[Vector3<f64>], truth: &[Vector3<f64>]) -> DistanceMatrix {
+    DistanceMatrix::between(predicted, truth, |a, b| (a - b).norm())
+}
+
+/// Distances of all predicted from all true segments, `[predicted, truth]`; ends
+/// must be finite.
+pub fn segment_distances(
+    predicted: &[LineSegment3],
+    truth: &[LineSegment3],
+    distance: SegmentDistance,
+) -> DistanceMatrix {
+    DistanceMatrix::between(predicted, truth, |a, b| {
+        let in_order = |b: &LineSegment3| {
+            let [start, end] = a.end_distances(b);
+            match distance {
+                SegmentDistance::Mean => (start + end) / 2.0,
+                SegmentDistance::Max => start.max(end),
+            }
+        };
+        in_order(b).min(in_order(&b.reversed()))
+    })
+}
+
+/// Precision and recall at each threshold, from the distances `[predicted, truth]`.
+///
+/// # Errors
+/// If a distance is not finite.
+pub fn precision_recall(
+    distances: &DistanceMatrix,
+    thresholds: &[f64],
+    matching: Matching,
+) -> Result<Vec<PrecisionRecall>, MetricsError> {
+    let by_sum = distances.assign()?;
+    thresholds
+        .iter()
+        .map(|&threshold| {
+            let matched = match matching {
+                Matching::MinimumSum => by_sum.iter().filter(|p| p.distance < threshold).count(),
+                Matching::PerThreshold => {
+                    // With cost 0 below the threshold and 1 elsewhere the
+                    // smallest sum is the largest number of pairs below it.
+                    let costs = distances.map(|d| if d < threshold { 0.0 } else { 1.0 });
+                    costs.assign()?.iter().filter(|p| p.distance == 0.0).count()
+                }
+            };
+            Ok(PrecisionRecall {
+                threshold,
+                matched,
+                precision: share(matched, distances.rows()),
+                recall: share(matched, distances.columns()),
+            })
+        })
+        .collect()
+}
+
+fn share(part: usize, whole: usize) -> f64 {
+    if whole == 0 {
+        0.0
+    } else {
+        part as f64 / whole as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn on_x(positions: &[f64]) -> Vec<Vector3<f64>> {
+        positions
+            .iter()
+            .map(|x| Vector3::new(*x, 0.0, 0.0))
+            .collect()
+    }
+
+    #[test]
+    fn segment_distance_takes_the_better_order() {
+        let truth = LineSegment3::new(Vector3::zeros(), Vector3::new(1.0, 0.0, 0.0));
+        let other = LineSegment3::new(Vector3::new(1.0, 0.3, 0.0), Vector3::new(0.0, 0.1, 0.0));
+        let distance = |kind| {
+            let distances = segment_distances(&[other], &[truth], kind);
+            distances.assign().unwrap()[0].distance
+        };
+        assert!((distance(SegmentDistance::Mean) - 0.2).abs() < 1e-15);
+        assert!((distance(SegmentDistance::Max) - 0.3).abs() < 1e-15);
+    }
+
+    #[test]
+    fn threshold_is_strict_and_shares_have_their_own_denominators() {
+        let distances = junction_distances(&on_x(&[0.0, 5.5, 9.0]), &on_x(&[0.0, 5.0]));
+        let scores = precision_recall(&distances, &[0.0, 0.5, 0.6], Matching::MinimumSum).unwrap();
+        assert_eq!(
+            scores.iter().map(|s| s.matched).collect::<Vec<_>>(),
+            [0, 1, 2]
+        );
+        assert_eq!((scores[1].precision, scores[1].recall), (1.0 / 3.0, 0.5));
+    }
+
+    /// The first prediction is exact for the first truth, but handing it to the
+    /// second truth makes the sum smaller.
+    #[test]
+    fn matching_per_threshold_is_not_disturbed_by_far_predictions() {
+        let table = [[0.005, 0.05], [0.05, 0.2]];
+        let distances = DistanceMatrix::between(&[0, 1], &[0, 1], |i, j| table[*i][*j]);
+        let matched =
+            |matching| precision_recall(&distances, &[0.01], matching).unwrap()[0].matched;
+        assert_eq!(matched(Matching::MinimumSum), 0);
+        assert_eq!(matched(Matching::PerThreshold), 1);
+    }
+
+    #[test]
+    fn nothing_predicted_or_nothing_true_scores_zero() {
+        for matching in [Matching::MinimumSum, Matching::PerThreshold] {
+            for (predicted, truth) in [(&[][..], &[1.0][..]), (&[1.0], &[]), (&[], &[])] {
+                let distances = junction_distances(&on_x(predicted), &on_x(truth));
+                let scores = precision_recall(&distances, &[0.01], matching).unwrap();
+                assert_eq!((scores[0].precision, scores[0].recall), (0.0, 0.0));
+            }
+        }
+    }
+
+    #[test]
+    fn nan_is_an_error() {
+        let distances = junction_distances(&on_x(&[f64::NAN]), &on_x(&[0.0]));
+        assert!(precision_recall(&distances, &[0.01], Matching::MinimumSum).is_err());
+    }
+}
