@@ -1,7 +1,8 @@
 //! Pinhole cameras with pose.
 
-use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
+use nalgebra::{Matrix3, Matrix4, RowVector4, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// Pinhole intrinsics: the matrix `[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,6 +20,44 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
+    /// From an intrinsic matrix of any scale, checked.
+    ///
+    /// # Errors
+    /// If the matrix is not upper triangular with positive focal lengths.
+    pub fn try_from_matrix(k: &Matrix3<f64>) -> Result<Self, CameraError> {
+        if k.iter().any(|x| !x.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        let tolerance = 1e-6 * k[(2, 2)].abs();
+        let lower = [k[(1, 0)], k[(2, 0)], k[(2, 1)]];
+        if k[(2, 2)] == 0.0 || lower.iter().any(|x| x.abs() > tolerance) {
+            return Err(CameraError::Intrinsics);
+        }
+        let intrinsics = Self::from_matrix(k);
+        intrinsics.validate().map(|()| intrinsics)
+    }
+
+    /// Checks that all numbers are finite and the focal lengths positive.
+    ///
+    /// # Errors
+    /// If they are not.
+    pub fn validate(&self) -> Result<(), CameraError> {
+        let Self {
+            fx,
+            fy,
+            cx,
+            cy,
+            skew,
+        } = *self;
+        if [fx, fy, cx, cy, skew].iter().any(|x| !x.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        if fx <= 0.0 || fy <= 0.0 {
+            return Err(CameraError::FocalLength { fx, fy });
+        }
+        Ok(())
+    }
+
     /// From the upper left 3×3 of an intrinsic matrix.
     pub fn from_matrix(k: &Matrix3<f64>) -> Self {
         let scale = k[(2, 2)];
@@ -88,6 +127,56 @@ pub struct Camera {
     pub height: u32,
 }
 
+/// Why a camera cannot be used.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum CameraError {
+    /// NaN or an infinite number.
+    #[error("its intrinsics or pose hold a number that is not finite: estimate the pose again")]
+    NotFinite,
+    /// An image without pixels.
+    #[error("its image has no pixels")]
+    NoPixels,
+    /// A focal length that is zero or negative.
+    #[error("its focal lengths {fx} and {fy} are not both positive")]
+    FocalLength {
+        /// Focal length along x, in pixels.
+        fx: f64,
+        /// Focal length along y, in pixels.
+        fy: f64,
+    },
+    /// An intrinsic matrix that is not upper triangular or not of scale ≠ 0.
+    #[error("its intrinsic matrix is not [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] up to scale")]
+    Intrinsics,
+    /// A pose without inverse.
+    #[error("its pose is singular: the rotation has determinant {determinant:.1e}")]
+    Singular {
+        /// Determinant of the rotation part.
+        determinant: f64,
+    },
+    /// A pose that turns a right hand into a left hand.
+    #[error(
+        "its pose is mirrored (determinant {determinant:.3}): convert it to OpenCV axes, \
+         x right, y down, z forward"
+    )]
+    Mirrored {
+        /// Determinant of the rotation part.
+        determinant: f64,
+    },
+    /// A 3×3 part that also scales or shears, or a last row other than 0 0 0 1.
+    #[error(
+        "its pose is not a rigid camera-to-world matrix: the rotation is off by {deviation:.1e}"
+    )]
+    NotRigid {
+        /// Largest element of |RᵀR − 1|, or of the error of the last row.
+        deviation: f64,
+    },
+}
+
+/// How far RᵀR may be from the identity: poses are often stored as `f32`, or
+/// with few digits as text.
+const RIGIDITY_TOLERANCE: f64 = 1e-3;
+
 /// Depths nearer to the camera plane than this are pushed away from zero before
 /// the perspective division, as the published code does.
 const DEPTH_GUARD: f64 = 1e-8;
@@ -107,6 +196,57 @@ impl Camera {
             width,
             height,
         }
+    }
+
+    /// From intrinsics and a 4×4 camera-to-world matrix, checked.
+    ///
+    /// # Errors
+    /// If the last row is not 0 0 0 1, or as [`Self::validate`].
+    pub fn try_from_matrices(
+        intrinsics: Intrinsics,
+        world_from_camera: &Matrix4<f64>,
+        width: u32,
+        height: u32,
+    ) -> Result<Self, CameraError> {
+        if world_from_camera.iter().any(|x| !x.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        let camera = Self::from_matrices(intrinsics, world_from_camera, width, height);
+        camera.validate()?;
+        let deviation = (world_from_camera.row(3) - RowVector4::new(0.0, 0.0, 0.0, 1.0)).amax();
+        if deviation > RIGIDITY_TOLERANCE {
+            return Err(CameraError::NotRigid { deviation });
+        }
+        Ok(camera)
+    }
+
+    /// Checks that the camera has pixels, positive focal lengths and a rigid,
+    /// right-handed pose of finite numbers.
+    ///
+    /// # Errors
+    /// If it has not.
+    pub fn validate(&self) -> Result<(), CameraError> {
+        self.intrinsics.validate()?;
+        if self.width == 0 || self.height == 0 {
+            return Err(CameraError::NoPixels);
+        }
+        let rotation = &self.world_from_camera;
+        let mut numbers = rotation.iter().chain(self.center_in_world.iter());
+        if numbers.any(|x| !x.is_finite()) {
+            return Err(CameraError::NotFinite);
+        }
+        let determinant = rotation.determinant();
+        if determinant.abs() < RIGIDITY_TOLERANCE {
+            return Err(CameraError::Singular { determinant });
+        }
+        if determinant < 0.0 {
+            return Err(CameraError::Mirrored { determinant });
+        }
+        let deviation = (rotation.tr_mul(rotation) - Matrix3::identity()).amax();
+        if deviation > RIGIDITY_TOLERANCE {
+            return Err(CameraError::NotRigid { deviation });
+        }
+        Ok(())
     }
 
     /// The 4×4 camera-to-world matrix.
@@ -145,8 +285,7 @@ impl Camera {
     /// The ray through a point given in image coordinates.
     pub fn ray_through(&self, point_in_image: &Vector2<f64>) -> Ray {
         let calibrated = self.intrinsics.calibrate(point_in_image);
-        let direction =
-            self.world_from_camera * Vector3::new(calibrated.x, calibrated.y, 1.0);
+        let direction = self.world_from_camera * Vector3::new(calibrated.x, calibrated.y, 1.0);
         Ray {
             origin: self.center_in_world,
             direction: direction.normalize(),

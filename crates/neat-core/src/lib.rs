@@ -15,13 +15,22 @@
 
 pub mod assignment;
 pub mod camera;
+pub mod error;
+pub mod file;
+pub mod ground_truth;
+pub mod hawp_json;
+pub mod layout;
 pub mod line_segment;
+pub mod npz;
+pub mod point_cloud;
 pub mod scene;
 pub mod wireframe2d;
 pub mod wireframe3d;
 
-pub use camera::{Camera, Intrinsics, Projection, Ray};
+pub use camera::{Camera, CameraError, Intrinsics, Projection, Ray};
+pub use error::{SceneError, ViewError};
+pub use layout::{LoadOptions, LoadedScene, load_scene};
 pub use line_segment::{LineSegment, LineSegment2, LineSegment3};
 pub use scene::{Scene, Similarity, View};
-pub use wireframe2d::{ScoredSegment2, Wireframe2d};
+pub use wireframe2d::{ScoredSegment2, Wireframe2d, Wireframe2dError};
 pub use wireframe3d::Wireframe3d;

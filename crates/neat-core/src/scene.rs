@@ -1,9 +1,10 @@
 //! A scene: posed images, each with its 2D wireframe.
 
-use crate::{Camera, Wireframe2d};
+use crate::{Camera, SceneError, ViewError, Wireframe2d};
 use image::RgbImage;
 use nalgebra::{Matrix4, Vector3};
 use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
 
 /// A transform `x ↦ scale · x + translation` with one scale for all axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,4 +68,109 @@ pub struct Scene {
     /// Image coordinates of the centre of pixel (0, 0), on both axes: 0.5 where
     /// the intrinsics' origin is the image corner, 0 where it is that centre.
     pub pixel_center: f64,
+}
+
+/// Every object of a scene should lie within this share of the space that all
+/// cameras see: with exactly 1 its corners can fall on the border.
+const BALL_MARGIN: f64 = 1.2;
+
+impl View {
+    /// Checks the camera, the wireframe, and that both are made for this image.
+    ///
+    /// # Errors
+    /// If one of them cannot be used.
+    pub fn validate(&self) -> Result<(), ViewError> {
+        self.camera.validate()?;
+        self.wireframe.validate()?;
+        let sizes = [
+            ("camera", self.camera.width, self.camera.height),
+            ("wireframe", self.wireframe.width, self.wireframe.height),
+        ];
+        for (what, width, height) in sizes {
+            check_image_size(what, (width, height), self.image.dimensions())?;
+        }
+        Ok(())
+    }
+}
+
+/// Errs if `what` is for an image of another size.
+pub(crate) fn check_image_size(
+    what: &'static str,
+    expected: (u32, u32),
+    found: (u32, u32),
+) -> Result<(), ViewError> {
+    if expected == found {
+        return Ok(());
+    }
+    Err(ViewError::ImageSize {
+        what,
+        expected_width: expected.0,
+        expected_height: expected.1,
+        width: found.0,
+        height: found.1,
+    })
+}
+
+impl Scene {
+    /// Checks that there are views, that each can be used, and that their names
+    /// are file names in ascending order. Readers have checked what they return.
+    ///
+    /// # Errors
+    /// At the first view that does not pass; the message has the scene's name in
+    /// the place of a file.
+    pub fn validate(&self) -> Result<(), SceneError> {
+        let path = PathBuf::from(&self.name);
+        if self.views.is_empty() {
+            return Err(SceneError::NoView { path });
+        }
+        for view in &self.views {
+            view.validate().map_err(|problem| SceneError::View {
+                path: path.clone(),
+                view: view.name.clone(),
+                problem,
+            })?;
+        }
+        check_names(self.views.iter().map(|view| view.name.as_str()), &path)
+    }
+
+    /// Radius of the ball around the world origin that holds the object: 1.2
+    /// times the largest origin-centred ball that every camera sees whole,
+    /// which is |c| · sin(atan(min(W, H) / 2 / f)) for a camera at c that looks
+    /// at the origin. Infinite for a scene without views.
+    pub fn bounding_ball_radius(&self) -> f64 {
+        let seen = |camera: &Camera| {
+            let half_tangent = (f64::from(camera.width) / camera.intrinsics.fx)
+                .min(f64::from(camera.height) / camera.intrinsics.fy)
+                / 2.0;
+            camera.center_in_world.norm() * half_tangent.atan().sin()
+        };
+        let nearest = self.views.iter().map(|view| seen(&view.camera));
+        BALL_MARGIN * nearest.fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Errs at a name that cannot be a file name or is not above the one before it.
+pub(crate) fn check_names<'a>(
+    names: impl Iterator<Item = &'a str>,
+    path: &Path,
+) -> Result<(), SceneError> {
+    let mut previous = None;
+    for name in names {
+        let reason = if name.is_empty() || name.starts_with('.') || name.contains(['/', '\\']) {
+            "is not a plain file name: rename it"
+        } else if previous == Some(name) {
+            "appears twice: give every image a name of its own"
+        } else if previous > Some(name) {
+            "is out of order: sort the views by name"
+        } else {
+            previous = Some(name);
+            continue;
+        };
+        return Err(SceneError::ViewName {
+            path: path.into(),
+            view: name.into(),
+            reason,
+        });
+    }
+    Ok(())
 }

@@ -3,6 +3,7 @@
 use crate::LineSegment2;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
+use thiserror::Error;
 
 /// A segment of a 2D wireframe with the detector's score.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,7 +33,99 @@ pub struct Wireframe2d {
     pub height: u32,
 }
 
+/// Why a 2D wireframe cannot be used.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum Wireframe2dError {
+    /// The image has no pixels.
+    #[error("its wireframe is for an image without pixels")]
+    NoPixels,
+    /// Not one score per element.
+    #[error("its wireframe has {elements} {kind} but {scores} scores of {kind}")]
+    ScoreCount {
+        /// "vertices" or "edges".
+        kind: &'static str,
+        /// How many there are.
+        elements: usize,
+        /// How many scores there are.
+        scores: usize,
+    },
+    /// NaN or an infinite number.
+    #[error("{kind} number {index} of its wireframe or the score of it is not finite")]
+    NotFinite {
+        /// "vertex" or "edge".
+        kind: &'static str,
+        /// Which one.
+        index: usize,
+    },
+    /// An edge that names no vertex.
+    #[error(
+        "edge {edge} of its wireframe names vertex {vertex}, but there are {vertices} vertices"
+    )]
+    VertexOutOfRange {
+        /// The edge.
+        edge: usize,
+        /// The vertex it names.
+        vertex: usize,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+}
+
 impl Wireframe2d {
+    /// Checks that every element has a finite score, every vertex finite
+    /// coordinates, and every edge two vertices.
+    ///
+    /// # Errors
+    /// At the first element that has not.
+    pub fn validate(&self) -> Result<(), Wireframe2dError> {
+        if self.width == 0 || self.height == 0 {
+            return Err(Wireframe2dError::NoPixels);
+        }
+        let counts = [
+            ("vertices", self.vertices.len(), self.vertex_scores.len()),
+            ("edges", self.edges.len(), self.edge_scores.len()),
+        ];
+        for (kind, elements, scores) in counts {
+            if elements != scores {
+                return Err(Wireframe2dError::ScoreCount {
+                    kind,
+                    elements,
+                    scores,
+                });
+            }
+        }
+        for (index, (vertex, score)) in self.vertices.iter().zip(&self.vertex_scores).enumerate() {
+            if ![vertex.x, vertex.y, *score].iter().all(|x| x.is_finite()) {
+                let kind = "vertex";
+                return Err(Wireframe2dError::NotFinite { kind, index });
+            }
+        }
+        for (index, (edge, score)) in self.edges.iter().zip(&self.edge_scores).enumerate() {
+            if !score.is_finite() {
+                let kind = "edge";
+                return Err(Wireframe2dError::NotFinite { kind, index });
+            }
+            if let Some(&vertex) = edge.iter().find(|&&v| v >= self.vertices.len()) {
+                return Err(Wireframe2dError::VertexOutOfRange {
+                    edge: index,
+                    vertex,
+                    vertices: self.vertices.len(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// A wireframe of an image in which nothing was detected.
+    pub fn empty(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            ..Self::default()
+        }
+    }
+
     /// The segments whose score is strictly greater than `min_score`, in file
     /// order.
     pub fn segments(&self, min_score: f64) -> Vec<ScoredSegment2> {

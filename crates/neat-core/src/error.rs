@@ -1,0 +1,179 @@
+//! What can be wrong with a scene on disk, and what to do about it.
+
+use crate::camera::CameraError;
+use crate::wireframe2d::Wireframe2dError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why a file or a folder of a scene could not be read or written.
+///
+/// Every message names the file, the view where there is one, and the remedy.
+/// Causes that come from other crates are in [`std::error::Error::source`].
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// A file or folder that must be there is not.
+    #[error("{path} does not exist: {remedy}")]
+    Missing {
+        /// The file or folder looked for.
+        path: PathBuf,
+        /// How to provide it.
+        remedy: String,
+    },
+    /// A file of zero bytes.
+    #[error("{path} is empty: write or download it again")]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file beyond what its format can sensibly need.
+    #[error("{path} has more than {limit} bytes: is it the right file?")]
+    TooLarge {
+        /// The file, or the array in it.
+        path: PathBuf,
+        /// The largest size that is read.
+        limit: u64,
+    },
+    /// The operating system refused to read.
+    #[error("cannot read {path}: check the file and its permissions")]
+    Read {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The operating system refused to write.
+    #[error("cannot write {path}: check the permissions of its folder and the space on the disk")]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// JSON that does not follow its grammar or lacks a field.
+    #[error("{path} is not a valid {format}: it may be truncated; write it again")]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// What it should be, such as "HAWP wireframe".
+        format: &'static str,
+        /// Where and why parsing stopped.
+        source: serde_json::Error,
+    },
+    /// A file that breaks the rules of its format.
+    #[error("{path} cannot be understood: {reason}; write it again")]
+    Malformed {
+        /// The file, or the array in it.
+        path: PathBuf,
+        /// Which rule it breaks.
+        reason: String,
+    },
+    /// An array of another shape than its layout asks for.
+    #[error("array `{array}` of {path} has shape {found:?}, expected {expected}")]
+    WrongShape {
+        /// The archive.
+        path: PathBuf,
+        /// Name of the array.
+        array: String,
+        /// Its shape.
+        found: Vec<usize>,
+        /// The shape the layout asks for, in words.
+        expected: &'static str,
+    },
+    /// An image that cannot be decoded or encoded.
+    #[error("image {path} cannot be read or written: replace it by a valid PNG or JPEG")]
+    Image {
+        /// The image.
+        path: PathBuf,
+        /// What the codec said.
+        source: image::ImageError,
+    },
+    /// A view that makes no sense.
+    #[error("view `{view}` of {path}: {problem}")]
+    View {
+        /// The file that says so.
+        path: PathBuf,
+        /// Name of the view.
+        view: String,
+        /// What is wrong with it.
+        problem: ViewError,
+    },
+    /// Files and poses that do not belong together.
+    #[error(
+        "{path} holds {poses} poses, but {images_dir} holds {images} images: add or remove images so that their sorted names match the poses"
+    )]
+    CountMismatch {
+        /// The file with the poses.
+        path: PathBuf,
+        /// How many poses it holds.
+        poses: usize,
+        /// The folder of the images.
+        images_dir: PathBuf,
+        /// How many images it holds.
+        images: usize,
+    },
+    /// Two views of one name, or a name that cannot be a file name.
+    #[error("{path}: view name `{view}` {reason}")]
+    ViewName {
+        /// The scene.
+        path: PathBuf,
+        /// The name.
+        view: String,
+        /// Why it cannot stay.
+        reason: &'static str,
+    },
+    /// A scene without views.
+    #[error("{path} holds no view: a scene needs images and their poses")]
+    NoView {
+        /// The scene.
+        path: PathBuf,
+    },
+    /// Not one view has a segment.
+    #[error(
+        "none of the {views} views of {path} has a segment with a score above {min_segment_score}: detect 2D wireframes again or lower the minimum score"
+    )]
+    NoUsableView {
+        /// The scene.
+        path: PathBuf,
+        /// How many views it has.
+        views: usize,
+        /// The minimum score.
+        min_segment_score: f64,
+    },
+    /// A folder that follows none of the known layouts.
+    #[error(
+        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics` or with `world_mat_0` and `scale_mat_0`, or cameras.json"
+    )]
+    UnknownLayout {
+        /// The folder.
+        path: PathBuf,
+    },
+}
+
+/// What can be wrong with one view.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum ViewError {
+    /// Its camera.
+    #[error(transparent)]
+    Camera(#[from] CameraError),
+    /// Its 2D wireframe.
+    #[error(transparent)]
+    Wireframe(#[from] Wireframe2dError),
+    /// Its image differs in size from what describes it.
+    #[error(
+        "the {what} is for {expected_width}×{expected_height} pixels, but the image has {width}×{height}: make the {what} from this very image"
+    )]
+    ImageSize {
+        /// What disagrees with the image: its camera or its wireframe.
+        what: &'static str,
+        /// Width according to it.
+        expected_width: u32,
+        /// Height according to it.
+        expected_height: u32,
+        /// Width of the image.
+        width: u32,
+        /// Height of the image.
+        height: u32,
+    },
+}

@@ -1,0 +1,114 @@
+//! Whole files: bounded reading, and writing that leaves no half-written file.
+
+use crate::SceneError;
+use std::fs;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// The largest text or array file that is read, in bytes.
+pub const MAX_FILE_BYTES: u64 = 1 << 30;
+
+/// Reads a whole file of at most [`MAX_FILE_BYTES`].
+///
+/// # Errors
+/// If it does not exist (the message then gives `remedy`), is empty, is too
+/// large, or cannot be read.
+pub fn read(path: &Path, remedy: &str) -> Result<Vec<u8>, SceneError> {
+    let file = fs::File::open(path).map_err(|source| read_error(path, remedy, source))?;
+    let mut bytes = Vec::new();
+    file.take(MAX_FILE_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|source| read_error(path, remedy, source))?;
+    if bytes.is_empty() {
+        return Err(SceneError::Empty { path: path.into() });
+    }
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        return Err(SceneError::TooLarge {
+            path: path.into(),
+            limit: MAX_FILE_BYTES,
+        });
+    }
+    Ok(bytes)
+}
+
+/// [`SceneError::Missing`] where the system says "not found", else
+/// [`SceneError::Read`].
+pub(crate) fn read_error(path: &Path, remedy: &str, source: io::Error) -> SceneError {
+    match source.kind() {
+        io::ErrorKind::NotFound => SceneError::Missing {
+            path: path.into(),
+            remedy: remedy.into(),
+        },
+        _ => SceneError::Read {
+            path: path.into(),
+            source,
+        },
+    }
+}
+
+/// Writes a whole file under a temporary name in the same folder, then renames
+/// it: readers see the old file or the new one, never a part.
+///
+/// # Errors
+/// If the folder does not exist, is read-only, or the disk is full; the
+/// temporary file is then removed.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), SceneError> {
+    let temporary = temporary_name(path);
+    let result = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
+    result.map_err(|source| {
+        // The first error is the one to report; a file that was never created
+        // cannot be removed.
+        let _ = fs::remove_file(&temporary);
+        SceneError::Write {
+            path: path.into(),
+            source,
+        }
+    })
+}
+
+/// Creates a folder and its parents.
+///
+/// # Errors
+/// If the system refuses.
+pub fn create_dir(path: &Path) -> Result<(), SceneError> {
+    fs::create_dir_all(path).map_err(|source| SceneError::Write {
+        path: path.into(),
+        source,
+    })
+}
+
+/// `.name.PID.tmp` beside `path`: hidden, so that no reader lists it.
+fn temporary_name(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!(".{name}.{}.tmp", std::process::id()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn write_replaces_and_leaves_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.json");
+        write_atomically(&path, b"old").unwrap();
+        write_atomically(&path, b"new").unwrap();
+        assert_eq!(read(&path, "").unwrap(), b"new");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn missing_and_empty_files_are_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.json");
+        let missing = read(&path, "run the detector").unwrap_err().to_string();
+        assert!(missing.contains("a.json") && missing.contains("run the detector"));
+        fs::write(&path, b"").unwrap();
+        assert!(matches!(read(&path, ""), Err(SceneError::Empty { .. })));
+        let nowhere = dir.path().join("no/such/folder/a.json");
+        assert!(matches!(
+            write_atomically(&nowhere, b"x"),
+            Err(SceneError::Write { .. })
+        ));
+    }
+}

@@ -1,0 +1,178 @@
+//! The layout of the published code's ABC objects.
+//!
+//! - `images/NAME.png`
+//! - `hawp/NAME.json`, see [`crate::hawp_json`]
+//! - `cameras.npz`: `intrinsics` [N, 3, 3] or [N, 4, 4], `extrinsics` [N, 4, 4]
+//!   camera-to-world in OpenCV axes, in the order of the sorted image names.
+//!
+//! Two more arrays are written and, where they are, read: `scale_mat` [4, 4]
+//! leads from the world to the original frame, and `pixel_center` [] says which
+//! image coordinates the centre of the first pixel has. Other programs ignore
+//! them.
+
+use super::images;
+use super::poses::{
+    CAMERAS_NPZ, NPZ_REMEDY, PosedImage, Poses, check_counts, intrinsics_of, matrix4,
+    similarity_of, view_error, wrong_shape,
+};
+use crate::npz::{NpyArray, NpzReader, write_npz};
+use crate::{Scene, SceneError, Similarity, View, ViewError, file, hawp_json};
+use image::ImageFormat;
+use nalgebra::{Matrix3, Matrix4, SMatrix};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::Path;
+
+pub(super) const INTRINSICS: &str = "intrinsics";
+pub(super) const EXTRINSICS: &str = "extrinsics";
+const SCALE_MAT: &str = "scale_mat";
+const PIXEL_CENTER: &str = "pixel_center";
+const IMAGES_DIR: &str = "images";
+/// The folder of 2D wireframes, in every layout.
+pub(super) const HAWP_DIR: &str = "hawp";
+
+pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
+    let path = dir.join(CAMERAS_NPZ);
+    let mut npz = NpzReader::open(&path, NPZ_REMEDY)?;
+    let intrinsics = stack(&path, INTRINSICS, &npz.array(INTRINSICS)?)?;
+    let extrinsics = stack(&path, EXTRINSICS, &npz.array(EXTRINSICS)?)?;
+    let images_dir = dir.join(IMAGES_DIR);
+    let images = images::list(&images_dir)?;
+    for poses in [&intrinsics, &extrinsics] {
+        check_counts(&path, poses.len(), &images_dir, images.len())?;
+    }
+
+    let mut views = Vec::with_capacity(images.len());
+    for ((image, intrinsics), world_from_camera) in
+        images.into_iter().zip(&intrinsics).zip(extrinsics)
+    {
+        let name = hawp_json::file_stem(&image);
+        let intrinsics = intrinsics_of(intrinsics)
+            .map_err(|problem| view_error(&path, &name, ViewError::Camera(problem)))?;
+        views.push(PosedImage {
+            name,
+            image,
+            intrinsics,
+            world_from_camera,
+            size: None,
+        });
+    }
+    views.sort_by(|a, b| a.name.cmp(&b.name));
+
+    Ok(Poses {
+        original_from_world: read_scale_mat(&mut npz, &path)?,
+        pixel_center: read_pixel_center(&mut npz, &path)?,
+        path,
+        views,
+    })
+}
+
+/// Matrices of an array [N, 3, 3] or [N, 4, 4]; 3×3 ones are completed.
+fn stack(path: &Path, name: &str, array: &NpyArray) -> Result<Vec<Matrix4<f64>>, SceneError> {
+    let matrix: fn(&[f64]) -> Matrix4<f64> = match (name, array.shape.as_slice()) {
+        (INTRINSICS, [_, 3, 3]) => |values| Matrix3::from_row_slice(values).to_homogeneous(),
+        (_, [_, 4, 4]) => Matrix4::from_row_slice,
+        (INTRINSICS, _) => return Err(wrong_shape(path, name, array, "[N, 3, 3] or [N, 4, 4]")),
+        _ => return Err(wrong_shape(path, name, array, "[N, 4, 4]")),
+    };
+    let len: usize = array.shape[1..].iter().product();
+    Ok(array.values.chunks_exact(len).map(matrix).collect())
+}
+
+fn read_scale_mat(npz: &mut NpzReader, path: &Path) -> Result<Similarity, SceneError> {
+    if !npz.contains(SCALE_MAT) {
+        return Ok(Similarity::identity());
+    }
+    similarity_of(path, &matrix4(path, SCALE_MAT, &npz.array(SCALE_MAT)?)?)
+}
+
+fn read_pixel_center(npz: &mut NpzReader, path: &Path) -> Result<Option<f64>, SceneError> {
+    if !npz.contains(PIXEL_CENTER) {
+        return Ok(None);
+    }
+    match npz.array(PIXEL_CENTER)?.values.as_slice() {
+        [value] if [0.0, 0.5].contains(value) => Ok(Some(*value)),
+        other => Err(SceneError::Malformed {
+            path: path.into(),
+            reason: format!("`{PIXEL_CENTER}` is {other:?}, not 0 or 0.5"),
+        }),
+    }
+}
+
+/// Writes a scene into the folder `dir`, which is created where needed. Reading
+/// it gives the same views, to the rounding that [`hawp_json::write`] names.
+///
+/// Poses are written last: a folder that an interrupt left without them is no
+/// scene. Other images in the folder stay, and the reader refuses them.
+///
+/// # Errors
+/// If [`Scene::validate`] does not pass, or a file cannot be written.
+pub fn write_scene(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
+    scene.validate()?;
+    let images_dir = dir.join(IMAGES_DIR);
+    let hawp_dir = dir.join(HAWP_DIR);
+    file::create_dir(&images_dir)?;
+    file::create_dir(&hawp_dir)?;
+    scene.views.par_iter().try_for_each(|view| {
+        write_png(view, &images_dir.join(format!("{}.png", view.name)))?;
+        let hawp = hawp_dir.join(format!("{}.json", view.name));
+        hawp_json::write(&hawp, &view.wireframe, scene.pixel_center)
+    })?;
+    write_cameras(scene, &dir.join(CAMERAS_NPZ))
+}
+
+fn write_png(view: &View, path: &Path) -> Result<(), SceneError> {
+    let mut png = Cursor::new(Vec::new());
+    view.image
+        .write_to(&mut png, ImageFormat::Png)
+        .map_err(|source| SceneError::Image {
+            path: path.into(),
+            source,
+        })?;
+    file::write_atomically(path, png.get_ref())
+}
+
+fn write_cameras(scene: &Scene, path: &Path) -> Result<(), SceneError> {
+    let cameras = || scene.views.iter().map(|view| &view.camera);
+    let arrays = BTreeMap::from([
+        (
+            INTRINSICS,
+            NpyArray {
+                shape: vec![scene.views.len(), 3, 3],
+                values: cameras()
+                    .flat_map(|camera| row_major(&camera.intrinsics.matrix()))
+                    .collect(),
+            },
+        ),
+        (
+            EXTRINSICS,
+            NpyArray {
+                shape: vec![scene.views.len(), 4, 4],
+                values: cameras()
+                    .flat_map(|camera| row_major(&camera.matrix_world_from_camera()))
+                    .collect(),
+            },
+        ),
+        (
+            SCALE_MAT,
+            NpyArray {
+                shape: vec![4, 4],
+                values: row_major(&scene.original_from_world.matrix()),
+            },
+        ),
+        (
+            PIXEL_CENTER,
+            NpyArray {
+                shape: vec![],
+                values: vec![scene.pixel_center],
+            },
+        ),
+    ]);
+    write_npz(path, &arrays)
+}
+
+/// The elements of a matrix, row by row.
+fn row_major<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Vec<f64> {
+    matrix.transpose().as_slice().to_vec()
+}

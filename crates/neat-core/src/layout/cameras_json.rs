@@ -1,0 +1,119 @@
+//! The layout in which one JSON file names every image and its camera.
+//!
+//! `cameras.json`: `{"frames": [{"file": "images/a.png", "width": w, "height": h,
+//! "K": 3×3, "c2w": 4×4}, …], "scale_mat": 4×4}`. Poses are camera-to-world in
+//! OpenCV axes; the optional `scale_mat` leads from the world to the original
+//! frame. Other keys are ignored.
+
+use super::images::ENDINGS;
+use super::poses::{PosedImage, Poses, similarity_of, view_error};
+use crate::hawp_json::file_stem;
+use crate::{Intrinsics, SceneError, Similarity, file};
+use nalgebra::{Matrix3, Matrix4};
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+pub(super) const FILE_NAME: &str = "cameras.json";
+
+#[derive(Deserialize)]
+struct CamerasJson {
+    frames: Vec<Frame>,
+    scale_mat: Option<[[f64; 4]; 4]>,
+}
+
+#[derive(Deserialize)]
+struct Frame {
+    file: PathBuf,
+    width: u32,
+    height: u32,
+    #[serde(rename = "K")]
+    k: [[f64; 3]; 3],
+    c2w: [[f64; 4]; 4],
+}
+
+pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
+    let path = dir.join(FILE_NAME);
+    parse(&file::read(&path, "provide the poses of the images")?, dir)
+}
+
+fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
+    let path = dir.join(FILE_NAME);
+    let json: CamerasJson = serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
+        path: path.clone(),
+        format: "list of cameras",
+        source,
+    })?;
+    let original_from_world = json.scale_mat.map_or(Ok(Similarity::identity()), |rows| {
+        similarity_of(&path, &Matrix4::from(rows).transpose())
+    })?;
+    let mut views = Vec::with_capacity(json.frames.len());
+    for frame in json.frames {
+        let name = file_stem(&frame.file);
+        // `From` takes the inner arrays for columns.
+        let k = Matrix3::from(frame.k).transpose();
+        let intrinsics =
+            Intrinsics::try_from_matrix(&k).map_err(|problem| view_error(&path, &name, problem))?;
+        views.push(PosedImage {
+            image: with_existing_ending(dir.join(&frame.file)),
+            name,
+            intrinsics,
+            world_from_camera: Matrix4::from(frame.c2w).transpose(),
+            size: Some((frame.width, frame.height)),
+        });
+    }
+    views.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(Poses {
+        path,
+        views,
+        original_from_world,
+        pixel_center: None,
+    })
+}
+
+/// `image`, or where it does not exist the same with another ending that does:
+/// data sets are often passed on with their images converted.
+fn with_existing_ending(image: PathBuf) -> PathBuf {
+    if image.exists() {
+        return image;
+    }
+    let mut others = ENDINGS.iter().map(|ending| image.with_extension(ending));
+    others.find(|other| other.exists()).unwrap_or(image)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const ONE_FRAME: &str = r#"{"frames": [{"file": "images/a.png", "width": 4, "height": 3,
+        "K": [[5, 0, 2], [0, 6, 1.5], [0, 0, 1]],
+        "c2w": [[1, 0, 0, 7], [0, 1, 0, 8], [0, 0, 1, 9], [0, 0, 0, 1]]}],
+        "scale_mat": [[2, 0, 0, 10], [0, 2, 0, 20], [0, 0, 2, 30], [0, 0, 0, 1]],
+        "convention": "ignored"}"#;
+
+    #[test]
+    fn matrices_are_read_row_by_row() {
+        let poses = parse(ONE_FRAME.as_bytes(), Path::new("scene")).unwrap();
+        let view = &poses.views[0];
+        assert_eq!(view.name, "a");
+        assert_eq!((view.intrinsics.fy, view.intrinsics.cx), (6.0, 2.0));
+        assert_eq!(view.world_from_camera[(1, 3)], 8.0);
+        assert_eq!(poses.original_from_world.scale, 2.0);
+        assert_eq!(poses.original_from_world.translation.z, 30.0);
+    }
+
+    proptest! {
+        #[test]
+        fn truncated_and_damaged_files_are_errors_not_panics(
+            end in 0..ONE_FRAME.len(), at in 0..ONE_FRAME.len(), byte: u8,
+        ) {
+            let bytes = ONE_FRAME.as_bytes();
+            prop_assert!(parse(&bytes[..end], Path::new("scene")).is_err());
+            let mut damaged = bytes.to_vec();
+            damaged[at] = byte;
+            if let Ok(poses) = parse(&damaged, Path::new("scene")) {
+                prop_assert!(poses.views.len() <= 1);
+            }
+        }
+    }
+}

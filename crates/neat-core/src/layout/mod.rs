@@ -1,0 +1,297 @@
+//! Scenes on disk: which files hold images, poses and 2D wireframes.
+//!
+//! Three layouts are known ([`Layout`]); each has a file here that reads its
+//! poses. Images and wireframes are read alike for all of them, by this file.
+
+pub mod abc;
+pub mod cameras_json;
+pub mod dtu;
+mod images;
+mod pixel_center;
+mod poses;
+
+pub use pixel_center::PixelCenter;
+
+use crate::npz::NpzReader;
+use crate::scene::{check_image_size, check_names};
+use crate::{Camera, Scene, SceneError, View, ViewError, Wireframe2d, hawp_json};
+use image::RgbImage;
+use poses::{PosedImage, Poses};
+use rayon::prelude::*;
+use std::fmt;
+use std::path::Path;
+
+/// How the files of a scene are arranged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// `images/`, `hawp/`, and `cameras.npz` with stacked `intrinsics` and
+    /// `extrinsics`: the ABC objects of the published code.
+    Abc,
+    /// `image/`, `hawp/`, and `cameras.npz` with `world_mat_i` and
+    /// `scale_mat_i`: DTU and BlendedMVS, as IDR, VolSDF and NeuS store them.
+    Dtu,
+    /// `cameras.json` that names every image with its intrinsics and pose, and
+    /// `hawp/`.
+    CamerasJson,
+}
+
+impl Layout {
+    /// Tells the layout of the folder `dir` by its files. `cameras.npz` is
+    /// looked at first, then `cameras.json`.
+    ///
+    /// # Errors
+    /// If the folder does not exist or follows no known layout.
+    pub fn detect(dir: &Path) -> Result<Self, SceneError> {
+        if !dir.is_dir() {
+            return Err(SceneError::Missing {
+                path: dir.into(),
+                remedy: "give the folder of a scene".into(),
+            });
+        }
+        let npz_path = dir.join(poses::CAMERAS_NPZ);
+        if npz_path.exists() {
+            let npz = NpzReader::open(&npz_path, poses::NPZ_REMEDY)?;
+            if npz.contains(abc::INTRINSICS) && npz.contains(abc::EXTRINSICS) {
+                return Ok(Self::Abc);
+            }
+            if npz.contains(&dtu::world_mat(0)) && npz.contains(&dtu::scale_mat(0)) {
+                return Ok(Self::Dtu);
+            }
+        }
+        if dir.join(cameras_json::FILE_NAME).exists() {
+            return Ok(Self::CamerasJson);
+        }
+        Err(SceneError::UnknownLayout { path: dir.into() })
+    }
+
+    fn read_poses(self, dir: &Path) -> Result<Poses, SceneError> {
+        match self {
+            Self::Abc => abc::read_poses(dir),
+            Self::Dtu => dtu::read_poses(dir),
+            Self::CamerasJson => cameras_json::read_poses(dir),
+        }
+    }
+}
+
+/// How [`load_scene`] reads a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadOptions {
+    /// The layout; `None` tells it by the files.
+    pub layout: Option<Layout>,
+    /// Where the centre of a pixel lies in the coordinates of the intrinsics.
+    pub pixel_center: PixelCenter,
+    /// A view is usable if a segment has a score above this. The published code
+    /// uses 0.05 for training.
+    pub min_segment_score: f64,
+    /// Whether views need 2D wireframes: if so, a missing wireframe is an error
+    /// and views without a usable segment are dropped. If not, every view is
+    /// kept, and one without a file has an empty wireframe.
+    pub require_wireframes: bool,
+    /// The colour behind transparent pixels.
+    pub background: [u8; 3],
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self {
+            layout: None,
+            pixel_center: PixelCenter::Auto,
+            min_segment_score: 0.05,
+            require_wireframes: true,
+            background: [0; 3],
+        }
+    }
+}
+
+/// A scene with what a person should know about how it was read.
+#[derive(Clone, Debug)]
+pub struct LoadedScene {
+    /// The scene: validated, its views sorted by name.
+    pub scene: Scene,
+    /// The layout that it was read by.
+    pub layout: Layout,
+    /// In the order of the views.
+    pub warnings: Vec<SceneWarning>,
+}
+
+/// Something that does not stop a scene from being read.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SceneWarning {
+    /// The principal point does not tell where pixel centres are.
+    PixelCenterAssumed {
+        /// The value taken.
+        pixel_center: f64,
+    },
+    /// A view was dropped because nothing was detected in it.
+    ViewWithoutSegments {
+        /// Name of the view.
+        view: String,
+        /// No segment's score is above this.
+        min_segment_score: f64,
+    },
+}
+
+impl fmt::Display for SceneWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PixelCenterAssumed { pixel_center } => write!(
+                f,
+                "the intrinsics do not tell where pixel centres are: {pixel_center} is assumed"
+            ),
+            Self::ViewWithoutSegments {
+                view,
+                min_segment_score,
+            } => write!(
+                f,
+                "view `{view}` is left out: no segment has a score above {min_segment_score}"
+            ),
+        }
+    }
+}
+
+/// Reads the scene in the folder `dir`.
+///
+/// Images and poses belong together by the order of the sorted file names, as in
+/// the published code, or by name where the layout gives names. Wireframes
+/// belong to images by name. Images are decoded in parallel; the result does not
+/// depend on the number of threads.
+///
+/// # Errors
+/// Everything that [`SceneError`] lists; the first view in order decides.
+///
+/// # Example
+/// ```no_run
+/// use neat_core::{LoadOptions, load_scene};
+/// let loaded = load_scene("data/abc-00075213", &LoadOptions::default())?;
+/// for warning in &loaded.warnings {
+///     eprintln!("{warning}");
+/// }
+/// assert!(!loaded.scene.views.is_empty());
+/// # Ok::<(), neat_core::SceneError>(())
+/// ```
+pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
+    let dir = dir.as_ref();
+    let layout = options.layout.map_or_else(|| Layout::detect(dir), Ok)?;
+    let poses = layout.read_poses(dir)?;
+    if poses.views.is_empty() {
+        return Err(SceneError::NoView { path: dir.into() });
+    }
+    check_names(poses.views.iter().map(|view| view.name.as_str()), dir)?;
+    let hawp_dir = dir.join(abc::HAWP_DIR);
+    if options.require_wireframes && !hawp_dir.is_dir() {
+        return Err(SceneError::Missing {
+            path: hawp_dir,
+            remedy: hawp_json::REMEDY.into(),
+        });
+    }
+
+    let posed_photos = try_par_map(&poses.views, |view| {
+        let photo = images::read_rgb(&view.image, options.background)?;
+        let camera = camera_of(view, &photo, &poses)?;
+        Ok((camera, photo))
+    })?;
+
+    let mut warnings = Vec::new();
+    let pixel_center = match options.pixel_center {
+        PixelCenter::Auto => poses
+            .pixel_center
+            .or_else(|| pixel_center::infer(posed_photos.iter().map(|(camera, _)| camera)))
+            .unwrap_or_else(|| {
+                let pixel_center = pixel_center::PUBLISHED;
+                warnings.push(SceneWarning::PixelCenterAssumed { pixel_center });
+                pixel_center
+            }),
+        PixelCenter::Integer => 0.0,
+        PixelCenter::Half => 0.5,
+    };
+
+    let wireframes = try_par_map(&poses.views, |view| {
+        let path = hawp_dir.join(format!("{}.json", view.name));
+        if !options.require_wireframes && !path.exists() {
+            return Ok(None);
+        }
+        hawp_json::read(&path, pixel_center).map(Some)
+    })?;
+
+    let mut views = Vec::new();
+    for ((posed, (camera, image)), wireframe) in
+        poses.views.iter().zip(posed_photos).zip(wireframes)
+    {
+        let wireframe =
+            wireframe.unwrap_or_else(|| Wireframe2d::empty(camera.width, camera.height));
+        let view = View {
+            name: posed.name.clone(),
+            camera,
+            wireframe,
+            image,
+        };
+        view.validate().map_err(|problem| SceneError::View {
+            path: hawp_dir.clone(),
+            view: view.name.clone(),
+            problem,
+        })?;
+        let usable = !view
+            .wireframe
+            .segments(options.min_segment_score)
+            .is_empty();
+        if usable || !options.require_wireframes {
+            views.push(view);
+        } else {
+            warnings.push(SceneWarning::ViewWithoutSegments {
+                view: view.name,
+                min_segment_score: options.min_segment_score,
+            });
+        }
+    }
+    if views.is_empty() {
+        return Err(SceneError::NoUsableView {
+            path: dir.into(),
+            views: poses.views.len(),
+            min_segment_score: options.min_segment_score,
+        });
+    }
+
+    let scene = Scene {
+        name: scene_name(dir),
+        views,
+        original_from_world: poses.original_from_world,
+        pixel_center,
+    };
+    Ok(LoadedScene {
+        scene,
+        layout,
+        warnings,
+    })
+}
+
+/// The camera of a posed image of the photo's size.
+fn camera_of(view: &PosedImage, photo: &RgbImage, poses: &Poses) -> Result<Camera, SceneError> {
+    let (width, height) = photo.dimensions();
+    let camera = view
+        .size
+        .map_or(Ok(()), |size| {
+            check_image_size("camera", size, (width, height))
+        })
+        .and_then(|()| {
+            Camera::try_from_matrices(view.intrinsics, &view.world_from_camera, width, height)
+                .map_err(ViewError::Camera)
+        });
+    camera.map_err(|problem| poses::view_error(&poses.path, &view.name, problem))
+}
+
+/// The folder's name, also for `.` and `scene/..`.
+fn scene_name(dir: &Path) -> String {
+    let canonical = dir.canonicalize().unwrap_or_else(|_| dir.into());
+    let name = canonical.file_name().unwrap_or(canonical.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// Maps in parallel; of several errors the first in order is returned.
+fn try_par_map<T: Sync, U: Send>(
+    items: &[T],
+    f: impl Fn(&T) -> Result<U, SceneError> + Sync + Send,
+) -> Result<Vec<U>, SceneError> {
+    let results: Vec<_> = items.par_iter().map(f).collect();
+    results.into_iter().collect()
+}

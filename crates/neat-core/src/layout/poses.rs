@@ -1,0 +1,120 @@
+//! What every layout says about its images: file, intrinsics and pose.
+
+use crate::npz::NpyArray;
+use crate::{CameraError, Intrinsics, SceneError, Similarity, ViewError};
+use nalgebra::{Matrix3, Matrix4};
+use std::path::{Path, PathBuf};
+
+/// The poses of a whole scene.
+pub(super) struct Poses {
+    /// The file that holds them, for messages.
+    pub path: PathBuf,
+    /// The images, sorted by name.
+    pub views: Vec<PosedImage>,
+    /// Leads to the frame of the user's files.
+    pub original_from_world: Similarity,
+    /// Where the layout says where pixel centres are, in pixels.
+    pub pixel_center: Option<f64>,
+}
+
+/// An image on disk with its camera.
+pub(super) struct PosedImage {
+    /// File name without ending.
+    pub name: String,
+    /// The image.
+    pub image: PathBuf,
+    /// Its intrinsics.
+    pub intrinsics: Intrinsics,
+    /// Its 4×4 camera-to-world matrix.
+    pub world_from_camera: Matrix4<f64>,
+    /// Width and height, where the layout gives them.
+    pub size: Option<(u32, u32)>,
+}
+
+/// The archive of poses in the layouts of the published code.
+pub(super) const CAMERAS_NPZ: &str = "cameras.npz";
+
+/// What to do about a missing [`CAMERAS_NPZ`].
+pub(super) const NPZ_REMEDY: &str = "provide the poses of the images";
+
+/// Errs unless there is one pose per image.
+pub(super) fn check_counts(
+    path: &Path,
+    poses: usize,
+    images_dir: &Path,
+    images: usize,
+) -> Result<(), SceneError> {
+    if poses == images {
+        return Ok(());
+    }
+    Err(SceneError::CountMismatch {
+        path: path.into(),
+        poses,
+        images_dir: images_dir.into(),
+        images,
+    })
+}
+
+/// A problem of one view, with the file that it is in.
+pub(super) fn view_error(path: &Path, view: &str, problem: impl Into<ViewError>) -> SceneError {
+    SceneError::View {
+        path: path.into(),
+        view: view.into(),
+        problem: problem.into(),
+    }
+}
+
+/// The upper left 3×3 of a matrix.
+pub(super) fn upper_left(matrix: &Matrix4<f64>) -> Matrix3<f64> {
+    matrix.fixed_view::<3, 3>(0, 0).into_owned()
+}
+
+/// Intrinsics from the upper left 3×3 of `matrix`, checked.
+pub(super) fn intrinsics_of(matrix: &Matrix4<f64>) -> Result<Intrinsics, CameraError> {
+    Intrinsics::try_from_matrix(&upper_left(matrix))
+}
+
+/// An array of shape [4, 4] as a matrix.
+pub(super) fn matrix4(
+    path: &Path,
+    name: &str,
+    array: &NpyArray,
+) -> Result<Matrix4<f64>, SceneError> {
+    if array.shape != [4, 4] {
+        return Err(wrong_shape(path, name, array, "[4, 4]"));
+    }
+    Ok(Matrix4::from_row_slice(&array.values))
+}
+
+/// An array with a shape that its layout does not allow.
+pub(super) fn wrong_shape(
+    path: &Path,
+    name: &str,
+    array: &NpyArray,
+    expected: &'static str,
+) -> SceneError {
+    SceneError::WrongShape {
+        path: path.into(),
+        array: name.into(),
+        found: array.shape.clone(),
+        expected,
+    }
+}
+
+/// The transform of a `scale_mat`: one positive scale and a translation.
+pub(super) fn similarity_of(path: &Path, matrix: &Matrix4<f64>) -> Result<Similarity, SceneError> {
+    let similarity = Similarity {
+        scale: matrix[(0, 0)],
+        translation: matrix.fixed_view::<3, 1>(0, 3).into_owned(),
+    };
+    let deviation = (similarity.matrix() - matrix).amax();
+    if similarity.scale <= 0.0 || deviation > 1e-5 * similarity.scale {
+        return Err(SceneError::Malformed {
+            path: path.into(),
+            reason:
+                "its scale matrix is not a positive scale, the same for all axes, and a translation"
+                    .into(),
+        });
+    }
+    Ok(similarity)
+}
