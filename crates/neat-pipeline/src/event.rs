@@ -1,0 +1,73 @@
+//! What a run tells while it works. Libraries report; only a user interface
+//! draws.
+
+use crate::trainer::StepReport;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::path::PathBuf;
+
+/// A part of a run that takes time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// A synthetic scene is made and written.
+    Synthesise,
+    /// Images, poses and 2D wireframes are read, and hashed for the manifest.
+    Load,
+    /// The fields are optimised.
+    Train,
+    /// The wireframe is taken out of the fields.
+    Distill,
+    /// Result files and pictures are written.
+    Export,
+    /// The wireframe is compared to the truth.
+    Evaluate,
+}
+
+impl fmt::Display for Stage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Synthesise => "synthesise",
+            Self::Load => "load",
+            Self::Train => "train",
+            Self::Distill => "distill",
+            Self::Export => "export",
+            Self::Evaluate => "evaluate",
+        })
+    }
+}
+
+/// One message of a run.
+#[derive(Clone, Debug)]
+pub enum Event<'a> {
+    /// A stage begins.
+    StageStarted(Stage),
+    /// So much of a stage is done.
+    StageProgress {
+        /// The stage.
+        stage: Stage,
+        /// From 0 to 1.
+        fraction: f64,
+    },
+    /// One optimisation step is done.
+    Step {
+        /// Losses and the like.
+        report: &'a StepReport,
+        /// So much of the training is done, by steps or by time: from 0 to 1.
+        fraction: f64,
+    },
+    /// A stage is done.
+    StageFinished {
+        /// The stage.
+        stage: Stage,
+        /// How long it took.
+        seconds: f64,
+    },
+    /// Something that a person should know and that does not stop the run.
+    Warning(String),
+    /// A result that a person may want to open is on disk.
+    FileWritten(PathBuf),
+}
+
+/// Who listens to the events of a run.
+pub type OnEvent<'a> = dyn FnMut(Event<'_>) + 'a;

@@ -1,0 +1,143 @@
+//! Rendered views as images on disk, and how near they are to the photograph.
+
+use image::{ImageFormat, Rgb, RgbImage};
+use neat_core::{SceneError, file};
+use std::io::Cursor;
+use std::path::Path;
+
+/// Writes a PNG, completely or not at all.
+///
+/// # Errors
+/// If the folder cannot be written or the disk is full.
+pub fn write_png(path: &Path, image: &RgbImage) -> Result<(), SceneError> {
+    let mut png = Cursor::new(Vec::new());
+    image
+        .write_to(&mut png, ImageFormat::Png)
+        .map_err(|source| SceneError::Image {
+            path: path.into(),
+            source,
+        })?;
+    file::write_atomically(path, png.get_ref())
+}
+
+/// Colours from 0 to 1, row by row, as an image.
+pub fn color_image(width: u32, height: u32, colors: &[[f32; 3]]) -> RgbImage {
+    image_of(width, height, |i| colors[i])
+}
+
+/// Depths, row by row, as grey levels: white is the nearest one, and black the
+/// farthest or none (depths that are not positive and finite).
+pub fn depth_image(width: u32, height: u32, depths: &[f32]) -> RgbImage {
+    let is_depth = |depth: &f32| *depth > 0.0 && depth.is_finite();
+    let (near, far) = depths
+        .iter()
+        .copied()
+        .filter(is_depth)
+        .fold((f32::INFINITY, 0.0_f32), |(near, far), depth| {
+            (near.min(depth), far.max(depth))
+        });
+    // All at one depth: all white.
+    let range = if far > near {
+        far - near
+    } else {
+        f32::INFINITY
+    };
+    image_of(width, height, |i| {
+        let level = 1.0 - (depths[i] - near) / range;
+        [if is_depth(&depths[i]) { level } else { 0.0 }; 3]
+    })
+}
+
+/// Normals, row by row, with x, y and z from −1 to 1 as red, green and blue from
+/// 0 to 1.
+pub fn normal_image(width: u32, height: u32, normals: &[[f32; 3]]) -> RgbImage {
+    image_of(width, height, |i| normals[i].map(|x| (x + 1.0) / 2.0))
+}
+
+fn image_of(width: u32, height: u32, color: impl Fn(usize) -> [f32; 3]) -> RgbImage {
+    RgbImage::from_fn(width, height, |x, y| {
+        let index = y as usize * width as usize + x as usize;
+        Rgb(color(index).map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8))
+    })
+}
+
+/// The photograph reduced by a whole factor: every pixel is the mean of a square
+/// of them. What is left over at the right and lower border is cut off.
+pub fn downscaled(photo: &RgbImage, factor: u32) -> RgbImage {
+    let factor = factor.max(1);
+    let pixels = u64::from(factor) * u64::from(factor);
+    RgbImage::from_fn(photo.width() / factor, photo.height() / factor, |x, y| {
+        let mut sum = [0_u64; 3];
+        for v in 0..factor {
+            for u in 0..factor {
+                let pixel = photo.get_pixel(x * factor + u, y * factor + v);
+                for (sum, value) in sum.iter_mut().zip(pixel.0) {
+                    *sum += u64::from(value);
+                }
+            }
+        }
+        // A mean of bytes is a byte.
+        Rgb(sum.map(|sum| ((sum + pixels / 2) / pixels) as u8))
+    })
+}
+
+/// Peak signal-to-noise ratio of colours from 0 to 1 against a photograph, in
+/// decibels; infinite if they are equal. `None` if there is not one colour per
+/// pixel, or no pixel.
+pub fn psnr(colors: &[[f32; 3]], photo: &RgbImage) -> Option<f64> {
+    let pixels = photo.pixels();
+    if colors.is_empty() || colors.len() != pixels.len() {
+        return None;
+    }
+    let squared_error: f64 = colors
+        .iter()
+        .zip(pixels)
+        .flat_map(|(color, pixel)| color.iter().zip(pixel.0))
+        .map(|(c, p)| (f64::from(c.clamp(0.0, 1.0)) - f64::from(p) / 255.0).powi(2))
+        .sum();
+    Some(-10.0 * (squared_error / (3 * colors.len()) as f64).log10())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn psnr_of_a_known_error() {
+        let photo = RgbImage::from_pixel(4, 2, Rgb([51, 102, 153]));
+        let shifted = vec![[0.3, 0.5, 0.7]; 8];
+        assert!((psnr(&shifted, &photo).unwrap() - 20.0).abs() < 1e-5);
+        let black = RgbImage::new(2, 1);
+        assert_eq!(psnr(&[[0.0; 3]; 2], &black), Some(f64::INFINITY));
+        assert_eq!(psnr(&shifted[1..], &photo), None);
+    }
+
+    #[test]
+    fn reduced_photographs_are_means() {
+        let photo = RgbImage::from_fn(5, 4, |x, y| Rgb([(10 * x) as u8, (10 * y) as u8, 7]));
+        let half = downscaled(&photo, 2);
+        assert_eq!(half.dimensions(), (2, 2));
+        assert_eq!(half.get_pixel(1, 1).0, [25, 25, 7]);
+        assert_eq!(downscaled(&photo, 1), photo);
+    }
+
+    #[test]
+    fn depths_are_bright_where_near() {
+        let depths = [1.0, 2.0, 3.0, 0.0, f32::INFINITY, f32::NAN];
+        let image = depth_image(3, 2, &depths);
+        let levels: Vec<u8> = image.pixels().map(|p| p.0[0]).collect();
+        assert_eq!(levels, [255, 128, 0, 0, 0, 0]);
+        let flat = depth_image(2, 1, &[2.0, 2.0]);
+        assert!(flat.pixels().all(|p| p.0 == [255; 3]));
+    }
+
+    #[test]
+    fn a_png_reads_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let image = normal_image(2, 1, &[[0.0, 1.0, -1.0], [1.0, 0.0, 0.0]]);
+        write_png(&path, &image).unwrap();
+        assert_eq!(image::open(&path).unwrap().into_rgb8(), image);
+        assert_eq!(image.get_pixel(0, 0).0, [128, 255, 0]);
+    }
+}

@@ -1,0 +1,162 @@
+//! Pictures of a wireframe: drawn on the photographs, and alone.
+
+mod line_drawing;
+mod picture;
+
+pub use picture::draw_wireframe;
+
+use image::RgbImage;
+use line_drawing::{Pen, draw_disc, draw_segment};
+use nalgebra::Vector2;
+use neat_core::{Camera, LineSegment2, LineSegment3, View, Wireframe3d};
+
+/// Line width relative to the larger side of the image.
+const WIDTH_PER_SIZE: f64 = 1.0 / 400.0;
+const SEGMENT_COLOR: [u8; 3] = [255, 64, 32];
+const JUNCTION_COLOR: [u8; 3] = [32, 200, 255];
+
+/// The photograph of a view with the wireframe on it, hidden parts too. The
+/// wireframe is in the world frame of the cameras; what is behind the camera is
+/// cut off.
+///
+/// `pixel_center` is [`neat_core::Scene::pixel_center`].
+pub fn draw_overlay(view: &View, pixel_center: f64, wireframe: &Wireframe3d) -> RgbImage {
+    let mut image = view.image.clone();
+    let size = f64::from(image.width().max(image.height()));
+    let radius = (size * WIDTH_PER_SIZE / 2.0).max(0.75);
+    let line = Pen {
+        color: SEGMENT_COLOR,
+        radius,
+    };
+    let dot = Pen {
+        color: JUNCTION_COLOR,
+        radius: 2.0 * radius,
+    };
+    for segment in wireframe.segments() {
+        if let Some(segment) = visible_part(&segment, &view.camera, pixel_center) {
+            draw_segment(&mut image, &segment, &line);
+        }
+    }
+    for junction in &wireframe.junctions {
+        let projection = view.camera.project(junction);
+        if projection.depth > 0.0 {
+            let pixel = projection.pixel - Vector2::repeat(pixel_center);
+            draw_disc(&mut image, &pixel, &dot);
+        }
+    }
+    image
+}
+
+/// The part of a segment that is in front of the camera, in pixels with the
+/// centre of the first one at (0, 0).
+fn visible_part(
+    segment: &LineSegment3,
+    camera: &Camera,
+    pixel_center: f64,
+) -> Option<LineSegment2> {
+    /// Lines are cut at this share of the larger depth: at 0 they would be
+    /// infinitely far away in the image.
+    const NEAR: f64 = 1e-3;
+    let [start, end] = segment.ends().map(|p| camera.to_camera(&p).z);
+    let near = NEAR * start.max(end);
+    if near <= 0.0 {
+        return None;
+    }
+    let crossing = || segment.point_at((near - start) / (end - start));
+    let clipped = LineSegment3::new(
+        if start < near {
+            crossing()
+        } else {
+            segment.start
+        },
+        if end < near { crossing() } else { segment.end },
+    );
+    let center = Vector2::repeat(pixel_center);
+    Some(clipped.map(|point| camera.project(point).pixel - center))
+}
+
+/// Indices of at most `count` views whose cameras stand far from each other, in
+/// ascending order: the first view, then always the one that is farthest from
+/// those already chosen.
+pub fn spread_views(views: &[View], count: usize) -> Vec<usize> {
+    let mut distances = vec![f64::INFINITY; views.len()];
+    let mut chosen = Vec::new();
+    while chosen.len() < count.min(views.len()) {
+        // Of equal distances the first wins.
+        let next = (0..views.len())
+            .rev()
+            .max_by(|a, b| distances[*a].total_cmp(&distances[*b]))
+            .unwrap_or(0);
+        chosen.push(next);
+        let center = views[next].camera.center_in_world;
+        for (view, distance) in views.iter().zip(&mut distances) {
+            *distance = distance.min((view.camera.center_in_world - center).norm());
+        }
+        // Views at one place must not be chosen twice.
+        distances[next] = f64::NEG_INFINITY;
+    }
+    chosen.sort_unstable();
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+    use neat_core::synthetic::{SyntheticScene, generate};
+
+    fn scene() -> neat_core::synthetic::SyntheticData {
+        let config = SyntheticScene {
+            views: 12,
+            image_size: 64,
+            ..SyntheticScene::default()
+        };
+        generate(&config).unwrap()
+    }
+
+    #[test]
+    fn lines_lie_on_the_projected_edges() {
+        let data = scene();
+        let view = &data.scene.views[3];
+        let image = draw_overlay(view, data.scene.pixel_center, &data.truth);
+        for segment in data.truth.segments() {
+            let middle = view.camera.project(&segment.point_at(0.5)).pixel;
+            // The index of the pixel that holds a point: its centre is at +0.5.
+            let pixel = image.get_pixel(middle.x.floor() as u32, middle.y.floor() as u32);
+            assert!(
+                [SEGMENT_COLOR, JUNCTION_COLOR]
+                    .iter()
+                    .any(|c| (0..3).all(|i| c[i].abs_diff(pixel.0[i]) < 80)),
+                "{pixel:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_behind_the_camera_is_cut_off() {
+        let data = scene();
+        let camera = &data.scene.views[0].camera;
+        let in_front = Vector3::zeros();
+        let behind = camera.center_in_world * 2.0;
+        let segment = LineSegment3::new(behind, in_front);
+        let part = visible_part(&segment, camera, 0.0).unwrap();
+        assert!((part.end - camera.project(&in_front).pixel).norm() < 1e-9);
+        assert!(part.start.iter().all(|x| x.is_finite()));
+        let wholly = LineSegment3::new(behind, behind * 1.5);
+        assert_eq!(visible_part(&wholly, camera, 0.0), None);
+    }
+
+    #[test]
+    fn spread_views_are_distinct_and_far_apart() {
+        let mut views = scene().scene.views;
+        let chosen = spread_views(&views, 6);
+        assert_eq!(chosen.len(), 6);
+        assert!(chosen.contains(&0) && chosen.windows(2).all(|w| w[0] < w[1]));
+        assert_eq!(spread_views(&views, 99), (0..12).collect::<Vec<_>>());
+        assert!(spread_views(&[], 6).is_empty());
+        // Two of the places are the same: one of them is enough.
+        views.truncate(3);
+        views[1].camera = views[0].camera;
+        assert_eq!(spread_views(&views, 2), [0, 2]);
+    }
+}

@@ -1,0 +1,170 @@
+//! The wireframe alone, on white, from a viewpoint that shows its shape.
+
+use super::line_drawing::{Pen, draw_disc, draw_segment};
+use super::visible_part;
+use image::{Rgb, RgbImage};
+use nalgebra::{Matrix3, Vector3};
+use neat_core::{Camera, Intrinsics, Scene, Wireframe3d};
+
+/// Width and height of the picture.
+const SIZE: u32 = 1200;
+/// The camera stands so many radii of the object away: near enough for a little
+/// perspective.
+const DISTANCE: f64 = 4.0;
+/// The object fills so much of the picture's half width.
+const FILLED: f64 = 0.88;
+/// Lines are drawn in so many pieces, each in the colour of its depth.
+const PIECES: usize = 24;
+const NEAR_COLOR: [f64; 3] = [18.0, 44.0, 92.0];
+const FAR_COLOR: [f64; 3] = [172.0, 188.0, 212.0];
+const JUNCTION: Pen = Pen {
+    color: [224, 72, 32],
+    radius: 6.0,
+};
+
+/// Draws the wireframe; far lines are paler than near ones. Without junctions
+/// the picture is white.
+///
+/// The viewing direction is that of the scene's camera from which the edges
+/// appear least foreshortened.
+pub fn draw_wireframe(wireframe: &Wireframe3d, scene: &Scene) -> RgbImage {
+    let mut picture = RgbImage::from_pixel(SIZE, SIZE, Rgb([255; 3]));
+    let Some((center, radius)) = bounding_ball(wireframe) else {
+        return picture;
+    };
+    let orientations = scene.views.iter().map(|view| view.camera.world_from_camera);
+    let orientation = orientations
+        .max_by(|a, b| openness(wireframe, a).total_cmp(&openness(wireframe, b)))
+        .unwrap_or_else(Matrix3::identity);
+    let camera = camera_at(&orientation, &center, radius);
+
+    let depth = |point: &Vector3<f64>| camera.to_camera(point).z;
+    let mut pieces: Vec<_> = wireframe
+        .segments()
+        .iter()
+        .flat_map(|segment| {
+            (0..PIECES).map(|i| {
+                let [a, b] = [i, i + 1].map(|i| segment.point_at(i as f64 / PIECES as f64));
+                neat_core::LineSegment3::new(a, b)
+            })
+        })
+        .collect();
+    // Near lines go over far ones.
+    pieces.sort_by(|a, b| depth(&b.point_at(0.5)).total_cmp(&depth(&a.point_at(0.5))));
+    for piece in &pieces {
+        let nearness = (DISTANCE + 1.0 - depth(&piece.point_at(0.5)) / radius) / 2.0;
+        let pen = line_pen(nearness.clamp(0.0, 1.0));
+        if let Some(segment) = visible_part(piece, &camera, 0.0) {
+            draw_segment(&mut picture, &segment, &pen);
+        }
+    }
+    for junction in &wireframe.junctions {
+        draw_disc(&mut picture, &camera.project(junction).pixel, &JUNCTION);
+    }
+    picture
+}
+
+fn line_pen(nearness: f64) -> Pen {
+    let color = std::array::from_fn(|i| {
+        (FAR_COLOR[i] + (NEAR_COLOR[i] - FAR_COLOR[i]) * nearness).round() as u8
+    });
+    Pen {
+        color,
+        radius: 1.5 + nearness,
+    }
+}
+
+/// Centre and radius of a ball around all junctions; `None` without any.
+fn bounding_ball(wireframe: &Wireframe3d) -> Option<(Vector3<f64>, f64)> {
+    let first = wireframe.junctions.first()?;
+    let (low, high) = wireframe
+        .junctions
+        .iter()
+        .fold((*first, *first), |(low, high), p| (low.inf(p), high.sup(p)));
+    let center = (low + high) / 2.0;
+    let radius = wireframe
+        .junctions
+        .iter()
+        .map(|p| (p - center).norm())
+        .fold(0.0, f64::max);
+    // One junction alone has no extent.
+    Some((center, if radius > 0.0 { radius } else { 1.0 }))
+}
+
+/// Mean logarithm of the factor by which the viewing direction shortens an edge:
+/// largest where no group of parallel edges points at the viewer.
+fn openness(wireframe: &Wireframe3d, world_from_camera: &Matrix3<f64>) -> f64 {
+    /// An edge that is seen end on must not outweigh all others.
+    const FLOOR: f64 = 0.05;
+    let forward = world_from_camera.column(2);
+    let logarithms = wireframe.segments().into_iter().map(|segment| {
+        let direction = segment.end - segment.start;
+        let cosine = direction.dot(&forward) / direction.norm().max(f64::MIN_POSITIVE);
+        (1.0 - cosine * cosine).max(0.0).sqrt().max(FLOOR).ln()
+    });
+    logarithms.sum()
+}
+
+/// The camera of the picture, turned like `world_from_camera`, with the ball in
+/// its middle.
+fn camera_at(world_from_camera: &Matrix3<f64>, center: &Vector3<f64>, radius: f64) -> Camera {
+    let half = f64::from(SIZE) / 2.0;
+    // A ball at distance d appears with the tangent 1 / √(d² − 1).
+    let focal = FILLED * half * (DISTANCE * DISTANCE - 1.0).sqrt();
+    Camera {
+        intrinsics: Intrinsics {
+            fx: focal,
+            fy: focal,
+            cx: half - 0.5,
+            cy: half - 0.5,
+            skew: 0.0,
+        },
+        world_from_camera: *world_from_camera,
+        center_in_world: center - world_from_camera.column(2) * (DISTANCE * radius),
+        width: SIZE,
+        height: SIZE,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use neat_core::synthetic::{Solid, SyntheticScene, generate};
+
+    #[test]
+    fn the_object_fills_the_picture_without_leaving_it() {
+        let config = SyntheticScene {
+            solid: Solid::LPrism,
+            views: 5,
+            image_size: 32,
+            ..SyntheticScene::default()
+        };
+        let data = generate(&config).unwrap();
+        let picture = draw_wireframe(&data.truth, &data.scene);
+        let inked = |x: u32, y: u32| picture.get_pixel(x, y).0 != [255; 3];
+        let columns: Vec<u32> = (0..SIZE)
+            .filter(|x| (0..SIZE).any(|y| inked(*x, y)))
+            .collect();
+        let (first, last) = (columns[0], columns[columns.len() - 1]);
+        assert!(first > 0 && last < SIZE - 1, "{first} {last}");
+        assert!(last - first > SIZE / 3, "{first} {last}");
+    }
+
+    #[test]
+    fn an_empty_wireframe_is_a_white_picture() {
+        let scene = Scene {
+            name: "empty".into(),
+            views: Vec::new(),
+            original_from_world: neat_core::Similarity::identity(),
+            pixel_center: 0.5,
+        };
+        let picture = draw_wireframe(&Wireframe3d::default(), &scene);
+        assert!(picture.pixels().all(|pixel| pixel.0 == [255; 3]));
+        let lonely = Wireframe3d {
+            junctions: vec![Vector3::new(1.0, 2.0, 3.0)],
+            edges: Vec::new(),
+        };
+        let picture = draw_wireframe(&lonely, &scene);
+        assert_eq!(picture.get_pixel(SIZE / 2, SIZE / 2).0, JUNCTION.color);
+    }
+}

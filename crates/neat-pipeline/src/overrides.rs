@@ -1,0 +1,274 @@
+//! `--set key.path=value` on top of a [`Config`].
+//!
+//! The value is read as TOML; a word that is not TOML is a string, and `none`
+//! takes an optional value away:
+//!
+//! ```text
+//! --set train.steps=500
+//! --set train.views=all
+//! --set data.scene_radius=none
+//! --set 'train.adam={ beta_1 = 0.9, beta_2 = 0.99, epsilon = 1e-8 }'
+//! ```
+
+use crate::Config;
+use serde_json::Value;
+
+/// Why an override cannot be applied.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OverrideError {
+    /// There is no `=`.
+    #[error("`--set {0}` has no `=`; write it as `--set key.path=value`")]
+    NoEqualsSign(String),
+    /// The configuration has no such key.
+    #[error("there is no key `{key}` in the configuration{suggestion}; {valid}")]
+    UnknownKey {
+        /// The path up to and including the first unknown part.
+        key: String,
+        /// ", did you mean `…`?" or nothing.
+        suggestion: String,
+        /// Which keys there are at that level.
+        valid: String,
+    },
+    /// The value is of the wrong kind.
+    #[error("`{key}` cannot be `{value}`: {reason}")]
+    Value {
+        /// The key.
+        key: String,
+        /// The value as it was written.
+        value: String,
+        /// What is expected.
+        reason: String,
+    },
+}
+
+/// Applies overrides of the form `key.path=value` from first to last.
+///
+/// # Errors
+/// If one has no `=`, names a key that the configuration does not have, or gives
+/// a value of the wrong kind. The message names the key, the valid keys at its
+/// level and the most similar one.
+pub fn apply_overrides(config: &Config, overrides: &[String]) -> Result<Config, OverrideError> {
+    apply_to(config, overrides)
+}
+
+/// [`apply_overrides`] for any tree of structs.
+fn apply_to<T>(config: &T, overrides: &[String]) -> Result<T, OverrideError>
+where
+    T: Clone + serde::Serialize + serde::de::DeserializeOwned,
+{
+    overrides.iter().try_fold(config.clone(), |config, text| {
+        let (key, value) = text
+            .split_once('=')
+            .ok_or_else(|| OverrideError::NoEqualsSign(text.clone()))?;
+        set(&config, key.trim(), value.trim())
+    })
+}
+
+fn set<T>(config: &T, key: &str, text: &str) -> Result<T, OverrideError>
+where
+    T: serde::Serialize + serde::de::DeserializeOwned,
+{
+    let wrong_value = |reason: String| OverrideError::Value {
+        key: key.to_owned(),
+        value: text.to_owned(),
+        reason,
+    };
+    // JSON, because it spells out the optional keys that have no value.
+    let mut tree = serde_json::to_value(config).map_err(|e| wrong_value(e.to_string()))?;
+    *slot(&mut tree, key)? = parse_value(text).map_err(wrong_value)?;
+    serde_json::from_value(tree).map_err(|e| wrong_value(e.to_string()))
+}
+
+/// The place in the tree that `key` names.
+fn slot<'a>(tree: &'a mut Value, key: &str) -> Result<&'a mut Value, OverrideError> {
+    let mut node = tree;
+    let mut level = String::new();
+    for part in key.split('.') {
+        let at = level.clone();
+        if !level.is_empty() {
+            level.push('.');
+        }
+        level.push_str(part);
+        let keys: Vec<String> = match &*node {
+            Value::Object(table) => table.keys().cloned().collect(),
+            _ => Vec::new(),
+        };
+        node = node
+            .get_mut(part)
+            .ok_or_else(|| unknown_key(level.clone(), &at, part, &keys))?;
+    }
+    Ok(node)
+}
+
+fn unknown_key(key: String, level: &str, part: &str, keys: &[String]) -> OverrideError {
+    let prefix = if level.is_empty() {
+        String::new()
+    } else {
+        format!("{level}.")
+    };
+    let list = |keys: &[String]| {
+        let names: Vec<_> = keys.iter().map(|k| format!("`{prefix}{k}`")).collect();
+        names.join(", ")
+    };
+    OverrideError::UnknownKey {
+        key,
+        suggestion: most_similar(part, keys)
+            .map(|name| format!(", did you mean `{prefix}{name}`?"))
+            .unwrap_or_default(),
+        valid: if keys.is_empty() {
+            format!("`{level}` is a value and has no keys")
+        } else {
+            format!("the keys are {}", list(keys))
+        },
+    }
+}
+
+/// Reads a value as TOML; what is not TOML is a plain string.
+fn parse_value(text: &str) -> Result<Value, String> {
+    if text == "none" {
+        return Ok(Value::Null);
+    }
+    match text.parse::<toml::Value>() {
+        Ok(toml::Value::Float(x)) if !x.is_finite() => Err("it must be a finite number".into()),
+        Ok(value) => serde_json::to_value(value).map_err(|e| e.to_string()),
+        Err(_) => Ok(Value::String(text.to_owned())),
+    }
+}
+
+/// The candidate nearest to `name`, if it is near enough to be a slip of the
+/// finger.
+fn most_similar<'a>(name: &str, candidates: &'a [String]) -> Option<&'a String> {
+    candidates
+        .iter()
+        .map(|candidate| (edit_distance(name, candidate), candidate))
+        .filter(|(distance, candidate)| *distance <= candidate.chars().count().max(3) / 3)
+        .min()
+        .map(|(_, candidate)| candidate)
+}
+
+/// Levenshtein distance: the fewest insertions, deletions and replacements.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, x) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, y) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(x != *y);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(row[j + 1] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::{Deserialize, Serialize};
+
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Tree {
+        train: Train,
+        views: Views,
+    }
+
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Train {
+        steps: u64,
+        learning_rate: f64,
+        radius: Option<f64>,
+    }
+
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Views {
+        One,
+        All,
+    }
+
+    fn tree() -> Tree {
+        Tree {
+            train: Train {
+                steps: 10,
+                learning_rate: 0.5,
+                radius: Some(1.0),
+            },
+            views: Views::One,
+        }
+    }
+
+    fn applied(overrides: &[&str]) -> Result<Tree, OverrideError> {
+        let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
+        apply_to(&tree(), &overrides)
+    }
+
+    #[test]
+    fn values_of_every_kind_are_set() {
+        let set = applied(&[
+            "train.steps = 7",
+            "train.learning_rate=1",
+            "train.radius=none",
+            "views=all",
+        ])
+        .unwrap();
+        let expected = Tree {
+            train: Train {
+                steps: 7,
+                learning_rate: 1.0,
+                radius: None,
+            },
+            views: Views::All,
+        };
+        assert_eq!(set, expected);
+        // The last one wins, and what is none can get a value again.
+        let again = applied(&["train.radius=none", "train.radius=2.5"]).unwrap();
+        assert_eq!(again.train.radius, Some(2.5));
+        let table = applied(&["train={ steps = 1, learning_rate = 2.0 }"]).unwrap();
+        assert_eq!(table.train.steps, 1);
+    }
+
+    #[test]
+    fn unknown_keys_list_the_valid_ones_and_the_nearest() {
+        let message = applied(&["train.stepz=1"]).unwrap_err().to_string();
+        assert!(message.contains("did you mean `train.steps`?"), "{message}");
+        assert!(message.contains("`train.learning_rate`"), "{message}");
+        let message = applied(&["training.steps=1"]).unwrap_err().to_string();
+        assert!(message.contains("no key `training`"), "{message}");
+        assert!(!message.contains("did you mean"), "{message}");
+        assert!(message.contains("`views`"), "{message}");
+        let message = applied(&["train.steps.x=1"]).unwrap_err().to_string();
+        assert!(message.contains("`train.steps` is a value"), "{message}");
+    }
+
+    #[test]
+    fn wrong_values_name_the_key() {
+        for text in [
+            "train.steps=many",
+            "train.steps=-1",
+            "train.steps=none",
+            "train.learning_rate=nan",
+            "train.learning_rate=inf",
+            "views=some",
+        ] {
+            let message = applied(&[text]).unwrap_err().to_string();
+            let (key, value) = text.split_once('=').unwrap();
+            assert!(message.contains(&format!("`{key}`")), "{message}");
+            assert!(message.contains(value), "{message}");
+        }
+        assert_eq!(
+            applied(&["train.steps"]),
+            Err(OverrideError::NoEqualsSign("train.steps".into()))
+        );
+    }
+
+    #[test]
+    fn edit_distances() {
+        assert_eq!(edit_distance("kitten", "sitting"), 3);
+        assert_eq!(edit_distance("", "abc"), 3);
+        assert_eq!(edit_distance("abc", ""), 3);
+        assert_eq!(edit_distance("same", "same"), 0);
+    }
+}
