@@ -24,6 +24,7 @@ pub mod line_segment;
 pub mod npz;
 pub mod point_cloud;
 pub mod scene;
+pub mod synthetic;
 pub mod wireframe2d;
 pub mod wireframe3d;
 

@@ -1,0 +1,187 @@
+//! Configuration and assembly of synthetic scenes.
+
+use super::detection::detect;
+use super::viewpoints::{min_distance, viewpoints};
+use super::visible_edges::{VisiblePart, visible_parts};
+use super::{Frustum, Solid, render};
+use crate::{Scene, Similarity, View, Wireframe3d};
+use nalgebra::Vector2;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// What to generate.
+///
+/// ```
+/// use neat_core::synthetic::{Solid, SyntheticScene, generate};
+///
+/// let config = SyntheticScene {
+///     solid: Solid::Box,
+///     views: 4,
+///     image_size: 64,
+///     ..SyntheticScene::default()
+/// };
+/// let data = generate(&config)?;
+/// assert_eq!(data.scene.views.len(), 4);
+/// assert_eq!(data.truth.junctions.len(), 8);
+/// # Ok::<(), neat_core::synthetic::SyntheticError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SyntheticScene {
+    /// The object.
+    pub solid: Solid,
+    /// Number of views.
+    pub views: usize,
+    /// Width and height of the images, in pixels.
+    pub image_size: u32,
+    /// Distance of the cameras from the origin, the object's centre.
+    pub camera_distance: f64,
+    /// Seed of all randomness.
+    pub seed: u64,
+    /// Standard deviation of each coordinate of a detected vertex, in pixels.
+    pub noise_in_pixels: f64,
+    /// Probability that a visible part of an edge is detected.
+    pub detection_rate: f64,
+    /// False segments in every view.
+    pub false_segments: usize,
+    /// Visible parts shorter than this are never detected, in pixels.
+    pub min_visible_length: f64,
+    /// Lambertian shading; without it faces show their plain albedo.
+    pub shading: bool,
+}
+
+impl Default for SyntheticScene {
+    /// As many views as the published toy scene has, in its geometry, with
+    /// detections about as good as HAWP's.
+    fn default() -> Self {
+        Self {
+            solid: Solid::default(),
+            views: 100,
+            image_size: 512,
+            camera_distance: 2.0,
+            seed: 0,
+            noise_in_pixels: 0.5,
+            detection_rate: 0.8,
+            false_segments: 2,
+            min_visible_length: 6.0,
+            shading: true,
+        }
+    }
+}
+
+/// Why a synthetic scene cannot be generated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("synthetic scene: {field} is {value}; choose a value from {min} to {max}")]
+pub struct SyntheticError {
+    /// The field of [`SyntheticScene`].
+    pub field: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Smallest possible value.
+    pub min: f64,
+    /// Largest possible value.
+    pub max: f64,
+}
+
+impl SyntheticScene {
+    /// Checks every field against its range.
+    ///
+    /// # Errors
+    /// The first field outside its range, or not a number.
+    pub fn validate(&self) -> Result<(), SyntheticError> {
+        let size = f64::from(self.image_size);
+        let nearest = min_distance(Solid::BOUNDING_RADIUS);
+        let ranges = [
+            ("views", self.views as f64, 1.0, 10_000.0),
+            ("image_size", size, 16.0, 8192.0),
+            ("camera_distance", self.camera_distance, nearest, 100.0),
+            ("noise_in_pixels", self.noise_in_pixels, 0.0, size),
+            ("detection_rate", self.detection_rate, 0.0, 1.0),
+            ("false_segments", self.false_segments as f64, 0.0, 100_000.0),
+            (
+                "min_visible_length",
+                self.min_visible_length,
+                0.0,
+                2.0 * size,
+            ),
+        ];
+        ranges
+            .into_iter()
+            .find(|(_, value, min, max)| !(min..=max).contains(&value))
+            .map_or(Ok(()), |(field, value, min, max)| {
+                Err(SyntheticError {
+                    field,
+                    value,
+                    min,
+                    max,
+                })
+            })
+    }
+}
+
+/// A generated scene and everything that is true about it.
+#[derive(Clone, Debug)]
+pub struct SyntheticData {
+    /// The posed images with their detected 2D wireframes.
+    pub scene: Scene,
+    /// The 3D wireframe that a perfect reconstruction would find.
+    pub truth: Wireframe3d,
+    /// The solid, with its exact signed distance.
+    pub solid: Frustum,
+    /// One for each view.
+    pub view_truths: Vec<ViewTruth>,
+}
+
+/// What is truly to be seen in one view.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewTruth {
+    /// The visible parts of all edges, without noise, that are long enough.
+    pub visible: Vec<VisiblePart>,
+    /// For each edge of the view's 2D wireframe, the index into `visible` of
+    /// the part it shows; `None` for a false segment.
+    pub sources: Vec<Option<usize>>,
+}
+
+/// Generates a scene: the world is centred on the object,
+/// [`Scene::original_from_world`] is the identity and [`Scene::pixel_center`] 0.5.
+///
+/// # Errors
+/// See [`SyntheticScene::validate`].
+pub fn generate(config: &SyntheticScene) -> Result<SyntheticData, SyntheticError> {
+    config.validate()?;
+    let solid = config.solid.frustum();
+    let (views, view_truths) = viewpoints(
+        config.views,
+        config.camera_distance,
+        config.image_size,
+        config.seed,
+    )
+    .into_par_iter()
+    .enumerate()
+    .map(|(index, camera)| {
+        let mut visible = visible_parts(&solid, &camera);
+        visible.retain(|part| part.segment.length() >= config.min_visible_length);
+        let whole_image = [0.0, f64::from(config.image_size)].map(|c| Vector2::new(c, c));
+        let bounds = solid.bounds_in_image(&camera).unwrap_or(whole_image);
+        let (wireframe, sources) = detect(&visible, config, index, bounds);
+        let view = View {
+            name: format!("image_{index:04}"),
+            camera,
+            wireframe,
+            image: render(&solid, &camera, config.shading),
+        };
+        (view, ViewTruth { visible, sources })
+    })
+    .unzip();
+    Ok(SyntheticData {
+        scene: Scene {
+            name: config.solid.name().to_owned(),
+            views,
+            original_from_world: Similarity::identity(),
+            pixel_center: 0.5,
+        },
+        truth: solid.wireframe().clone(),
+        solid,
+        view_truths,
+    })
+}
