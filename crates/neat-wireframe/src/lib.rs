@@ -3,23 +3,42 @@
 //! No learning framework: anything that proposes 3D segments can use this crate.
 
 pub mod attraction;
+pub mod attraction_hypotheses;
+pub mod bundle_adjustment;
+pub mod cleanup;
 pub mod distance_matrix;
+pub mod edge_completion;
+pub mod edge_support;
 pub mod export;
+pub mod fast_back_end;
+pub mod junction_modes;
 pub mod junction_refinement;
 pub mod junction_voting;
 pub mod metrics;
 pub mod neat_lines;
+pub mod normal_equations;
 pub mod observation;
+pub mod occlusion;
 pub mod paper_back_end;
+pub mod projection;
 pub mod proposal;
+pub mod robust_segments;
+pub mod segment_ends;
+pub mod segment_matching;
 pub mod signed_distance;
+pub mod triangulation;
 pub mod validity;
 pub mod visibility;
+
+mod evidence;
+mod point_index;
 
 pub use neat_core::Wireframe3d;
 pub use observation::ViewObservation;
 pub use proposal::SegmentProposal;
 pub use signed_distance::SignedDistance;
 
+#[cfg(test)]
+mod test_scenes;
 #[cfg(test)]
 mod test_support;

@@ -1,0 +1,251 @@
+//! Clean-up of the graph: one junction per place, one edge per line, nothing
+//! isolated.
+
+use crate::edge_support::SupportedEdge;
+use nalgebra::Vector3;
+use neat_core::LineSegment3;
+use serde::{Deserialize, Serialize};
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+
+/// Settings of [`clean_up`]; lengths in world units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CleanupConfig {
+    /// Junctions closer than this become one.
+    pub merge_distance: f64,
+    /// A junction closer than this to the inside of an edge lies on it.
+    pub collinear_distance: f64,
+    /// The inside of an edge excludes this share of it at both ends.
+    pub end_margin: f64,
+}
+
+impl Default for CleanupConfig {
+    fn default() -> Self {
+        Self {
+            merge_distance: 0.015,
+            collinear_distance: 0.015,
+            end_margin: 0.02,
+        }
+    }
+}
+
+/// The edges by their pair of junctions.
+type EdgesByPair = BTreeMap<[usize; 2], SupportedEdge>;
+
+/// Merges near junctions, keeps either a long edge or its parts, and drops the
+/// junctions without edges.
+///
+/// Indices in the result are those of the returned junctions; edges are sorted.
+///
+/// # Panics
+/// If an edge names a junction that does not exist.
+pub fn clean_up(
+    junctions: &[Vector3<f64>],
+    edges: &[SupportedEdge],
+    config: &CleanupConfig,
+) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
+    let merging = Merging::new(junctions, edges, config.merge_distance);
+    let mut by_pair = merging.apply(edges);
+    resolve_collinear(&mut by_pair, junctions, &merging.kept, config);
+    drop_isolated(junctions, by_pair.into_values())
+}
+
+/// Which junction stands for each.
+struct Merging {
+    /// The junctions that stay, best supported first.
+    kept: Vec<usize>,
+    /// For every junction the one that stands for it.
+    representative: Vec<usize>,
+}
+
+impl Merging {
+    fn new(junctions: &[Vector3<f64>], edges: &[SupportedEdge], distance: f64) -> Self {
+        let mut support = vec![0; junctions.len()];
+        for edge in edges {
+            for junction in edge.junctions {
+                support[junction] += edge.support;
+            }
+        }
+        let mut order: Vec<usize> = (0..junctions.len()).collect();
+        order.sort_by_key(|junction| Reverse(support[*junction]));
+        let mut kept: Vec<usize> = Vec::new();
+        let mut representative: Vec<usize> = (0..junctions.len()).collect();
+        for junction in order {
+            let near = kept
+                .iter()
+                .find(|other| (junctions[**other] - junctions[junction]).norm() < distance);
+            match near {
+                Some(other) => representative[junction] = *other,
+                None => kept.push(junction),
+            }
+        }
+        Self {
+            kept,
+            representative,
+        }
+    }
+
+    /// The edges between representatives; of parallel ones the best supported.
+    fn apply(&self, edges: &[SupportedEdge]) -> EdgesByPair {
+        let mut by_pair = EdgesByPair::new();
+        for edge in edges {
+            let [a, b] = edge.junctions.map(|junction| self.representative[junction]);
+            if a == b {
+                continue;
+            }
+            let merged = SupportedEdge {
+                junctions: [a.min(b), a.max(b)],
+                ..*edge
+            };
+            by_pair
+                .entry(merged.junctions)
+                .and_modify(|present| {
+                    if merged.support > present.support {
+                        *present = merged;
+                    }
+                })
+                .or_insert(merged);
+        }
+        by_pair
+    }
+}
+
+/// Where a junction lies on the inside of an edge, removes the edge or its two
+/// parts: the long edge stays if its support is not less than that of either
+/// part, or if nothing else hangs on the junction. Long edges decide first.
+fn resolve_collinear(
+    edges: &mut EdgesByPair,
+    junctions: &[Vector3<f64>],
+    candidates: &[usize],
+    config: &CleanupConfig,
+) {
+    let segment = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
+    let mut longest_first: Vec<[usize; 2]> = edges.keys().copied().collect();
+    longest_first.sort_by(|p, q| f64::total_cmp(&segment(*q).length(), &segment(*p).length()));
+
+    for pair in longest_first {
+        let [a, b] = pair;
+        let long = segment(pair);
+        for &c in candidates {
+            let Some(long_support) = edges.get(&pair).map(|edge| edge.support) else {
+                break;
+            };
+            if c == a || c == b || !lies_inside(&long, &junctions[c], config) {
+                continue;
+            }
+            let parts = [[a.min(c), a.max(c)], [b.min(c), b.max(c)]];
+            let part_support = parts
+                .iter()
+                .filter_map(|part| edges.get(part))
+                .map(|part| part.support)
+                .max()
+                .unwrap_or(0);
+            let something_else_hangs_here = edges
+                .keys()
+                .any(|other| other.contains(&c) && !parts.contains(other));
+            if long_support >= part_support || !something_else_hangs_here {
+                for part in &parts {
+                    edges.remove(part);
+                }
+            } else {
+                edges.remove(&pair);
+            }
+        }
+    }
+}
+
+fn lies_inside(edge: &LineSegment3, point: &Vector3<f64>, config: &CleanupConfig) -> bool {
+    let t = edge.line_parameter(point);
+    t > config.end_margin
+        && t < 1.0 - config.end_margin
+        && (edge.point_at(t) - point).norm() < config.collinear_distance
+}
+
+/// The junctions that have edges, with edges that name them by their new index.
+fn drop_isolated(
+    junctions: &[Vector3<f64>],
+    edges: impl Iterator<Item = SupportedEdge>,
+) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
+    let mut edges: Vec<SupportedEdge> = edges.collect();
+    let mut used = vec![false; junctions.len()];
+    for junction in edges.iter().flat_map(|edge| edge.junctions) {
+        used[junction] = true;
+    }
+    let mut kept = Vec::new();
+    let mut new_index = vec![0; junctions.len()];
+    for (old, position) in junctions.iter().enumerate() {
+        if used[old] {
+            new_index[old] = kept.len();
+            kept.push(*position);
+        }
+    }
+    for edge in &mut edges {
+        edge.junctions = edge.junctions.map(|junction| new_index[junction]);
+    }
+    (kept, edges)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn edge(a: usize, b: usize, support: usize) -> SupportedEdge {
+        SupportedEdge {
+            junctions: [a, b],
+            support,
+            visible_views: None,
+        }
+    }
+
+    fn at(x: f64, y: f64) -> Vector3<f64> {
+        Vector3::new(x, y, 0.0)
+    }
+
+    /// Junctions, and the edges with their support.
+    type Graph = (Vec<Vector3<f64>>, Vec<([usize; 2], usize)>);
+
+    fn cleaned(junctions: &[Vector3<f64>], edges: &[SupportedEdge]) -> Graph {
+        let (junctions, edges) = clean_up(junctions, edges, &CleanupConfig::default());
+        let edges = edges.iter().map(|e| (e.junctions, e.support)).collect();
+        (junctions, edges)
+    }
+
+    #[test]
+    fn near_junctions_become_the_better_supported_one() {
+        let junctions = [at(0.0, 0.0), at(0.01, 0.0), at(1.0, 0.0), at(5.0, 5.0)];
+        let edges = [edge(0, 1, 9), edge(0, 2, 3), edge(1, 2, 7)];
+        assert_eq!(
+            cleaned(&junctions, &edges),
+            (vec![junctions[1], junctions[2]], vec![([0, 1], 7)])
+        );
+    }
+
+    #[test]
+    fn a_long_edge_beats_parts_that_are_not_better() {
+        let junctions = [at(0.0, 0.0), at(1.0, 0.0), at(0.5, 0.0), at(0.5, 1.0)];
+        let edges = [edge(0, 1, 8), edge(0, 2, 8), edge(1, 2, 3), edge(2, 3, 9)];
+        let (kept, edges) = cleaned(&junctions, &edges);
+        assert_eq!(kept.len(), 4);
+        assert_eq!(edges, [([0, 1], 8), ([2, 3], 9)]);
+    }
+
+    #[test]
+    fn better_parts_at_a_true_junction_beat_the_long_edge() {
+        let junctions = [at(0.0, 0.0), at(1.0, 0.0), at(0.5, 0.0), at(0.5, 1.0)];
+        let edges = [edge(0, 1, 5), edge(0, 2, 8), edge(1, 2, 3), edge(2, 3, 9)];
+        let (_, edges) = cleaned(&junctions, &edges);
+        assert_eq!(edges, [([0, 2], 8), ([1, 2], 3), ([2, 3], 9)]);
+    }
+
+    #[test]
+    fn a_junction_where_nothing_else_hangs_goes() {
+        let junctions = [at(0.0, 0.0), at(1.0, 0.0), at(0.5, 0.01)];
+        let edges = [edge(0, 1, 5), edge(0, 2, 8), edge(1, 2, 8)];
+        assert_eq!(
+            cleaned(&junctions, &edges),
+            (vec![junctions[0], junctions[1]], vec![([0, 1], 5)])
+        );
+        assert_eq!(cleaned(&[], &[]), (Vec::new(), Vec::new()));
+    }
+}

@@ -1,0 +1,412 @@
+//! The fast back end: from segment proposals to a wireframe graph that the 2D
+//! evidence of all views confirms.
+//!
+//! Where the paper's distillation (NEAT, Sec. 4.3) takes positions from the field,
+//! this one takes only neighbourhoods: an end within about 0.05 of a junction is
+//! enough. Positions come from triangulation and bundle adjustment of the 2D
+//! detections, edges from the pairs of junctions that detections join, precision
+//! from the surface, which tells where an edge ought to be seen.
+//!
+//! All steps work in a world whose scene ball is the unit ball around the
+//! origin, so every length in the configuration is a share of the scene's radius.
+
+use crate::attraction_hypotheses::{AttractionHypothesesConfig, attraction_hypotheses};
+use crate::bundle_adjustment::{BundleAdjustmentConfig, bundle_adjust};
+use crate::cleanup::{CleanupConfig, clean_up};
+use crate::edge_completion::complete_edges;
+use crate::edge_support::{EdgeSupportConfig, SupportedEdge, edge_support};
+use crate::evidence::Evidence;
+use crate::junction_modes::{JunctionModesConfig, junction_modes, supported_junctions};
+use crate::occlusion::{OcclusionConfig, visible_views};
+use crate::segment_ends::{SegmentEndConfig, segment_ends};
+use crate::triangulation::{TriangulationConfig, retriangulate};
+use crate::{SegmentProposal, SignedDistance, ViewObservation};
+use nalgebra::Vector3;
+use neat_core::Wireframe3d;
+use serde::{Deserialize, Serialize};
+
+/// Switches and constants of [`run`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FastBackEndConfig {
+    /// Take the modes of the segment ends as junctions.
+    pub use_junction_modes: bool,
+    /// Take the perceived junctions that segment ends support.
+    pub use_perceived_junctions: bool,
+    /// Re-estimate the junctions from the 2D ends.
+    pub retriangulation: bool,
+    /// Test all pairs of junctions as edges; off: those that proposals suggest.
+    pub edge_completion: bool,
+    /// Move all junctions until the projected edges lie on the detections.
+    pub bundle_adjustment: bool,
+    /// Drop edges supported in too few of the views in which they are visible.
+    pub occlusion_test: bool,
+    /// Merge near junctions and collinear edges, drop isolated junctions.
+    pub cleanup: bool,
+    /// Which segment ends count, and how much.
+    pub ends: SegmentEndConfig,
+    /// Constants of the junction candidates.
+    pub modes: JunctionModesConfig,
+    /// Constants of the re-triangulation.
+    pub triangulation: TriangulationConfig,
+    /// Constants of the edges that proposals suggest.
+    pub attraction: AttractionHypothesesConfig,
+    /// When views support an edge.
+    pub support: EdgeSupportConfig,
+    /// Constants of the bundle adjustment.
+    pub adjustment: BundleAdjustmentConfig,
+    /// Constants of the occlusion test.
+    pub occlusion: OcclusionConfig,
+    /// Constants of the clean-up.
+    pub merging: CleanupConfig,
+}
+
+impl Default for FastBackEndConfig {
+    fn default() -> Self {
+        Self {
+            use_junction_modes: true,
+            use_perceived_junctions: true,
+            retriangulation: true,
+            edge_completion: true,
+            bundle_adjustment: true,
+            occlusion_test: true,
+            cleanup: true,
+            ends: SegmentEndConfig::default(),
+            modes: JunctionModesConfig::default(),
+            triangulation: TriangulationConfig::default(),
+            attraction: AttractionHypothesesConfig::default(),
+            support: EdgeSupportConfig::default(),
+            adjustment: BundleAdjustmentConfig::default(),
+            occlusion: OcclusionConfig::default(),
+            merging: CleanupConfig::default(),
+        }
+    }
+}
+
+/// A wireframe with the evidence for each of its edges.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FastBackEndResult {
+    /// Junctions in lexicographic order of their coordinates; edges `[a, b]`,
+    /// a < b, sorted.
+    pub wireframe: Wireframe3d,
+    /// One entry per edge of the wireframe.
+    pub edges: Vec<EdgeEvidence>,
+    /// What each step kept.
+    pub report: FastBackEndReport,
+}
+
+/// What speaks for an edge, as counted when it was chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EdgeEvidence {
+    /// Number of views with a detection on the edge.
+    pub support: usize,
+    /// Number of views in which the surface leaves it visible; `None` without
+    /// the occlusion test.
+    pub visible_views: Option<usize>,
+    /// Support divided by visible views, see
+    /// [`OcclusionConfig::support_ratio`].
+    pub support_ratio: Option<f64>,
+}
+
+/// How many things each step of [`run`] kept, in the order of the steps.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FastBackEndReport {
+    /// Views with a finite camera and at least one finite segment.
+    pub usable_views: usize,
+    /// Finite proposals for a segment of such a view.
+    pub usable_proposals: usize,
+    /// Views that must support an edge.
+    pub required_views: usize,
+    /// Proposal ends that reproject well and on which the rays agree.
+    pub segment_ends: usize,
+    /// Junction candidates that are modes of these ends.
+    pub junction_modes: usize,
+    /// Perceived junctions that the ends support and no mode stands for.
+    pub added_perceived_junctions: usize,
+    /// Junctions after re-triangulation.
+    pub triangulated_junctions: usize,
+    /// Edges with enough support before any bundle adjustment.
+    pub supported_edges: usize,
+    /// Edges with enough support after it.
+    pub supported_edges_after_adjustment: usize,
+    /// Edges left by the occlusion test.
+    pub unoccluded_edges: usize,
+    /// Junctions of the result.
+    pub junctions: usize,
+    /// Edges of the result.
+    pub edges: usize,
+}
+
+/// Builds the wireframe.
+///
+/// - `observations`: cameras and detected segments. Views without a finite
+///   camera or segment do not count.
+/// - `proposals`: 3D segments with indices into `observations`; those that are
+///   not finite or name nothing do not count.
+/// - `perceived_junctions`: further candidates, from global junction perceiving.
+/// - `surface`: asked for distances in the world of the cameras.
+/// - `scene_radius`: radius of the ball around the world's origin in which
+///   `surface` means something. Lengths in `config` are shares of it.
+///
+/// The result is empty where nothing can be built: no usable proposals, a
+/// radius that is not a positive number. It does not depend on the number of
+/// threads.
+pub fn run(
+    observations: &[ViewObservation],
+    proposals: &[SegmentProposal],
+    perceived_junctions: &[Vector3<f64>],
+    surface: &dyn SignedDistance,
+    scene_radius: f64,
+    config: &FastBackEndConfig,
+) -> FastBackEndResult {
+    if !(scene_radius.is_normal() && scene_radius > 0.0) {
+        return FastBackEndResult::default();
+    }
+    let Evidence { views, proposals } =
+        Evidence::new(observations, proposals, scene_radius.recip());
+    let perceived: Vec<_> = perceived_junctions
+        .iter()
+        .map(|junction| junction / scene_radius)
+        .collect();
+    let back_end = BackEnd {
+        required_views: config.support.required_views(views.len()),
+        surface: UnitBallSurface {
+            surface,
+            scene_radius,
+        },
+        views: &views,
+        proposals: &proposals,
+        config,
+    };
+    let mut report = FastBackEndReport {
+        usable_views: views.len(),
+        usable_proposals: proposals.len(),
+        required_views: back_end.required_views,
+        ..Default::default()
+    };
+    let junctions = back_end.find_junctions(&perceived, &mut report);
+    let (junctions, edges) = back_end.find_edges(junctions, &mut report);
+    let (junctions, edges) = canonical_order(junctions, edges);
+    report.junctions = junctions.len();
+    report.edges = edges.len();
+    FastBackEndResult {
+        wireframe: Wireframe3d {
+            junctions: junctions.iter().map(|x| x * scene_radius).collect(),
+            edges: edges.iter().map(|edge| edge.junctions).collect(),
+        },
+        edges: edges.iter().map(|edge| back_end.evidence(edge)).collect(),
+        report,
+    }
+}
+
+/// The usable input of one run.
+struct BackEnd<'a> {
+    views: &'a [ViewObservation],
+    proposals: &'a [SegmentProposal],
+    surface: UnitBallSurface<'a>,
+    required_views: usize,
+    config: &'a FastBackEndConfig,
+}
+
+impl BackEnd<'_> {
+    /// Candidates from the proposals' ends, re-triangulated.
+    fn find_junctions(
+        &self,
+        perceived: &[Vector3<f64>],
+        report: &mut FastBackEndReport,
+    ) -> Vec<Vector3<f64>> {
+        let config = self.config;
+        let ends = segment_ends(self.views, self.proposals, &config.ends);
+        report.segment_ends = ends.len();
+
+        let mut junctions = Vec::new();
+        if config.use_junction_modes {
+            junctions = junction_modes(&ends, &config.modes);
+        }
+        report.junction_modes = junctions.len();
+        if config.use_perceived_junctions {
+            let added = supported_junctions(perceived, &ends, &junctions, &config.modes);
+            report.added_perceived_junctions = added.len();
+            junctions.extend(added);
+        }
+        if config.retriangulation {
+            junctions = retriangulate(
+                &junctions,
+                &ends,
+                self.views,
+                self.required_views,
+                &config.triangulation,
+            );
+        }
+        report.triangulated_junctions = junctions.len();
+        junctions
+    }
+
+    /// The edges that the evidence confirms, with the junctions where it puts
+    /// them.
+    fn find_edges(
+        &self,
+        mut junctions: Vec<Vector3<f64>>,
+        report: &mut FastBackEndReport,
+    ) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
+        let config = self.config;
+        let hypotheses = (!config.edge_completion)
+            .then(|| attraction_hypotheses(&junctions, self.proposals, &config.attraction));
+        let mut edges = self.supported_edges(&junctions, hypotheses);
+        report.supported_edges = edges.len();
+
+        if config.bundle_adjustment {
+            for association in &config.adjustment.association_in_pixels {
+                junctions = self.adjust(&junctions, &edges, *association);
+            }
+            // Junctions have moved: pairs that just failed may pass now, and the
+            // other way round.
+            let hypotheses = (!config.edge_completion).then(|| pairs_of(&edges));
+            edges = self.supported_edges(&junctions, hypotheses);
+        }
+        report.supported_edges_after_adjustment = edges.len();
+
+        if config.occlusion_test {
+            edges = self.unoccluded(&junctions, edges);
+        }
+        report.unoccluded_edges = edges.len();
+
+        if config.cleanup {
+            (junctions, edges) = clean_up(&junctions, &edges, &config.merging);
+        }
+        if config.bundle_adjustment {
+            let association = config.adjustment.final_association_in_pixels;
+            junctions = self.adjust(&junctions, &edges, association);
+        }
+        (junctions, edges)
+    }
+
+    /// The pairs with enough support: among `hypotheses`, or among all.
+    fn supported_edges(
+        &self,
+        junctions: &[Vector3<f64>],
+        hypotheses: Option<Vec<[usize; 2]>>,
+    ) -> Vec<SupportedEdge> {
+        let config = &self.config.support;
+        let Some(hypotheses) = hypotheses else {
+            return complete_edges(self.views, junctions, self.required_views, config);
+        };
+        let mut edges = edge_support(self.views, junctions, &hypotheses, config);
+        edges.retain(|edge| edge.support >= self.required_views);
+        edges
+    }
+
+    fn adjust(
+        &self,
+        junctions: &[Vector3<f64>],
+        edges: &[SupportedEdge],
+        association_in_pixels: f64,
+    ) -> Vec<Vector3<f64>> {
+        bundle_adjust(
+            self.views,
+            junctions,
+            &pairs_of(edges),
+            association_in_pixels,
+            &self.config.adjustment,
+        )
+    }
+
+    /// The edges with support in enough of the views that could see them.
+    fn unoccluded(
+        &self,
+        junctions: &[Vector3<f64>],
+        edges: Vec<SupportedEdge>,
+    ) -> Vec<SupportedEdge> {
+        let config = &self.config.occlusion;
+        let visible = visible_views(
+            self.views,
+            junctions,
+            &pairs_of(&edges),
+            &self.surface,
+            config,
+        );
+        edges
+            .into_iter()
+            .zip(visible)
+            .filter(|(edge, visible)| {
+                config.support_ratio(edge.support, *visible, self.views.len())
+                    >= config.min_support_ratio
+            })
+            .map(|(edge, visible)| SupportedEdge {
+                visible_views: Some(visible),
+                ..edge
+            })
+            .collect()
+    }
+
+    fn evidence(&self, edge: &SupportedEdge) -> EdgeEvidence {
+        let ratio = |visible| {
+            let config = &self.config.occlusion;
+            config.support_ratio(edge.support, visible, self.views.len())
+        };
+        EdgeEvidence {
+            support: edge.support,
+            visible_views: edge.visible_views,
+            support_ratio: edge.visible_views.map(ratio),
+        }
+    }
+}
+
+fn pairs_of(edges: &[SupportedEdge]) -> Vec<[usize; 2]> {
+    edges.iter().map(|edge| edge.junctions).collect()
+}
+
+/// Sorts the junctions by their coordinates and the edges by their junctions.
+fn canonical_order(
+    junctions: Vec<Vector3<f64>>,
+    mut edges: Vec<SupportedEdge>,
+) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
+    let mut order: Vec<usize> = (0..junctions.len()).collect();
+    order.sort_by(|a, b| {
+        let (a, b) = (&junctions[*a], &junctions[*b]);
+        a.x.total_cmp(&b.x)
+            .then(a.y.total_cmp(&b.y))
+            .then(a.z.total_cmp(&b.z))
+    });
+    let mut new_index = vec![0; junctions.len()];
+    for (new, old) in order.iter().enumerate() {
+        new_index[*old] = new;
+    }
+    for edge in &mut edges {
+        let [a, b] = edge.junctions.map(|junction| new_index[junction]);
+        edge.junctions = [a.min(b), a.max(b)];
+    }
+    edges.sort_by_key(|edge| edge.junctions);
+    (order.into_iter().map(|old| junctions[old]).collect(), edges)
+}
+
+/// A surface in the world whose scene ball is the unit ball.
+struct UnitBallSurface<'a> {
+    surface: &'a dyn SignedDistance,
+    scene_radius: f64,
+}
+
+impl UnitBallSurface<'_> {
+    fn in_world(&self, points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        points.iter().map(|x| x * self.scene_radius).collect()
+    }
+}
+
+impl SignedDistance for UnitBallSurface<'_> {
+    fn sdf(&self, points: &[Vector3<f64>]) -> Vec<f64> {
+        let mut sdf = self.surface.sdf(&self.in_world(points));
+        for distance in &mut sdf {
+            *distance /= self.scene_radius;
+        }
+        sdf
+    }
+
+    fn sdf_and_gradient(&self, points: &[Vector3<f64>]) -> Vec<(f64, Vector3<f64>)> {
+        // Distances and points scale alike: the gradient stays.
+        let mut answers = self.surface.sdf_and_gradient(&self.in_world(points));
+        for (distance, _) in &mut answers {
+            *distance /= self.scene_radius;
+        }
+        answers
+    }
+}

@@ -1,0 +1,238 @@
+//! Junction candidates: the modes of the density of segment ends, and the
+//! perceived junctions that segment ends support.
+
+use crate::point_index::PointIndex;
+use crate::segment_ends::SegmentEnd;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Ends farther than this many sigmas from a point weigh less than 0.0004 of a
+/// near one: leaving them out makes the search near-linear.
+const KERNEL_RADIUS_IN_SIGMAS: f64 = 4.0;
+
+/// Settings of [`junction_modes`] and [`supported_junctions`]; lengths in world
+/// units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct JunctionModesConfig {
+    /// Standard deviation of the Gaussian kernel.
+    pub sigma: f64,
+    /// Candidates keep more than this distance from each other.
+    pub separation: f64,
+    /// A mode needs more kernel-weighted mass than this: about two good ends.
+    pub min_mass: f64,
+    /// Mean shift steps from every end.
+    pub iterations: usize,
+    /// A perceived junction is supported by the ends closer than this.
+    pub perceived_radius: f64,
+    /// A perceived junction needs more mass of ends than this.
+    pub perceived_min_mass: f64,
+}
+
+impl Default for JunctionModesConfig {
+    fn default() -> Self {
+        Self {
+            sigma: 0.02,
+            separation: 0.04,
+            min_mass: 1.0,
+            iterations: 10,
+            perceived_radius: 0.03,
+            perceived_min_mass: 1.0,
+        }
+    }
+}
+
+/// The modes of the weighted density of `ends`, heaviest first.
+///
+/// Mean shift from every end; of modes closer than the separation the heaviest
+/// stays.
+pub fn junction_modes(ends: &[SegmentEnd], config: &JunctionModesConfig) -> Vec<Vector3<f64>> {
+    let index = PointIndex::new(ends.iter().map(|end| end.position).collect());
+    let modes = ends
+        .par_iter()
+        .map(|end| climb(end.position, ends, &index, config))
+        .collect();
+    separated(modes, config.min_mass, config.separation, &[])
+}
+
+/// The perceived junctions (NEAT, global junction perceiving) that enough segment
+/// ends support and that keep the separation from `present` and from each other,
+/// best supported first.
+pub fn supported_junctions(
+    perceived: &[Vector3<f64>],
+    ends: &[SegmentEnd],
+    present: &[Vector3<f64>],
+    config: &JunctionModesConfig,
+) -> Vec<Vector3<f64>> {
+    let index = PointIndex::new(ends.iter().map(|end| end.position).collect());
+    let candidates = perceived
+        .iter()
+        .filter(|position| position.iter().all(|x| x.is_finite()))
+        .map(|position| {
+            let near = index.within(position, config.perceived_radius);
+            let mass = near
+                .iter()
+                .filter(|neighbour| neighbour.distance < config.perceived_radius)
+                .map(|neighbour| ends[neighbour.index].weight)
+                .sum();
+            (*position, mass)
+        })
+        .collect();
+    separated(
+        candidates,
+        config.perceived_min_mass,
+        config.separation,
+        present,
+    )
+}
+
+/// Follows the mean shift from `start`; the mode with its mass.
+fn climb(
+    start: Vector3<f64>,
+    ends: &[SegmentEnd],
+    index: &PointIndex<3>,
+    config: &JunctionModesConfig,
+) -> (Vector3<f64>, f64) {
+    let kernel_sums = |at: &Vector3<f64>| {
+        let mut mass = 0.0;
+        let mut weighted_sum = Vector3::zeros();
+        for near in index.within(at, KERNEL_RADIUS_IN_SIGMAS * config.sigma) {
+            let end = &ends[near.index];
+            let sigmas = near.distance / config.sigma;
+            let kernel = end.weight * (-0.5 * sigmas * sigmas).exp();
+            mass += kernel;
+            weighted_sum += kernel * end.position;
+        }
+        (mass, weighted_sum)
+    };
+    let mut mode = start;
+    for _ in 0..config.iterations {
+        let (mass, weighted_sum) = kernel_sums(&mode);
+        if mass > 0.0 {
+            mode = weighted_sum / mass;
+        }
+    }
+    (mode, kernel_sums(&mode).0)
+}
+
+/// The candidates with more than `min_mass`, heaviest first, each farther than
+/// `separation` from the accepted ones and from `present`.
+fn separated(
+    mut candidates: Vec<(Vector3<f64>, f64)>,
+    min_mass: f64,
+    separation: f64,
+    present: &[Vector3<f64>],
+) -> Vec<Vector3<f64>> {
+    candidates.retain(|(_, mass)| *mass > min_mass);
+    // A stable sort: of equal masses the first comes first.
+    candidates.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut accepted: Vec<Vector3<f64>> = Vec::new();
+    for (position, _) in candidates {
+        let mut others = present.iter().chain(&accepted);
+        if others.all(|other| (position - other).norm() > separation) {
+            accepted.push(position);
+        }
+    }
+    accepted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scenes::Noise;
+    use nalgebra::Vector2;
+
+    fn end(position: Vector3<f64>, weight: f64) -> SegmentEnd {
+        SegmentEnd {
+            position,
+            view: 0,
+            pixel: Vector2::zeros(),
+            weight,
+        }
+    }
+
+    fn noisy_clusters(centers: usize) -> (Vec<Vector3<f64>>, Vec<SegmentEnd>) {
+        let mut noise = Noise(11);
+        let centers: Vec<_> = (0..centers).map(|_| 2.0 * noise.vector()).collect();
+        let ends = centers
+            .iter()
+            .flat_map(|center| {
+                (0..20)
+                    .map(|_| {
+                        end(
+                            center + 0.02 * noise.vector(),
+                            0.75 + 0.25 * noise.uniform(),
+                        )
+                    })
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        (centers, ends)
+    }
+
+    /// The definition: every end pulls on every start.
+    fn all_pairs_modes(ends: &[SegmentEnd], config: &JunctionModesConfig) -> Vec<Vector3<f64>> {
+        let kernel = |end: &SegmentEnd, at: &Vector3<f64>| {
+            let squared = (end.position - at).norm_squared();
+            end.weight * (-squared / (2.0 * config.sigma * config.sigma)).exp()
+        };
+        let modes = ends
+            .iter()
+            .map(|start| {
+                let mut x = start.position;
+                for _ in 0..config.iterations {
+                    let sum: Vector3<f64> = ends.iter().map(|e| kernel(e, &x) * e.position).sum();
+                    x = sum / ends.iter().map(|e| kernel(e, &x)).sum::<f64>();
+                }
+                (x, ends.iter().map(|e| kernel(e, &x)).sum())
+            })
+            .collect();
+        separated(modes, config.min_mass, config.separation, &[])
+    }
+
+    #[test]
+    fn modes_are_those_of_the_all_pairs_form() {
+        let (centers, ends) = noisy_clusters(15);
+        let config = JunctionModesConfig::default();
+        let modes = junction_modes(&ends, &config);
+        let oracle = all_pairs_modes(&ends, &config);
+        assert_eq!(modes.len(), centers.len());
+        assert_eq!(modes.len(), oracle.len());
+        for (mode, expected) in modes.iter().zip(&oracle) {
+            assert!((mode - expected).norm() < 1e-4, "{mode} {expected}");
+        }
+        for center in centers {
+            assert!(modes.iter().any(|mode| (mode - center).norm() < 0.02));
+        }
+    }
+
+    #[test]
+    fn a_lone_end_is_no_mode() {
+        let config = JunctionModesConfig::default();
+        let lone = end(Vector3::new(0.3, 0.0, 0.0), 1.0);
+        assert!(junction_modes(&[lone], &config).is_empty());
+        assert!(junction_modes(&[], &config).is_empty());
+        assert_eq!(junction_modes(&[lone, lone], &config), [lone.position]);
+    }
+
+    #[test]
+    fn perceived_junctions_need_support_and_distance() {
+        let config = JunctionModesConfig::default();
+        let at = |x: f64| Vector3::new(x, 0.0, 0.0);
+        let ends: Vec<_> = [0.0, 0.001, 0.5, 0.5, 0.51, 0.9]
+            .iter()
+            .map(|x| end(at(*x), 0.8))
+            .collect();
+        let perceived = [at(0.01), at(0.49), at(0.52), at(0.9), at(f64::NAN)];
+        // 0.49 wins over 0.52: first of equal masses. 0.9 has one end only.
+        assert_eq!(
+            supported_junctions(&perceived, &ends, &[], &config),
+            [at(0.49), at(0.01)]
+        );
+        assert_eq!(
+            supported_junctions(&perceived, &ends, &[at(0.0)], &config),
+            [at(0.49)]
+        );
+    }
+}

@@ -1,0 +1,280 @@
+//! In how many views the surface leaves an edge visible.
+
+use crate::{SignedDistance, ViewObservation};
+use nalgebra::Vector3;
+use neat_core::{Camera, LineSegment3};
+use serde::{Deserialize, Serialize};
+
+/// Settings of [`visible_views`] and of the test that uses it. Lengths are in
+/// the unit of a scene whose ball has radius 1.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OcclusionConfig {
+    /// Points of an edge whose sight lines are followed.
+    pub points_per_edge: usize,
+    /// The first and the last of them lie this share of the edge from its ends.
+    pub end_margin: f64,
+    /// Samples of each sight line …
+    pub samples_per_sight_line: usize,
+    /// … from this distance …
+    pub start_distance: f64,
+    /// … to this one, or the camera.
+    pub end_distance: f64,
+    /// A signed distance at or below this hides the point.
+    pub min_sdf: f64,
+    /// Points outside this ball around the origin hide nothing: the surface
+    /// means nothing there.
+    pub ball_radius: f64,
+    /// Share of its points that must be visible for an edge to count as visible.
+    pub min_visible_share: f64,
+    /// An edge needs support in at least this share of the views in which it is
+    /// visible.
+    pub min_support_ratio: f64,
+    /// The ratio's denominator is at least this number of views …
+    pub min_denominator: f64,
+    /// … or this share of all views, whichever is less.
+    pub min_denominator_share: f64,
+}
+
+impl Default for OcclusionConfig {
+    fn default() -> Self {
+        Self {
+            points_per_edge: 7,
+            end_margin: 0.1,
+            samples_per_sight_line: 40,
+            start_distance: 0.05,
+            end_distance: 1.2,
+            min_sdf: -0.015,
+            ball_radius: 1.0,
+            min_visible_share: 0.6,
+            min_support_ratio: 0.3,
+            min_denominator: 20.0,
+            min_denominator_share: 0.2,
+        }
+    }
+}
+
+impl OcclusionConfig {
+    /// Support divided by visible views, the latter bounded from below so that
+    /// edges visible almost nowhere need evidence too.
+    pub fn support_ratio(&self, support: usize, visible_views: usize, views: usize) -> f64 {
+        let least = (self.min_denominator_share * views as f64).min(self.min_denominator);
+        let denominator = (visible_views as f64).max(least);
+        if denominator > 0.0 {
+            support as f64 / denominator
+        } else {
+            0.0
+        }
+    }
+}
+
+/// The number of views in which each edge is visible: most of its points project
+/// into the image and have a free sight line to the camera.
+///
+/// The surface answers one batch of points per edge.
+///
+/// # Panics
+/// If an edge names a junction that does not exist.
+pub fn visible_views(
+    views: &[ViewObservation],
+    junctions: &[Vector3<f64>],
+    edges: &[[usize; 2]],
+    surface: &dyn SignedDistance,
+    config: &OcclusionConfig,
+) -> Vec<usize> {
+    edges
+        .iter()
+        .map(|[a, b]| {
+            let edge = LineSegment3::new(junctions[*a], junctions[*b]);
+            visible_views_of_edge(views, &edge, surface, config)
+        })
+        .collect()
+}
+
+fn visible_views_of_edge(
+    views: &[ViewObservation],
+    edge: &LineSegment3,
+    surface: &dyn SignedDistance,
+    config: &OcclusionConfig,
+) -> usize {
+    let points = linspace(
+        config.end_margin,
+        1.0 - config.end_margin,
+        config.points_per_edge,
+    );
+    let mut samples = Vec::new();
+    // Per view and point, where its samples end; `None` for a point outside the
+    // image.
+    let mut sight_lines = Vec::with_capacity(views.len() * config.points_per_edge);
+    for view in views {
+        for t in &points {
+            let point = edge.point_at(*t);
+            let in_image = is_in_image(&view.camera, &point);
+            if in_image {
+                append_sight_line(&mut samples, &point, &view.camera, config);
+            }
+            sight_lines.push(in_image.then_some(samples.len()));
+        }
+    }
+    let sdf = surface.sdf(&samples);
+
+    let mut begin = 0;
+    let visible: Vec<bool> = sight_lines
+        .into_iter()
+        .map(|line| {
+            line.is_some_and(|end| {
+                // A surface that answers too few points hides the rest.
+                let free = sdf
+                    .get(begin..end)
+                    .is_some_and(|line| line.iter().all(|distance| *distance > config.min_sdf));
+                begin = end;
+                free
+            })
+        })
+        .collect();
+    visible
+        .chunks(config.points_per_edge.max(1))
+        .filter(|points| {
+            let count = points.iter().filter(|visible| **visible).count();
+            count as f64 >= config.min_visible_share * points.len() as f64
+        })
+        .count()
+}
+
+/// Appends the samples of the line from `point` to the camera that can hide it.
+fn append_sight_line(
+    samples: &mut Vec<Vector3<f64>>,
+    point: &Vector3<f64>,
+    camera: &Camera,
+    config: &OcclusionConfig,
+) {
+    let to_camera = camera.center_in_world - point;
+    let camera_distance = to_camera.norm();
+    let direction = to_camera / camera_distance;
+    samples.extend(
+        linspace(
+            config.start_distance,
+            config.end_distance,
+            config.samples_per_sight_line,
+        )
+        .into_iter()
+        .filter(|distance| *distance < camera_distance)
+        .map(|distance| point + direction * distance)
+        .filter(|sample| sample.norm() < config.ball_radius),
+    );
+}
+
+fn is_in_image(camera: &Camera, point: &Vector3<f64>) -> bool {
+    crate::projection::project_in_front(camera, point).is_some_and(|pixel| {
+        (0.0..f64::from(camera.width)).contains(&pixel.x)
+            && (0.0..f64::from(camera.height)).contains(&pixel.y)
+    })
+}
+
+/// `count` evenly spaced numbers from `first` to `last`; `first` alone for one.
+fn linspace(first: f64, last: f64, count: usize) -> Vec<f64> {
+    let intervals = count.saturating_sub(1).max(1) as f64;
+    (0..count)
+        .map(|i| first + (last - first) * i as f64 / intervals)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scenes::{camera_looking_at_origin, cube};
+
+    /// A box of half side 0.5.
+    struct Cube;
+
+    impl SignedDistance for Cube {
+        fn sdf(&self, points: &[Vector3<f64>]) -> Vec<f64> {
+            points.iter().map(|p| p.amax() - 0.5).collect()
+        }
+
+        fn sdf_and_gradient(&self, points: &[Vector3<f64>]) -> Vec<(f64, Vector3<f64>)> {
+            let gradient = |p: &Vector3<f64>| Vector3::ith(p.iamax(), p[p.iamax()].signum());
+            points
+                .iter()
+                .zip(self.sdf(points))
+                .map(|(p, sdf)| (sdf, gradient(p)))
+                .collect()
+        }
+    }
+
+    fn view_from(x: f64, y: f64, z: f64) -> ViewObservation {
+        ViewObservation {
+            camera: camera_looking_at_origin(&Vector3::new(x, y, z)),
+            segments: Vec::new(),
+            junctions: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn the_object_hides_its_far_edges_and_the_chords_through_it() {
+        let (junctions, _) = cube();
+        let views = [
+            view_from(1.5, 1.6, 1.7),
+            view_from(1.5, -1.6, 1.7),
+            view_from(-1.5, -1.6, -1.7),
+        ];
+        // The edge x = y = +0.5 along z, its opposite, and the space diagonal.
+        let edges = [[3, 7], [0, 4], [0, 7]];
+        let config = OcclusionConfig::default();
+        assert_eq!(
+            visible_views(&views, &junctions, &edges, &Cube, &config),
+            [2, 2, 0]
+        );
+    }
+
+    #[test]
+    fn an_edge_outside_the_image_is_not_visible() {
+        let (junctions, _) = cube();
+        let mut view = view_from(1.5, 1.6, 1.7);
+        let config = OcclusionConfig::default();
+        let count = |view: &ViewObservation| {
+            visible_views(
+                std::slice::from_ref(view),
+                &junctions,
+                &[[3, 7]],
+                &Cube,
+                &config,
+            )[0]
+        };
+        assert_eq!(count(&view), 1);
+        view.camera.intrinsics.cx = -400.0;
+        assert_eq!(count(&view), 0);
+    }
+
+    #[test]
+    fn points_outside_the_ball_hide_nothing() {
+        /// Solid everywhere.
+        struct Solid;
+        impl SignedDistance for Solid {
+            fn sdf(&self, points: &[Vector3<f64>]) -> Vec<f64> {
+                vec![-1.0; points.len()]
+            }
+            fn sdf_and_gradient(&self, points: &[Vector3<f64>]) -> Vec<(f64, Vector3<f64>)> {
+                vec![(-1.0, Vector3::zeros()); points.len()]
+            }
+        }
+        let views = [view_from(2.0, 2.0, 2.0)];
+        let junctions = [Vector3::new(0.6, 0.5, 0.5), Vector3::new(0.5, 0.6, 0.5)];
+        let config = OcclusionConfig {
+            ball_radius: 0.9,
+            ..Default::default()
+        };
+        let count = |config| visible_views(&views, &junctions, &[[0, 1]], &Solid, config)[0];
+        assert_eq!(count(&config), 1);
+        assert_eq!(count(&OcclusionConfig::default()), 0);
+    }
+
+    #[test]
+    fn the_ratio_has_a_floor() {
+        let config = OcclusionConfig::default();
+        assert_eq!(config.support_ratio(30, 60, 100), 0.5);
+        assert_eq!(config.support_ratio(5, 0, 100), 0.25);
+        assert_eq!(config.support_ratio(5, 0, 1000), 0.25);
+        assert_eq!(config.support_ratio(0, 0, 0), 0.0);
+    }
+}
