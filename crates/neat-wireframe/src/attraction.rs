@@ -38,6 +38,22 @@ pub fn attracted_ends(line: &LineSegment3, junctions: &[Vector3<f64>]) -> Option
 
 /// The edges that the lines turn into: pairs `[i, j]` with `i ≤ j`, sorted, each
 /// once. Duplicate lines of many views collapse here.
+///
+/// # Example
+/// ```
+/// use nalgebra::Vector3;
+/// use neat_core::LineSegment3;
+/// use neat_wireframe::attraction::{AttractionConfig, attract};
+///
+/// let junctions = [Vector3::zeros(), Vector3::x(), Vector3::y()];
+/// let line = |a, b| LineSegment3::new(a, b);
+/// let lines = [
+///     line(Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.9, 0.1, 0.0)),
+///     line(Vector3::new(1.1, 0.0, 0.0), Vector3::new(0.0, 0.1, 0.0)),
+/// ];
+/// let edges = attract(&lines, &junctions, &AttractionConfig::default());
+/// assert_eq!(edges, [[0, 1]]);
+/// ```
 pub fn attract(
     lines: &[LineSegment3],
     junctions: &[Vector3<f64>],

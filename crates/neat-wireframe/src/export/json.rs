@@ -1,8 +1,9 @@
 //! `wireframe.json`: the graph with whatever is known about its parts.
 
-use super::{ExportError, check, write_atomically};
+use super::{ExportError, check};
 use crate::Wireframe3d;
 use nalgebra::Vector3;
+use neat_core::file;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -91,7 +92,7 @@ pub fn write_json(path: &Path, document: &WireframeDocument) -> Result<(), Expor
         source,
     })?;
     text.push(b'\n');
-    write_atomically(path, &text)
+    Ok(file::write_atomically(path, &text)?)
 }
 
 /// Reads a `wireframe.json`, or a ground-truth file with `junctions` and `lines`.
@@ -99,11 +100,7 @@ pub fn write_json(path: &Path, document: &WireframeDocument) -> Result<(), Expor
 /// # Errors
 /// If the file is missing, is not such JSON, or fails the checks of [`write_json`].
 pub fn read_json(path: &Path) -> Result<WireframeDocument, ExportError> {
-    let bytes = std::fs::read(path).map_err(|source| ExportError::Io {
-        path: path.into(),
-        action: "read",
-        source,
-    })?;
+    let bytes = file::read(path, "reconstruct a wireframe first, or give another path")?;
     let document: WireframeDocument =
         serde_json::from_slice(&bytes).map_err(|source| ExportError::Json {
             path: path.into(),

@@ -4,25 +4,24 @@
 //! back as the same number, and replace an existing file only when the new one is
 //! complete.
 
-mod atomic_file;
 mod json;
 mod obj;
 mod ply;
 
-pub use atomic_file::write_atomically;
 pub use json::{WireframeDocument, read_json, write_json};
 pub use obj::write_obj;
 pub use ply::write_ply;
 
 use crate::validity::{WireframeFlaw, check_wireframe};
 use nalgebra::Vector3;
+use neat_core::SceneError;
 use std::path::{Path, PathBuf};
 
 /// Why a wireframe could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The graph has a point that is no point or an edge that leads nowhere.
-    #[error("{path}: not a valid wireframe")]
+    #[error("{path}: the wireframe is not valid")]
     Invalid {
         /// The file.
         path: PathBuf,
@@ -42,23 +41,16 @@ pub enum ExportError {
         of: &'static str,
     },
     /// The text is not the JSON of a wireframe.
-    #[error("{path}: not a wireframe in JSON")]
+    #[error("{path} is not a wireframe in JSON; it may be truncated: export it again")]
     Json {
         /// The file.
         path: PathBuf,
         /// What the parser says, with line and column.
         source: serde_json::Error,
     },
-    /// The file system refused.
-    #[error("{path}: cannot {action}")]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What was tried.
-        action: &'static str,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    /// The file could not be read or written.
+    #[error(transparent)]
+    File(#[from] SceneError),
 }
 
 /// [`check_wireframe`], with the file's name in the error.

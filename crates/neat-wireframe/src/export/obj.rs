@@ -1,7 +1,8 @@
 //! Wavefront OBJ: `v` and `l` elements.
 
-use super::{ExportError, check, write_atomically};
+use super::{ExportError, check};
 use crate::Wireframe3d;
+use neat_core::file;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -20,5 +21,5 @@ pub fn write_obj(path: &Path, wireframe: &Wireframe3d) -> Result<(), ExportError
     for [a, b] in &wireframe.edges {
         let _ = writeln!(text, "l {} {}", a + 1, b + 1);
     }
-    write_atomically(path, text.as_bytes())
+    Ok(file::write_atomically(path, text.as_bytes())?)
 }

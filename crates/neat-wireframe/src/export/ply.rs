@@ -1,7 +1,8 @@
 //! PLY, ASCII: a `vertex` and an `edge` element.
 
-use super::{ExportError, check, write_atomically};
+use super::{ExportError, check};
 use crate::Wireframe3d;
+use neat_core::file;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -34,5 +35,5 @@ pub fn write_ply(path: &Path, wireframe: &Wireframe3d) -> Result<(), ExportError
     for [a, b] in &wireframe.edges {
         let _ = writeln!(text, "{a} {b}");
     }
-    write_atomically(path, text.as_bytes())
+    Ok(file::write_atomically(path, text.as_bytes())?)
 }

@@ -90,6 +90,22 @@ impl EvaluationConfig {
     ///
     /// # Errors
     /// If a wireframe or the surface is not valid, see [`MetricsError`].
+    ///
+    /// # Example
+    /// ```
+    /// use nalgebra::Vector3;
+    /// use neat_wireframe::{Wireframe3d, metrics::EvaluationConfig};
+    ///
+    /// let truth = Wireframe3d {
+    ///     junctions: vec![Vector3::zeros(), Vector3::x()],
+    ///     edges: vec![[0, 1]],
+    /// };
+    /// let predicted = truth.map(|p| p + Vector3::new(0.0, 0.015, 0.0));
+    /// let evaluation = EvaluationConfig::default().evaluate(&predicted, Some(&truth), None)?;
+    /// let recall = |i: usize| evaluation.wireframe.as_ref().map(|w| w.segments_max[i].recall);
+    /// assert_eq!((recall(0), recall(1)), (Some(0.0), Some(1.0)));
+    /// # Ok::<(), neat_wireframe::metrics::MetricsError>(())
+    /// ```
     pub fn evaluate(
         &self,
         predicted: &Wireframe3d,
