@@ -2,8 +2,9 @@
 //!
 //! Ground truth (`gt_wireframe.json`) calls its edges `lines` and may hold
 //! `curves`: `{"junctions": [[x, y, z], …], "lines": [[i, j], …], "curves":
-//! [[[x, y, z], …], …]}`. Our results (`wireframe.json`) call them `edges`.
-//! Both are read by the same functions; other keys are ignored.
+//! [{"type": "Circle", "points": [[x, y, z], …]}, …]}`. Our results
+//! (`wireframe.json`) call them `edges`. Both are read by the same functions;
+//! other keys are ignored.
 
 use crate::{SceneError, Wireframe3d, file};
 use nalgebra::Vector3;
@@ -15,24 +16,34 @@ use std::path::Path;
 pub struct GroundTruth {
     /// The straight edges, in world units.
     pub wireframe: Wireframe3d,
-    /// The other sharp edges as polylines. They are no part of the wireframe.
-    pub curves: Vec<Vec<Vector3<f64>>>,
+    /// The other sharp edges. They are no part of the wireframe.
+    pub curves: Vec<Curve>,
+}
+
+/// A sharp edge that is not straight.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Curve {
+    /// What the CAD model says it is, such as "Circle"; may be empty.
+    #[serde(rename = "type", default)]
+    pub kind: String,
+    /// Points along it, in world units.
+    pub points: Vec<Vector3<f64>>,
 }
 
 #[derive(Deserialize)]
 struct ReadJson {
-    junctions: Vec<[f64; 3]>,
+    junctions: Vec<Vector3<f64>>,
     #[serde(alias = "lines")]
     edges: Vec<[usize; 2]>,
     #[serde(default)]
-    curves: Vec<Vec<[f64; 3]>>,
+    curves: Vec<Curve>,
 }
 
 #[derive(Serialize)]
 struct GroundTruthJson<'a> {
     junctions: &'a [Vector3<f64>],
     lines: &'a [[usize; 2]],
-    curves: &'a [Vec<Vector3<f64>>],
+    curves: &'a [Curve],
 }
 
 const REMEDY: &str = "give a file with `junctions` and `lines` or `edges`";
@@ -78,14 +89,10 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GroundTruth, SceneError> {
     }
     Ok(GroundTruth {
         wireframe: Wireframe3d {
-            junctions: json.junctions.into_iter().map(Vector3::from).collect(),
+            junctions: json.junctions,
             edges: json.edges,
         },
-        curves: json
-            .curves
-            .into_iter()
-            .map(|curve| curve.into_iter().map(Vector3::from).collect())
-            .collect(),
+        curves: json.curves,
     })
 }
 
@@ -124,7 +131,7 @@ mod tests {
     use proptest::prelude::*;
 
     const SMALL: &str = r#"{"junctions": [[0, 0, 0], [1.5, 0, -2]], "lines": [[0, 1]],
-        "curves": [[[0, 0, 0], [0, 1, 0], [0, 1, 1]]], "source": {"file": "a.step"}}"#;
+        "curves": [{"type": "Circle", "points": [[0, 0, 0], [0, 1, 0], [0, 1, 1]]}], "source": {"file": "a.step"}}"#;
 
     #[test]
     fn both_names_of_the_edges_are_read() {
@@ -132,7 +139,8 @@ mod tests {
         let truth = parse(SMALL.as_bytes(), path).unwrap();
         assert_eq!(truth.wireframe.edges, [[0, 1]]);
         assert_eq!(truth.wireframe.junctions[1], Vector3::new(1.5, 0.0, -2.0));
-        assert_eq!(truth.curves[0].len(), 3);
+        assert_eq!(truth.curves[0].points.len(), 3);
+        assert_eq!(truth.curves[0].kind, "Circle");
         let ours = SMALL.replace("lines", "edges");
         assert_eq!(parse(ours.as_bytes(), path).unwrap(), truth);
         let wrong = SMALL.replace("[[0, 1]]", "[[0, 2]]");
@@ -149,7 +157,10 @@ mod tests {
             let junctions: Vec<_> = junctions.into_iter().map(Vector3::from).collect();
             let edges = edges.iter().map(|e| e.map(|i| i % junctions.len())).collect();
             let truth = GroundTruth {
-                curves: vec![junctions.clone()],
+                curves: vec![Curve {
+                    kind: "BSpline".into(),
+                    points: junctions.clone(),
+                }],
                 wireframe: Wireframe3d { junctions, edges },
             };
             let dir = tempfile::tempdir().unwrap();

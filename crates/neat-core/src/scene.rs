@@ -174,3 +174,82 @@ pub(crate) fn check_names<'a>(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Intrinsics;
+
+    /// A view from `distance` along −z toward the origin.
+    fn view(name: &str, distance: f64, width: u32, height: u32) -> View {
+        let intrinsics = Intrinsics {
+            fx: 100.0,
+            fy: 100.0,
+            cx: 0.0,
+            cy: 0.0,
+            skew: 0.0,
+        };
+        let pose = Matrix4::new_translation(&Vector3::new(0.0, 0.0, -distance));
+        View {
+            name: name.into(),
+            camera: Camera::from_matrices(intrinsics, &pose, width, height),
+            wireframe: Wireframe2d::empty(width, height),
+            image: RgbImage::new(width, height),
+        }
+    }
+
+    fn scene(views: Vec<View>) -> Scene {
+        Scene {
+            name: "box".into(),
+            views,
+            original_from_world: Similarity::identity(),
+            pixel_center: 0.5,
+        }
+    }
+
+    #[test]
+    fn the_ball_is_the_largest_that_the_nearest_camera_sees() {
+        // Half of the smaller side over the focal length is 3/4: sine 3/5.
+        let two = scene(vec![view("a", 9.0, 150, 200), view("b", 5.0, 200, 150)]);
+        assert!((two.bounding_ball_radius() - 1.2 * 5.0 * 0.6).abs() < 1e-12);
+        assert_eq!(scene(vec![]).bounding_ball_radius(), f64::INFINITY);
+    }
+
+    #[test]
+    fn validation_names_the_view() {
+        let good = || vec![view("a", 1.0, 4, 3), view("b", 1.0, 4, 3)];
+        scene(good()).validate().unwrap();
+        assert!(matches!(
+            scene(vec![]).validate(),
+            Err(SceneError::NoView { .. })
+        ));
+
+        let damages: [fn(&mut Vec<View>); 6] = [
+            |views| views[1].camera.intrinsics.fx = 0.0,
+            |views| views[1].camera.world_from_camera *= -1.0,
+            |views| views[1].camera.center_in_world.x = f64::NAN,
+            |views| views[1].wireframe.edges.push([0, 0]),
+            |views| views[1].image = RgbImage::new(3, 3),
+            |views| views[0].name = "b".into(),
+        ];
+        for damage in damages {
+            let mut views = good();
+            damage(&mut views);
+            let message = scene(views).validate().unwrap_err().to_string();
+            assert!(message.contains("`b`"), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_similarity_and_its_inverse_cancel() {
+        let similarity = Similarity {
+            scale: 15.0,
+            translation: Vector3::new(5.0, 7.5, 3.0),
+        };
+        let point = Vector3::new(0.1, -0.2, 0.3);
+        let there = similarity.apply(&point);
+        assert!((similarity.inverse().apply(&there) - point).amax() < 1e-15);
+        let by_matrix = similarity.matrix() * point.push(1.0);
+        assert!((by_matrix.xyz() - there).amax() < 1e-15);
+    }
+}

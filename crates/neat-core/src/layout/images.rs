@@ -1,7 +1,7 @@
 //! Images on disk.
 
 use crate::{SceneError, hawp_json::file_stem};
-use image::{DynamicImage, ImageError, RgbImage};
+use image::{DynamicImage, ImageReader, RgbImage};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -35,13 +35,15 @@ fn is_image(path: &Path) -> bool {
 /// Decodes an image; transparent pixels are blended with `background`.
 pub(super) fn read_rgb(path: &Path, background: [u8; 3]) -> Result<RgbImage, SceneError> {
     let remedy = "put the image there or remove its pose";
-    let image = image::open(path).map_err(|error| match error {
-        ImageError::IoError(source) => crate::file::read_error(path, remedy, source),
-        source => SceneError::Image {
+    // By its first bytes: endings of converted data sets are not to be trusted.
+    let image = ImageReader::open(path)
+        .and_then(ImageReader::with_guessed_format)
+        .map_err(|source| crate::file::read_error(path, remedy, source))?
+        .decode()
+        .map_err(|source| SceneError::Image {
             path: path.into(),
             source,
-        },
-    })?;
+        })?;
     if image.color().has_alpha() {
         return Ok(blend(&image, background));
     }

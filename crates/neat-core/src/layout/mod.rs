@@ -179,6 +179,7 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
     }
     check_names(poses.views.iter().map(|view| view.name.as_str()), dir)?;
     let hawp_dir = dir.join(abc::HAWP_DIR);
+    // Before the images, which take seconds to decode.
     if options.require_wireframes && !hawp_dir.is_dir() {
         return Err(SceneError::Missing {
             path: hawp_dir,
@@ -186,62 +187,48 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
         });
     }
 
-    let posed_photos = try_par_map(&poses.views, |view| {
-        let photo = images::read_rgb(&view.image, options.background)?;
-        let camera = camera_of(view, &photo, &poses)?;
-        Ok((camera, photo))
+    let photos = try_par_map(&poses.views, |posed| {
+        let image = images::read_rgb(&posed.image, options.background)?;
+        Ok((camera_of(posed, &image, &poses.path)?, image))
     })?;
-
     let mut warnings = Vec::new();
-    let pixel_center = match options.pixel_center {
+    let told = match options.pixel_center {
+        PixelCenter::Integer => Some(0.0),
+        PixelCenter::Half => Some(0.5),
         PixelCenter::Auto => poses
             .pixel_center
-            .or_else(|| pixel_center::infer(posed_photos.iter().map(|(camera, _)| camera)))
-            .unwrap_or_else(|| {
-                let pixel_center = pixel_center::PUBLISHED;
-                warnings.push(SceneWarning::PixelCenterAssumed { pixel_center });
-                pixel_center
-            }),
-        PixelCenter::Integer => 0.0,
-        PixelCenter::Half => 0.5,
+            .or_else(|| pixel_center::infer(photos.iter().map(|(camera, _)| camera))),
     };
-
-    let wireframes = try_par_map(&poses.views, |view| {
-        let path = hawp_dir.join(format!("{}.json", view.name));
-        if !options.require_wireframes && !path.exists() {
-            return Ok(None);
-        }
-        hawp_json::read(&path, pixel_center).map(Some)
+    let pixel_center = told.unwrap_or(pixel_center::PUBLISHED);
+    if told.is_none() {
+        warnings.push(SceneWarning::PixelCenterAssumed { pixel_center });
+    }
+    let wireframes = try_par_map(&poses.views, |posed| {
+        let path = hawp_dir.join(format!("{}.json", posed.name));
+        let absent = !options.require_wireframes && !path.exists();
+        (!absent)
+            .then(|| hawp_json::read(&path, pixel_center))
+            .transpose()
     })?;
 
     let mut views = Vec::new();
-    for ((posed, (camera, image)), wireframe) in
-        poses.views.iter().zip(posed_photos).zip(wireframes)
-    {
-        let wireframe =
-            wireframe.unwrap_or_else(|| Wireframe2d::empty(camera.width, camera.height));
+    for ((posed, (camera, image)), wireframe) in poses.views.iter().zip(photos).zip(wireframes) {
         let view = View {
             name: posed.name.clone(),
             camera,
-            wireframe,
+            wireframe: wireframe.unwrap_or_else(|| Wireframe2d::empty(camera.width, camera.height)),
             image,
         };
-        view.validate().map_err(|problem| SceneError::View {
-            path: hawp_dir.clone(),
-            view: view.name.clone(),
-            problem,
-        })?;
-        let usable = !view
-            .wireframe
-            .segments(options.min_segment_score)
-            .is_empty();
-        if usable || !options.require_wireframes {
-            views.push(view);
-        } else {
+        view.validate()
+            .map_err(|problem| poses::view_error(&hawp_dir, &view.name, problem))?;
+        let segments = view.wireframe.segments(options.min_segment_score);
+        if options.require_wireframes && segments.is_empty() {
             warnings.push(SceneWarning::ViewWithoutSegments {
                 view: view.name,
                 min_segment_score: options.min_segment_score,
             });
+        } else {
+            views.push(view);
         }
     }
     if views.is_empty() {
@@ -251,33 +238,28 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
             min_segment_score: options.min_segment_score,
         });
     }
-
-    let scene = Scene {
-        name: scene_name(dir),
-        views,
-        original_from_world: poses.original_from_world,
-        pixel_center,
-    };
     Ok(LoadedScene {
-        scene,
+        scene: Scene {
+            name: scene_name(dir),
+            views,
+            original_from_world: poses.original_from_world,
+            pixel_center,
+        },
         layout,
         warnings,
     })
 }
 
-/// The camera of a posed image of the photo's size.
-fn camera_of(view: &PosedImage, photo: &RgbImage, poses: &Poses) -> Result<Camera, SceneError> {
-    let (width, height) = photo.dimensions();
-    let camera = view
-        .size
-        .map_or(Ok(()), |size| {
-            check_image_size("camera", size, (width, height))
-        })
+/// The camera of `posed`, for its decoded `image`. `path` is that of the poses.
+fn camera_of(posed: &PosedImage, image: &RgbImage, path: &Path) -> Result<Camera, SceneError> {
+    let (width, height) = image.dimensions();
+    let size = posed.size.unwrap_or((width, height));
+    check_image_size("camera", size, (width, height))
         .and_then(|()| {
-            Camera::try_from_matrices(view.intrinsics, &view.world_from_camera, width, height)
+            Camera::try_from_matrices(posed.intrinsics, &posed.world_from_camera, width, height)
                 .map_err(ViewError::Camera)
-        });
-    camera.map_err(|problem| poses::view_error(&poses.path, &view.name, problem))
+        })
+        .map_err(|problem| poses::view_error(path, &posed.name, problem))
 }
 
 /// The folder's name, also for `.` and `scene/..`.

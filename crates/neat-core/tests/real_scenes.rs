@@ -1,0 +1,165 @@
+//! Every real scene that is at hand loads. The data are not part of the
+//! repository: set `NEAT_DATA`, or keep them in `../shared/data`.
+
+use nalgebra::Vector3;
+use neat_core::ground_truth::{read_ground_truth, read_wireframe};
+use neat_core::layout::Layout;
+use neat_core::point_cloud::read_ply;
+use neat_core::{LoadOptions, SceneError, load_scene};
+use std::path::PathBuf;
+
+/// The folder of a real scene, or `None`, said aloud, where there is none.
+#[expect(clippy::print_stderr, reason = "a skipped test must be seen")]
+fn real(scene: &str) -> Option<PathBuf> {
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data");
+    let root = std::env::var_os("NEAT_DATA").map_or_else(|| default.into(), PathBuf::from);
+    let dir = root.join(scene);
+    if dir.is_dir() {
+        return Some(dir);
+    }
+    eprintln!("skipped: no real data at {}", dir.display());
+    None
+}
+
+#[test]
+fn the_toy_object_has_its_known_numbers() {
+    let Some(dir) = real("abc-00075213") else {
+        return;
+    };
+    let loaded = load_scene(&dir, &LoadOptions::default()).unwrap();
+    let scene = &loaded.scene;
+    assert_eq!(loaded.layout, Layout::Abc);
+    assert_eq!(loaded.warnings, []);
+    assert_eq!(scene.name, "abc-00075213");
+    assert_eq!(scene.views.len(), 100);
+    assert_eq!(scene.pixel_center, 0.5);
+    for view in &scene.views {
+        assert_eq!((view.camera.width, view.camera.height), (512, 512));
+        assert_eq!(view.camera.intrinsics.fx, 560.0);
+        assert!((view.camera.center_in_world.norm() - 2.0).abs() < 1e-5);
+        // Every camera looks at the origin.
+        let pixel = view.camera.project(&Vector3::zeros()).pixel;
+        assert!((pixel.add_scalar(-256.0)).amax() < 1e-2);
+    }
+    assert!((scene.bounding_ball_radius() - 1.0).abs() < 1e-2);
+    assert_eq!(scene.views[0].wireframe.vertices.len(), 8);
+    assert_eq!(scene.views[0].wireframe.segments(0.05).len(), 9);
+    assert_eq!(
+        scene.views[0].wireframe.vertices[0].x,
+        269.1760559082031 + 0.5
+    );
+
+    let truth = read_ground_truth(&dir.join("gt_wireframe.json")).unwrap();
+    assert_eq!(truth.wireframe.junctions.len(), 12);
+    assert_eq!(truth.wireframe.edges.len(), 18);
+    // The truth agrees with what the detector saw, to a pixel.
+    let segments = truth.wireframe.segments();
+    let near = scene.views.iter().filter(|view| {
+        let detected = view.wireframe.segments(0.5);
+        segments.iter().any(|segment| {
+            let projected = segment.map(|end| view.camera.project(end).pixel);
+            detected
+                .iter()
+                .any(|found| projected.unordered_squared_end_distance(&found.segment) < 2.0)
+        })
+    });
+    assert!(near.count() > 90);
+}
+
+#[test]
+fn scenes_without_wireframes_name_the_remedy_and_load_without() {
+    let scenes = [
+        ("abc-00001776", 100, 0.5),
+        ("abc-00003173", 100, 0.5),
+        ("cad-0406", 100, 0.5),
+        ("cad-three-concave", 100, 0.5),
+        ("abcnef-00000952", 50, 0.0),
+        ("abcnef-00004926", 49, 0.0),
+        ("dtu-scan24", 49, 0.0),
+        ("strecha-entry-P10", 10, 0.0),
+        ("sceaux-castle", 10, 0.0),
+    ];
+    for (name, views, pixel_center) in scenes {
+        let Some(dir) = real(name) else {
+            continue;
+        };
+        let error = load_scene(&dir, &LoadOptions::default()).unwrap_err();
+        assert!(
+            matches!(error, SceneError::Missing { .. }),
+            "{name}: {error}"
+        );
+
+        // The two files of poses say the same; photographs are large, so one
+        // scene is held at a time, without its images.
+        let layout = if name.starts_with("dtu") {
+            Layout::Dtu
+        } else {
+            Layout::Abc
+        };
+        let cameras = [layout, Layout::CamerasJson].map(|layout| {
+            let options = LoadOptions {
+                layout: Some(layout),
+                require_wireframes: false,
+                ..LoadOptions::default()
+            };
+            let scene = load_scene(&dir, &options).unwrap().scene;
+            assert_eq!(scene.views.len(), views, "{name}");
+            assert_eq!(scene.pixel_center, pixel_center, "{name}");
+            let cameras: Vec<_> = scene.views.iter().map(|view| view.camera).collect();
+            (cameras, scene.original_from_world)
+        });
+        let [(npz, npz_frame), (json, json_frame)] = cameras;
+        for (a, b) in npz.iter().zip(&json) {
+            let poses = a.matrix_world_from_camera() - b.matrix_world_from_camera();
+            assert!(poses.amax() < 1e-4, "{name}: {poses}");
+            let k = a.intrinsics.matrix() - b.intrinsics.matrix();
+            assert!(k.amax() < 1e-2, "{name}: {k}");
+        }
+        if layout == Layout::Dtu {
+            let difference = npz_frame.matrix() - json_frame.matrix();
+            assert!(difference.amax() < 1e-6, "{name}: {difference}");
+            assert!((npz_frame.scale - 231.068).abs() < 1e-3);
+        }
+    }
+}
+
+#[test]
+fn ground_truth_counts_are_those_of_the_data_readme() {
+    let truths = [
+        ("abc-00001776", 20, 30, 0),
+        ("abc-00003173", 15, 23, 0),
+        ("cad-0406", 27, 41, 0),
+        ("cad-three-concave", 16, 20, 2),
+        ("abcnef-00000952", 20, 30, 0),
+        ("abcnef-00004926", 20, 27, 6),
+    ];
+    for (name, junctions, lines, curves) in truths {
+        let Some(dir) = real(name) else {
+            continue;
+        };
+        let truth = read_ground_truth(&dir.join("gt_wireframe.json")).unwrap();
+        let counts = (
+            truth.wireframe.junctions.len(),
+            truth.wireframe.edges.len(),
+            truth.curves.len(),
+        );
+        assert_eq!(counts, (junctions, lines, curves), "{name}");
+        let wireframe = read_wireframe(&dir.join("gt_wireframe.json")).unwrap();
+        assert_eq!(wireframe, truth.wireframe);
+    }
+}
+
+#[test]
+fn point_clouds_of_both_encodings_are_read() {
+    let clouds = [
+        ("dtu-scan24", "sparse_points.ply", 5804),
+        ("strecha-entry-P10", "sparse_points.ply", 3104),
+        ("sceaux-castle", "scene_mesh_refine.ply", 87685),
+    ];
+    for (name, file, points) in clouds {
+        let Some(dir) = real(name) else {
+            continue;
+        };
+        assert_eq!(read_ply(&dir.join(file)).unwrap().len(), points, "{name}");
+    }
+}
