@@ -1,145 +1,13 @@
-//! The fast back end on prisms: exact geometry, noisy detections, proposals that
-//! are off by several times what the result may be.
+//! Prisms: exact geometry, noisy detections, proposals that are off by several
+//! times what the result may be.
 
+use crate::graph::assert_is_the_graph;
+use crate::noise::{Noise, PROPOSAL_SIGMA};
+use crate::prism::{Prism, Scaled};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::{Camera, Intrinsics, LineSegment2, LineSegment3, ScoredSegment2};
 use neat_wireframe::fast_back_end::{FastBackEndConfig, FastBackEndResult, run};
 use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation, Wireframe3d};
-
-/// A polygon, swept along z from `-half_height` to `half_height`.
-struct Prism {
-    profile: Vec<Vector2<f64>>,
-    half_height: f64,
-}
-
-impl Prism {
-    fn cube() -> Self {
-        Self::new(&[(-0.4, -0.4), (0.4, -0.4), (0.4, 0.4), (-0.4, 0.4)], 0.4)
-    }
-
-    fn l_shape() -> Self {
-        let profile = [
-            (-0.5, -0.5),
-            (0.5, -0.5),
-            (0.5, -0.1),
-            (-0.05, -0.1),
-            (-0.05, 0.5),
-            (-0.5, 0.5),
-        ];
-        Self::new(&profile, 0.35)
-    }
-
-    fn new(profile: &[(f64, f64)], half_height: f64) -> Self {
-        Self {
-            profile: profile.iter().map(|(x, y)| Vector2::new(*x, *y)).collect(),
-            half_height,
-        }
-    }
-
-    /// Bottom junctions first, then top; per corner its bottom, top and upright
-    /// edge.
-    fn wireframe(&self) -> Wireframe3d {
-        let n = self.profile.len();
-        let level = |z: f64| self.profile.iter().map(move |p| Vector3::new(p.x, p.y, z));
-        let edges = (0..n).flat_map(|i| {
-            let next = (i + 1) % n;
-            [[i, next], [n + i, n + next], [i, n + i]]
-        });
-        Wireframe3d {
-            junctions: level(-self.half_height)
-                .chain(level(self.half_height))
-                .collect(),
-            edges: edges.collect(),
-        }
-    }
-
-    fn distance(&self, point: &Vector3<f64>) -> f64 {
-        let in_profile = self.distance_in_plane(&point.xy());
-        let beyond_height = point.z.abs() - self.half_height;
-        let outside = Vector2::new(in_profile.max(0.0), beyond_height.max(0.0)).norm();
-        outside + in_profile.max(beyond_height).min(0.0)
-    }
-
-    fn distance_in_plane(&self, point: &Vector2<f64>) -> f64 {
-        let n = self.profile.len();
-        let mut distance = f64::INFINITY;
-        let mut inside = false;
-        for i in 0..n {
-            let (a, b) = (self.profile[i], self.profile[(i + 1) % n]);
-            distance = distance.min(LineSegment2::new(a, b).distance_to_point(point));
-            let crosses = (a.y > point.y) != (b.y > point.y);
-            if crosses && point.x < a.x + (point.y - a.y) / (b.y - a.y) * (b.x - a.x) {
-                inside = !inside;
-            }
-        }
-        if inside { -distance } else { distance }
-    }
-
-    fn sees(&self, camera: &Camera, edge: &LineSegment3) -> bool {
-        (1..20).all(|i| {
-            let point = edge.point_at(f64::from(i) / 20.0);
-            (1..150).all(|step| {
-                let t = f64::from(step) / 150.0;
-                self.distance(&(point + (camera.center_in_world - point) * t)) > -1e-6
-            })
-        })
-    }
-}
-
-/// The prism scaled about the origin.
-struct Scaled<'a>(&'a Prism, f64);
-
-impl SignedDistance for Scaled<'_> {
-    fn sdf(&self, points: &[Vector3<f64>]) -> Vec<f64> {
-        points
-            .iter()
-            .map(|p| self.0.distance(&(p / self.1)) * self.1)
-            .collect()
-    }
-
-    fn sdf_and_gradient(&self, points: &[Vector3<f64>]) -> Vec<(f64, Vector3<f64>)> {
-        let step = 1e-6;
-        points
-            .iter()
-            .map(|p| {
-                let gradient = Vector3::from_fn(|axis, _| {
-                    let offset = Vector3::ith(axis, step);
-                    let ends = self.sdf(&[p + offset, p - offset]);
-                    (ends[0] - ends[1]) / (2.0 * step)
-                });
-                (self.sdf(&[*p])[0], gradient)
-            })
-            .collect()
-    }
-}
-
-/// Reproducible noise (SplitMix64).
-struct Noise(u64);
-
-impl Noise {
-    /// Uniform in [0, 1).
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    /// Standard normal (Box–Muller).
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-
-    fn normal2(&mut self, sigma: f64) -> Vector2<f64> {
-        Vector2::from_fn(|_, _| sigma * self.normal())
-    }
-
-    fn normal3(&mut self, sigma: f64) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| sigma * self.normal())
-    }
-}
 
 /// A camera at distance 2.5 that looks at the origin; `i` of `count` on a
 /// Fibonacci lattice.
@@ -196,14 +64,8 @@ impl Input {
                     edge.reversed()
                 };
                 let projected = edge.map(|end| camera.project(end).pixel);
-                let segment = LineSegment2::new(
-                    projected.start + noise.normal2(0.7),
-                    projected.end + noise.normal2(0.7),
-                );
-                let proposed = LineSegment3::new(
-                    edge.start + noise.normal3(0.03 / 3f64.sqrt()),
-                    edge.end + noise.normal3(0.03 / 3f64.sqrt()),
-                );
+                let segment = noise.jitter(&projected, 0.7);
+                let proposed = noise.jitter(&edge, PROPOSAL_SIGMA);
                 input.propose(view, segments.len(), &camera, &segment, proposed);
                 segments.push((segment, 0.5 + 0.5 * noise.uniform()));
             }
@@ -211,7 +73,8 @@ impl Input {
                 let anywhere =
                     |noise: &mut Noise| 512.0 * Vector2::new(noise.uniform(), noise.uniform());
                 let segment = LineSegment2::new(anywhere(&mut noise), anywhere(&mut noise));
-                let proposed = LineSegment3::new(noise.normal3(0.4), noise.normal3(0.4));
+                let proposed =
+                    LineSegment3::new(noise.normal_vector(0.4), noise.normal_vector(0.4));
                 input.propose(view, segments.len(), &camera, &segment, proposed);
                 segments.push((segment, 0.3));
             }
@@ -263,45 +126,13 @@ impl Input {
     }
 }
 
-/// Asserts that the result is the graph of the prism: the junctions one to one,
-/// each within `tolerance`, and the same edges.
-fn assert_is_the_graph_of(prism: &Prism, result: &FastBackEndResult, tolerance: f64) {
-    let truth = prism.wireframe();
-    let found = &result.wireframe;
-    assert_eq!(found.junctions.len(), truth.junctions.len(), "{result:?}");
-    let name: Vec<usize> = found
-        .junctions
-        .iter()
-        .map(|junction| {
-            let nearest = truth
-                .junctions
-                .iter()
-                .position(|true_junction| (true_junction - junction).norm() < tolerance);
-            nearest.unwrap_or_else(|| panic!("{junction} is near no true junction: {result:?}"))
-        })
-        .collect();
-    let sorted = |edges: &[[usize; 2]]| {
-        let mut edges: Vec<_> = edges.iter().map(|[a, b]| [*a.min(b), *a.max(b)]).collect();
-        edges.sort_unstable();
-        edges
-    };
-    let named: Vec<_> = found
-        .edges
-        .iter()
-        .map(|e| e.map(|junction| name[junction]))
-        .collect();
-    assert_eq!(sorted(&named), sorted(&truth.edges), "{:?}", result.report);
-    assert_eq!(found.edges, sorted(&found.edges));
-    assert_eq!(result.edges.len(), found.edges.len());
-}
-
 #[test]
 fn prisms_come_back_exactly() {
     for prism in [Prism::cube(), Prism::l_shape()] {
         for seed in 0..3 {
             let input = Input::new(&prism, 40, seed);
             let result = input.run(&prism, &FastBackEndConfig::default());
-            assert_is_the_graph_of(&prism, &result, 0.003);
+            assert_is_the_graph(&prism.wireframe(), &result, 0.003);
             for edge in &result.edges {
                 assert!(edge.support >= 5);
                 assert!(edge.support_ratio.is_some_and(|ratio| ratio >= 0.3));
@@ -331,21 +162,21 @@ fn every_step_can_be_left_out() {
 
     let without_perceived = run_without(|c| c.use_perceived_junctions = false);
     assert_eq!(without_perceived.report.added_perceived_junctions, 0);
-    assert_is_the_graph_of(&prism, &without_perceived, 0.003);
+    assert_is_the_graph(&prism.wireframe(), &without_perceived, 0.003);
 
     let without_modes = run_without(|c| c.use_junction_modes = false);
     assert_eq!(without_modes.report.junction_modes, 0);
-    assert_is_the_graph_of(&prism, &without_modes, 0.003);
+    assert_is_the_graph(&prism.wireframe(), &without_modes, 0.003);
 
     // Modes lie within 0.015 or so: the bundle adjustment alone repairs much.
     let without_retriangulation = run_without(|c| c.retriangulation = false);
     assert!(without_retriangulation.wireframe.edges.len() >= 9);
 
     let without_completion = run_without(|c| c.edge_completion = false);
-    assert_is_the_graph_of(&prism, &without_completion, 0.003);
+    assert_is_the_graph(&prism.wireframe(), &without_completion, 0.003);
 
     let without_adjustment = run_without(|c| c.bundle_adjustment = false);
-    assert_is_the_graph_of(&prism, &without_adjustment, 0.006);
+    assert_is_the_graph(&prism.wireframe(), &without_adjustment, 0.006);
 
     let without_occlusion = run_without(|c| c.occlusion_test = false);
     assert!(without_occlusion.wireframe.edges.len() >= 18);
@@ -491,5 +322,5 @@ fn one_broken_view_costs_only_itself() {
     input.proposals[0].segment.start.z = f64::NAN;
     let result = input.run(&prism, &FastBackEndConfig::default());
     assert_eq!(result.report.usable_views, 39);
-    assert_is_the_graph_of(&prism, &result, 0.003);
+    assert_is_the_graph(&prism.wireframe(), &result, 0.003);
 }
