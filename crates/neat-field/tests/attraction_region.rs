@@ -6,6 +6,7 @@ mod golden;
 use golden::Golden;
 use nalgebra::Vector2;
 use neat_core::LineSegment2;
+use neat_core::synthetic::{SyntheticScene, generate};
 use neat_field::attraction_region::AttractionRegions;
 use proptest::prelude::*;
 
@@ -189,4 +190,33 @@ fn huge_segments_and_thresholds_stay_inside_the_image() {
     let long = LineSegment2::new(Vector2::new(-1e12, -1e12), Vector2::new(1e12, 1e12));
     let regions = AttractionRegions::compute(&[long], 7, 5, 0.0, f64::INFINITY);
     assert_eq!(regions.pixels, (0..35).collect::<Vec<u32>>());
+}
+
+#[test]
+fn the_regions_of_a_scene_are_those_of_its_views() {
+    let config = SyntheticScene {
+        views: 4,
+        image_size: 64,
+        ..SyntheticScene::default()
+    };
+    let scene = generate(&config).unwrap().scene;
+    let min_score = 0.05;
+    let expected: Vec<AttractionRegions> = scene
+        .views
+        .iter()
+        .map(|view| {
+            let scored = view.wireframe.segments(min_score);
+            let segments: Vec<LineSegment2> = scored.iter().map(|s| s.segment).collect();
+            AttractionRegions::compute(&segments, 64, 64, scene.pixel_center, 5.0)
+        })
+        .collect();
+    assert!(expected.iter().all(|regions| !regions.is_empty()));
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let regions = pool
+            .build()
+            .unwrap()
+            .install(|| AttractionRegions::of_scene(&scene, min_score, 5.0));
+        assert_eq!(regions, expected);
+    }
 }
