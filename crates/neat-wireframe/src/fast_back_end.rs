@@ -410,3 +410,65 @@ impl SignedDistance for UnitBallSurface<'_> {
         answers
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_configuration_names_only_what_it_changes_and_nothing_unknown() {
+        let config: FastBackEndConfig =
+            serde_json::from_str(r#"{"cleanup": false, "modes": {"sigma": 0.01}}"#).unwrap();
+        let mut expected = FastBackEndConfig {
+            cleanup: false,
+            ..Default::default()
+        };
+        expected.modes.sigma = 0.01;
+        assert_eq!(config, expected);
+        let text = serde_json::to_string(&config).unwrap();
+        let again: FastBackEndConfig = serde_json::from_str(&text).unwrap();
+        assert_eq!(again, config);
+        for unknown in [r#"{"clean": true}"#, r#"{"support": {"pixels": 4.0}}"#] {
+            assert!(serde_json::from_str::<FastBackEndConfig>(unknown).is_err());
+        }
+    }
+
+    #[test]
+    fn canonical_order_renames_the_junctions_of_the_edges() {
+        let at = |x: f64, y: f64| Vector3::new(x, y, 0.0);
+        let edge = |a, b, support| SupportedEdge {
+            junctions: [a, b],
+            support,
+            visible_views: None,
+        };
+        let junctions = vec![at(1.0, 0.0), at(0.0, 1.0), at(0.0, 0.0)];
+        let edges = vec![edge(0, 1, 7), edge(0, 2, 9)];
+        let (junctions, edges) = canonical_order(junctions, edges);
+        assert_eq!(junctions, [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0)]);
+        assert_eq!(edges, [edge(0, 2, 9), edge(1, 2, 7)]);
+    }
+
+    #[test]
+    fn a_scaled_surface_answers_in_the_unit_of_the_radius() {
+        /// A sphere of radius 2.
+        struct Sphere;
+        impl SignedDistance for Sphere {
+            fn sdf(&self, points: &[Vector3<f64>]) -> Vec<f64> {
+                points.iter().map(|p| p.norm() - 2.0).collect()
+            }
+            fn sdf_and_gradient(&self, points: &[Vector3<f64>]) -> Vec<(f64, Vector3<f64>)> {
+                points
+                    .iter()
+                    .map(|p| (p.norm() - 2.0, p.normalize()))
+                    .collect()
+            }
+        }
+        let surface = UnitBallSurface {
+            surface: &Sphere,
+            scene_radius: 4.0,
+        };
+        let point = [Vector3::x()];
+        assert_eq!(surface.sdf(&point), [0.5]);
+        assert_eq!(surface.sdf_and_gradient(&point), [(0.5, Vector3::x())]);
+    }
+}
