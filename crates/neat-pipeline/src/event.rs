@@ -70,4 +70,4 @@ pub enum Event<'a> {
 }
 
 /// Who listens to the events of a run.
-pub type OnEvent<'a> = dyn FnMut(Event<'_>) + 'a;
+pub type OnEvent<'a> = &'a mut dyn FnMut(Event<'_>);

@@ -10,7 +10,7 @@
 //! --set 'train.adam={ beta_1 = 0.9, beta_2 = 0.99, epsilon = 1e-8 }'
 //! ```
 
-use crate::Config;
+use crate::config::Config;
 use serde_json::Value;
 
 /// Why an override cannot be applied.
@@ -20,11 +20,11 @@ pub enum OverrideError {
     #[error("`--set {0}` has no `=`; write it as `--set key.path=value`")]
     NoEqualsSign(String),
     /// The configuration has no such key.
-    #[error("there is no key `{key}` in the configuration{suggestion}; {valid}")]
+    #[error("there is no key `{key}` in the configuration{suggestion}: {valid}")]
     UnknownKey {
         /// The path up to and including the first unknown part.
         key: String,
-        /// ", did you mean `…`?" or nothing.
+        /// " (did you mean `…`?)" or nothing.
         suggestion: String,
         /// Which keys there are at that level.
         valid: String,
@@ -113,7 +113,7 @@ fn unknown_key(key: String, level: &str, part: &str, keys: &[String]) -> Overrid
     OverrideError::UnknownKey {
         key,
         suggestion: most_similar(part, keys)
-            .map(|name| format!(", did you mean `{prefix}{name}`?"))
+            .map(|name| format!(" (did you mean `{prefix}{name}`?)"))
             .unwrap_or_default(),
         valid: if keys.is_empty() {
             format!("`{level}` is a value and has no keys")

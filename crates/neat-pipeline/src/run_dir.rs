@@ -13,7 +13,7 @@
 //!
 //! Every file is complete or not there; `metrics.jsonl` only grows.
 
-use crate::Config;
+use crate::config::Config;
 use crate::manifest::Manifest;
 use crate::trainer::StepReport;
 use neat_core::{SceneError, file};
@@ -56,7 +56,7 @@ pub enum Existing {
 pub enum RunDirError {
     /// A new run would mix with what is there.
     #[error(
-        "{0} is not empty: choose another folder, or pass --overwrite to replace the run in it, or --resume to continue it"
+        "{0} is not empty: choose another folder, or pass --overwrite to replace the run in it"
     )]
     NotEmpty(PathBuf),
     /// The path leads to something else.
@@ -79,6 +79,16 @@ pub enum RunDirError {
     /// The configuration has no TOML form.
     #[error("the configuration cannot be written as TOML")]
     Serialize(#[from] toml::ser::Error),
+    /// The folder cannot hold a run.
+    #[error(
+        "no run can be written to {path}: check the permissions and the space on the disk, or choose another folder"
+    )]
+    Unwritable {
+        /// The folder.
+        path: PathBuf,
+        /// What the system said.
+        source: SceneError,
+    },
     /// A file or folder could not be read or written.
     #[error(transparent)]
     File(#[from] SceneError),
@@ -125,10 +135,16 @@ impl RunDir {
     pub fn create(root: &Path, existing: Existing) -> Result<Self, RunDirError> {
         Self::check(root, existing)?;
         let dir = Self { root: root.into() };
-        if existing == Existing::Overwrite {
-            dir.remove_earlier_run()?;
-        }
-        file::create_dir(&dir.root.join(CHECKPOINTS))?;
+        let cleared = match existing {
+            Existing::Overwrite => dir.remove_earlier_run(),
+            Existing::Refuse | Existing::Resume => Ok(()),
+        };
+        cleared
+            .and_then(|()| file::create_dir(&root.join(CHECKPOINTS)))
+            .map_err(|source| RunDirError::Unwritable {
+                path: root.into(),
+                source,
+            })?;
         Ok(dir)
     }
 
@@ -260,7 +276,15 @@ impl RunDir {
         Ok(path)
     }
 
-    /// The last checkpoint.
+    /// Reads the last checkpoint.
+    ///
+    /// # Errors
+    /// If there is none, or it is damaged.
+    pub fn read_latest_checkpoint(&self) -> Result<Checkpoint, RunDirError> {
+        Ok(Checkpoint::read(&self.latest_checkpoint()?)?)
+    }
+
+    /// The last checkpoint's file.
     ///
     /// # Errors
     /// If there is none, or the folder cannot be read.

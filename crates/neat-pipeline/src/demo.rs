@@ -1,0 +1,118 @@
+//! The whole method on a scene whose truth is known: synthesise, reconstruct,
+//! evaluate.
+
+use crate::error::PipelineError;
+use crate::event::{Event, OnEvent, Stage};
+use crate::reconstruct::{Reconstruction, RunOptions, reconstruct, timed};
+use crate::run_dir::{Existing, RunDir};
+use neat_core::ground_truth::{GroundTruth, write_ground_truth};
+use neat_core::layout::abc;
+use neat_core::synthetic::{SyntheticScene, generate};
+use neat_core::{SceneError, file};
+use neat_wireframe::metrics::{Evaluation, EvaluationConfig};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// The true wireframe in the folder of a synthetic scene.
+pub const GROUND_TRUTH: &str = "gt_wireframe.json";
+
+/// What a demonstration came to.
+#[derive(Clone, Debug)]
+pub struct Demo {
+    /// What was reconstructed.
+    pub reconstruction: Reconstruction,
+    /// How good it is.
+    pub evaluation: Evaluation,
+    /// Where that is written, as JSON.
+    pub evaluation_file: PathBuf,
+}
+
+/// Generates a synthetic scene and writes it in the ABC layout, with the true
+/// wireframe as `gt_wireframe.json`.
+///
+/// # Errors
+/// If the scene is impossible, or the folder is not empty or cannot be written.
+pub fn synthesise(config: &SyntheticScene, dir: &Path) -> Result<GroundTruth, PipelineError> {
+    config.validate()?;
+    if dir
+        .read_dir()
+        .is_ok_and(|mut entries| entries.next().is_some())
+    {
+        return Err(PipelineError::SceneDirNotEmpty(dir.into()));
+    }
+    let data = generate(config)?;
+    let truth = GroundTruth {
+        wireframe: data.truth,
+        curves: Vec::new(),
+    };
+    abc::write_scene(&data.scene, dir)?;
+    write_ground_truth(&dir.join(GROUND_TRUTH), &truth)?;
+    Ok(truth)
+}
+
+/// Synthesises a scene into `OUT/scene`, reconstructs it into `OUT/run`, and
+/// writes how good the result is to `OUT/evaluation.json`. `options.scene` is
+/// not looked at; `options.out` is OUT.
+///
+/// # Errors
+/// As [`synthesise`] and [`reconstruct`].
+pub fn demo(
+    synthetic: &SyntheticScene,
+    options: &RunOptions,
+    cancelled: &AtomicBool,
+    on_event: OnEvent<'_>,
+) -> Result<Demo, PipelineError> {
+    RunDir::check(&options.out, options.existing)?;
+    if options.existing == Existing::Overwrite {
+        remove_earlier_demo(&options.out)?;
+    }
+    let options = RunOptions {
+        scene: options.out.join("scene"),
+        out: options.out.join("run"),
+        ..options.clone()
+    };
+    let evaluation_file = options.out.with_file_name("evaluation.json");
+    let (truth, _) = timed(on_event, Stage::Synthesise, |_| {
+        synthesise(synthetic, &options.scene)
+    })?;
+    let reconstruction = reconstruct(&options, cancelled, on_event)?;
+    let (evaluation, _) = timed(on_event, Stage::Evaluate, |_| {
+        let metrics = EvaluationConfig::default();
+        Ok(metrics.evaluate(&reconstruction.wireframe, Some(&truth.wireframe), None)?)
+    })?;
+    write_evaluation(&evaluation_file, &evaluation)?;
+    on_event(Event::FileWritten(evaluation_file.clone()));
+    Ok(Demo {
+        reconstruction,
+        evaluation,
+        evaluation_file,
+    })
+}
+
+/// Removes the scene of an earlier demonstration in `out`.
+fn remove_earlier_demo(out: &Path) -> Result<(), PipelineError> {
+    let scene = out.join("scene");
+    if !scene.exists() {
+        return Ok(());
+    }
+    // Without a run beside it, these may be somebody's photographs.
+    RunDir::open(&out.join("run"))?;
+    fs::remove_dir_all(&scene).map_err(|source| SceneError::Write {
+        path: scene.clone(),
+        source,
+    })?;
+    Ok(())
+}
+
+/// Writes an evaluation as JSON.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write_evaluation(path: &Path, evaluation: &Evaluation) -> Result<(), SceneError> {
+    let json = serde_json::to_vec_pretty(evaluation).map_err(|error| SceneError::Write {
+        path: path.into(),
+        source: error.into(),
+    })?;
+    file::write_atomically(path, &json)
+}

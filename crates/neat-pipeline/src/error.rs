@@ -1,0 +1,73 @@
+//! What can go wrong in a run as a whole.
+
+use crate::distill::DistillError;
+use crate::run_dir::RunDirError;
+use crate::trainer::TrainError;
+use neat_core::SceneError;
+use neat_core::synthetic::SyntheticError;
+use neat_tensor::BackendError;
+use neat_wireframe::export::ExportError;
+use neat_wireframe::metrics::MetricsError;
+use std::path::PathBuf;
+
+/// Why a run did not finish.
+#[derive(Debug, thiserror::Error)]
+pub enum PipelineError {
+    /// The scene, or another file, could not be read or written.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The run folder cannot be used.
+    #[error(transparent)]
+    RunDir(#[from] RunDirError),
+    /// The backend cannot be used.
+    #[error(transparent)]
+    Backend(#[from] BackendError),
+    /// A synthetic scene would mix with what is there.
+    #[error("{0} is not empty: choose another folder for the synthetic scene")]
+    SceneDirNotEmpty(PathBuf),
+    /// A synthetic scene cannot be made as asked for.
+    #[error(transparent)]
+    Synthetic(#[from] SyntheticError),
+    /// The optimisation failed.
+    #[error(transparent)]
+    Train(#[from] TrainError),
+    /// No wireframe could be taken out of the field.
+    #[error(transparent)]
+    Distill(#[from] DistillError),
+    /// A result could not be written.
+    #[error(transparent)]
+    Export(#[from] ExportError),
+    /// A result could not be measured.
+    #[error(transparent)]
+    Metrics(#[from] MetricsError),
+    /// A person stopped the run.
+    #[error("interrupted after step {step}: {checkpoint} holds the state")]
+    Interrupted {
+        /// Steps that are done.
+        step: u64,
+        /// The checkpoint that was written.
+        checkpoint: PathBuf,
+    },
+}
+
+impl PipelineError {
+    /// Whether the cause lies in what was asked for or in the input, and trying
+    /// again without a change is pointless; otherwise the run itself failed.
+    pub fn is_bad_input(&self) -> bool {
+        match self {
+            Self::Scene(error) => !is_write_error(error),
+            Self::RunDir(RunDirError::File(error)) => !is_write_error(error),
+            Self::RunDir(RunDirError::Serialize(_) | RunDirError::Checkpoint(_)) => false,
+            Self::RunDir(_)
+            | Self::Backend(_)
+            | Self::SceneDirNotEmpty(_)
+            | Self::Synthetic(_)
+            | Self::Metrics(_) => true,
+            Self::Train(_) | Self::Distill(_) | Self::Export(_) | Self::Interrupted { .. } => false,
+        }
+    }
+}
+
+fn is_write_error(error: &SceneError) -> bool {
+    matches!(error, SceneError::Write { .. })
+}

@@ -1,0 +1,147 @@
+//! Configurations by name.
+
+use crate::config::Config;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+use toml::{Table, Value};
+
+/// A named configuration to start from.
+///
+/// ```
+/// use neat_pipeline::preset::Preset;
+///
+/// let preset: Preset = "fast".parse()?;
+/// assert!(preset.config().train.steps > 0);
+/// # Ok::<(), neat_pipeline::preset::UnknownPreset>(())
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// The published code on ABC objects.
+    PaperAbc,
+    /// The published code on DTU scans.
+    PaperDtu,
+    /// The published code on BlendedMVS scenes.
+    PaperBlendedmvs,
+    /// Small networks, rays of all views and a back end of our own: minutes on a
+    /// CPU.
+    #[default]
+    Fast,
+}
+
+/// A name that is no preset's.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown preset `{0}`; use one of paper-abc, paper-dtu, paper-blendedmvs, fast")]
+pub struct UnknownPreset(String);
+
+impl Preset {
+    /// Every preset.
+    pub const ALL: [Self; 4] = [
+        Self::PaperAbc,
+        Self::PaperDtu,
+        Self::PaperBlendedmvs,
+        Self::Fast,
+    ];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PaperAbc => "paper-abc",
+            Self::PaperDtu => "paper-dtu",
+            Self::PaperBlendedmvs => "paper-blendedmvs",
+            Self::Fast => "fast",
+        }
+    }
+
+    /// Its configuration files, with comments that say where the values are from;
+    /// later ones lie on top of earlier ones.
+    fn layers(self) -> &'static [&'static str] {
+        const PAPER: &str = include_str!("../presets/paper.toml");
+        match self {
+            Self::PaperAbc => &[PAPER, include_str!("../presets/paper-abc.toml")],
+            Self::PaperDtu => &[PAPER, include_str!("../presets/paper-dtu.toml")],
+            Self::PaperBlendedmvs => &[PAPER, include_str!("../presets/paper-blendedmvs.toml")],
+            Self::Fast => &[include_str!("../presets/fast.toml")],
+        }
+    }
+
+    /// Its configuration.
+    pub fn config(self) -> Config {
+        // The files are part of the program, and a test reads them all.
+        let broken = |error: toml::de::Error| -> ! {
+            panic!("Preset::config: {self} does not parse: {error}")
+        };
+        let mut tree = Table::new();
+        for layer in self.layers() {
+            let table = layer.parse().unwrap_or_else(|error| broken(error));
+            lay_over(&mut tree, table);
+        }
+        tree.try_into().unwrap_or_else(|error| broken(error))
+    }
+}
+
+/// Puts the values of `layer` into `tree`, table by table.
+fn lay_over(tree: &mut Table, layer: Table) {
+    for (key, value) in layer {
+        match (tree.get_mut(&key), value) {
+            (Some(Value::Table(below)), Value::Table(above)) => lay_over(below, above),
+            (_, value) => {
+                tree.insert(key, value);
+            }
+        }
+    }
+}
+
+impl fmt::Display for Preset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Preset {
+    type Err = UnknownPreset;
+
+    fn from_str(name: &str) -> Result<Self, UnknownPreset> {
+        Self::ALL
+            .into_iter()
+            .find(|preset| preset.name() == name)
+            .ok_or_else(|| UnknownPreset(name.to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_survives_the_way_to_disk_and_back() {
+        for preset in Preset::ALL {
+            let config = preset.config();
+            let text = toml::to_string_pretty(&config).unwrap();
+            assert_eq!(toml::from_str::<Config>(&text).unwrap(), config, "{preset}");
+            assert_eq!(preset.name().parse(), Ok(preset));
+        }
+        let message = "fats".parse::<Preset>().unwrap_err().to_string();
+        assert!(message.contains("`fats`") && message.contains("paper-dtu"));
+    }
+
+    #[test]
+    fn published_presets_follow_the_published_code() {
+        for preset in [Preset::PaperAbc, Preset::PaperDtu, Preset::PaperBlendedmvs] {
+            let train = preset.config().train;
+            assert_eq!(train.rays, 1024, "{preset}");
+            assert_eq!(train.min_sample_weight, None, "{preset}");
+            let loss = train.loss;
+            let weights = [
+                loss.rgb,
+                loss.eikonal,
+                loss.mask,
+                loss.segment,
+                loss.junction_3d,
+                loss.junction_2d,
+            ];
+            assert_eq!(weights, [1.0, 0.1, 0.0, 0.01, 0.1, 0.01], "{preset}");
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! From a scene on disk to a run folder: training, distillation, and both.
+
+mod results;
+mod session;
+mod training;
+
+pub(crate) use session::timed;
+pub use session::{OpenedRun, open_run};
+
+use crate::config::Config;
+use crate::error::PipelineError;
+use crate::event::{OnEvent, Stage};
+use crate::run_dir::{Existing, RunDir};
+use neat_core::Wireframe3d;
+use neat_tensor::Backend;
+use session::Session;
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+/// What to run, where, and how long.
+#[derive(Clone, Debug)]
+pub struct RunOptions {
+    /// The folder of the scene.
+    pub scene: PathBuf,
+    /// The folder of the run.
+    pub out: PathBuf,
+    /// What to do about a folder that already holds something.
+    pub existing: Existing,
+    /// Every choice of method.
+    pub config: Config,
+    /// What the configuration started from, for the manifest.
+    pub preset: String,
+    /// What computes.
+    pub backend: Backend,
+    /// Seed of all randomness.
+    pub seed: u64,
+    /// Training ends after this long, if its steps are not done before; the
+    /// schedules of the optimisation are shortened with it.
+    pub time_budget: Option<Duration>,
+    /// The arguments of the program, for the manifest.
+    pub command_line: Vec<String>,
+}
+
+/// What a run came to.
+#[derive(Clone, Debug)]
+pub struct Reconstruction {
+    /// The folder with all results.
+    pub run: RunDir,
+    /// The wireframe, in the frame of the user's files.
+    pub wireframe: Wireframe3d,
+    /// Numbers of every step of the distillation.
+    pub report: serde_json::Value,
+}
+
+/// Trains on a scene and leaves a run folder with checkpoints.
+///
+/// `cancelled` is looked at before every step: once it is set, the last state is
+/// written and the run ends.
+///
+/// # Errors
+/// If the scene, the folder or the backend cannot be used, the optimisation
+/// fails, or the disk is full; [`PipelineError::Interrupted`] after
+/// cancellation. What has been written stays.
+pub fn train(
+    options: &RunOptions,
+    cancelled: &AtomicBool,
+    on_event: OnEvent<'_>,
+) -> Result<RunDir, PipelineError> {
+    Session::start(options, on_event)?.finish(|session| {
+        session.train(options, cancelled)?;
+        Ok(session.dir.clone())
+    })
+}
+
+/// Trains on a scene, distils the wireframe and writes all results.
+///
+/// # Errors
+/// As [`train`], or if no wireframe can be taken out of the field.
+pub fn reconstruct(
+    options: &RunOptions,
+    cancelled: &AtomicBool,
+    on_event: OnEvent<'_>,
+) -> Result<Reconstruction, PipelineError> {
+    Session::start(options, on_event)?.finish(|session| {
+        let field = session.train(options, cancelled)?;
+        session.distill(&field)
+    })
+}
+
+/// Distils the wireframe once more from the last checkpoint of a run, and writes
+/// the results into its folder.
+///
+/// # Errors
+/// If the run or its scene cannot be read, no wireframe can be taken out of the
+/// field, or the disk is full.
+pub fn distill_run(
+    opened: OpenedRun,
+    on_event: OnEvent<'_>,
+) -> Result<Reconstruction, PipelineError> {
+    let OpenedRun {
+        dir,
+        config,
+        manifest,
+        scene,
+        field,
+    } = opened;
+    let mut session = Session {
+        dir,
+        config,
+        manifest,
+        scene,
+        on_event,
+    };
+    // Distillation is repeated: only the last one's time counts.
+    for stage in [Stage::Distill, Stage::Export] {
+        session.manifest.seconds.remove(&stage);
+    }
+    session.finish(|session| session.distill(&field))
+}

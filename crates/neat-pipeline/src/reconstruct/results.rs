@@ -1,0 +1,100 @@
+//! Distillation, and everything that a person gets to see of it.
+
+use super::Reconstruction;
+use super::session::Session;
+use crate::distill::{Distilled, distill};
+use crate::error::PipelineError;
+use crate::event::{Event, Stage};
+use crate::image_io::write_png;
+use crate::overlay::{draw_overlay, draw_wireframe, spread_views};
+use crate::trainer::TrainedField;
+use neat_core::{Wireframe3d, file};
+use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
+use rayon::prelude::*;
+use serde_json::json;
+use std::collections::BTreeMap;
+
+/// The wireframe is drawn on so many photographs.
+const OVERLAYS: usize = 6;
+
+impl Session<'_> {
+    /// Takes the wireframe out of the field and writes it.
+    pub fn distill(&mut self, field: &TrainedField) -> Result<Reconstruction, PipelineError> {
+        let distilled = self.stage(Stage::Distill, |session| {
+            let on_event = &mut *session.on_event;
+            let mut progress = |fraction| {
+                on_event(Event::StageProgress {
+                    stage: Stage::Distill,
+                    fraction,
+                });
+            };
+            let (scene, config) = (&session.scene, &session.config);
+            Ok(distill(scene, field, config, &mut progress)?)
+        })?;
+        if distilled.wireframe.edges.is_empty() {
+            self.warn(
+                "the wireframe has no edges: train longer, or look at the 2D wireframes of the scene",
+            );
+        }
+        let wireframe = self.stage(Stage::Export, |session| session.export(&distilled))?;
+        Ok(Reconstruction {
+            run: self.dir.clone(),
+            wireframe,
+            report: distilled.report,
+        })
+    }
+
+    /// Writes files and pictures; returns the wireframe in the frame of the
+    /// user's files.
+    fn export(&mut self, distilled: &Distilled) -> Result<Wireframe3d, PipelineError> {
+        let in_world = &distilled.wireframe;
+        let original = in_world.map(|point| self.scene.original_from_world.apply(point));
+        let document = WireframeDocument {
+            metadata: self.metadata(distilled),
+            edge_fields: BTreeMap::from([(
+                "supporting_views".to_owned(),
+                distilled.edge_support.iter().map(|n| *n as f64).collect(),
+            )]),
+            ..WireframeDocument::from(&original)
+        };
+        let [json, obj, ply, png] =
+            ["json", "obj", "ply", "png"].map(|extension| self.dir.wireframe(extension));
+        write_json(&json, &document)?;
+        write_obj(&obj, &original)?;
+        write_ply(&ply, &original)?;
+        write_png(&png, &draw_wireframe(in_world, &self.scene))?;
+        let mut written = vec![json, obj, ply, png];
+
+        let views = &self.scene.views;
+        let overlays: Vec<_> = spread_views(views, OVERLAYS)
+            .into_iter()
+            .map(|index| (&views[index], self.dir.overlay(&views[index].name)))
+            .collect();
+        if let Some(folder) = overlays.first().and_then(|(_, path)| path.parent()) {
+            file::create_dir(folder)?;
+        }
+        overlays.par_iter().try_for_each(|(view, path)| {
+            write_png(path, &draw_overlay(view, self.scene.pixel_center, in_world))
+        })?;
+        written.extend(overlays.into_iter().map(|(_, path)| path));
+
+        for path in written {
+            self.written(path);
+        }
+        Ok(original)
+    }
+
+    fn metadata(&self, distilled: &Distilled) -> BTreeMap<String, serde_json::Value> {
+        [
+            ("neat", json!(self.manifest.neat)),
+            ("scene", json!(self.scene.name)),
+            ("preset", json!(self.manifest.preset)),
+            ("backend", json!(self.manifest.backend)),
+            ("seed", json!(self.manifest.seed)),
+            ("steps", json!(self.manifest.steps)),
+            ("report", distilled.report.clone()),
+        ]
+        .map(|(key, value)| (key.to_owned(), value))
+        .into()
+    }
+}

@@ -1,0 +1,248 @@
+//! A run in progress: its folder, its scene, and its manifest kept up to date.
+
+use super::RunOptions;
+use crate::config::Config;
+use crate::error::PipelineError;
+use crate::event::{Event, OnEvent, Stage};
+use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
+use crate::run_dir::{Existing, RunDir};
+use crate::trainer::TrainedField;
+use burn::tensor::Device;
+use neat_core::{LoadOptions, LoadedScene, Scene, SceneError, load_scene};
+use neat_tensor::Backend;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// A run in progress.
+pub(super) struct Session<'a> {
+    pub dir: RunDir,
+    pub config: Config,
+    pub manifest: Manifest,
+    pub scene: Scene,
+    pub on_event: OnEvent<'a>,
+}
+
+impl<'a> Session<'a> {
+    /// Reads the scene, then makes the run folder with `config.toml` and a first
+    /// `manifest.json`: bad input leaves no folder behind.
+    pub fn start(options: &RunOptions, on_event: OnEvent<'a>) -> Result<Self, PipelineError> {
+        RunDir::check(&options.out, options.existing)?;
+        let device = options.backend.device()?;
+        let earlier = match options.existing {
+            Existing::Resume => Some(RunDir::open(&options.out)?.manifest()?),
+            Existing::Refuse | Existing::Overwrite => None,
+        };
+        let scene_dir = absolute(&options.scene)?;
+
+        let mut warnings = Vec::new();
+        let ((loaded, inputs), seconds) = timed(on_event, Stage::Load, |on_event| {
+            let loaded = load(&scene_dir, &options.config, on_event)?;
+            Ok((loaded, hash_inputs(&scene_dir)?))
+        })?;
+        warnings.extend(loaded.warnings.iter().map(ToString::to_string));
+        if earlier.as_ref().is_some_and(|e| e.inputs != inputs) {
+            let warning = "the files of the scene have changed since the run began".to_owned();
+            on_event(Event::Warning(warning.clone()));
+            warnings.push(warning);
+        }
+
+        let dir = RunDir::create(&options.out, options.existing)?;
+        dir.write_config(&options.config)?;
+        let now = utc_now();
+        let manifest = Manifest {
+            neat: env!("CARGO_PKG_VERSION").to_owned(),
+            compiler: env!("NEAT_RUSTC").to_owned(),
+            target: env!("NEAT_TARGET").to_owned(),
+            command_line: options.command_line.clone(),
+            preset: options.preset.clone(),
+            backend: options.backend.resolve().to_string(),
+            device: device_name(&device),
+            threads: rayon::current_num_threads(),
+            seed: options.seed,
+            scene: scene_dir,
+            inputs,
+            warnings,
+            status: Status::Running,
+            steps: earlier.as_ref().map_or(0, |e| e.steps),
+            started: earlier
+                .as_ref()
+                .map_or_else(|| now.clone(), |e| e.started.clone()),
+            updated: now,
+            seconds: earlier.map_or_else(BTreeMap::new, |e| e.seconds),
+        };
+        let mut session = Self {
+            dir,
+            config: options.config.clone(),
+            manifest,
+            scene: loaded.scene,
+            on_event,
+        };
+        session.add_seconds(Stage::Load, seconds);
+        session.write_manifest()?;
+        Ok(session)
+    }
+
+    /// Does the work of the run and records in the manifest how it ended.
+    pub fn finish<T>(
+        mut self,
+        work: impl FnOnce(&mut Self) -> Result<T, PipelineError>,
+    ) -> Result<T, PipelineError> {
+        let result = work(&mut self);
+        self.manifest.status = match &result {
+            Ok(_) => Status::Finished,
+            Err(PipelineError::Interrupted { .. }) => Status::Interrupted,
+            Err(_) => Status::Failed,
+        };
+        let recorded = self.write_manifest();
+        // Of two errors the first is the cause.
+        let value = result?;
+        recorded?;
+        Ok(value)
+    }
+
+    /// Does a part of the work, tells when it begins and ends, and adds its time.
+    pub fn stage<T>(
+        &mut self,
+        stage: Stage,
+        work: impl FnOnce(&mut Self) -> Result<T, PipelineError>,
+    ) -> Result<T, PipelineError> {
+        (self.on_event)(Event::StageStarted(stage));
+        let start = Instant::now();
+        let value = work(self)?;
+        let seconds = start.elapsed().as_secs_f64();
+        self.add_seconds(stage, seconds);
+        (self.on_event)(Event::StageFinished { stage, seconds });
+        Ok(value)
+    }
+
+    pub fn warn(&mut self, warning: &str) {
+        self.manifest.warnings.push(warning.to_owned());
+        (self.on_event)(Event::Warning(warning.to_owned()));
+    }
+
+    pub fn written(&mut self, path: PathBuf) {
+        (self.on_event)(Event::FileWritten(path));
+    }
+
+    pub fn write_manifest(&mut self) -> Result<(), PipelineError> {
+        self.manifest.updated = utc_now();
+        Ok(self.dir.write_manifest(&self.manifest)?)
+    }
+
+    fn add_seconds(&mut self, stage: Stage, seconds: f64) {
+        *self.manifest.seconds.entry(stage).or_default() += seconds;
+    }
+}
+
+/// A run that has been, with its scene and its trained field.
+#[derive(Debug)]
+pub struct OpenedRun {
+    /// Its folder.
+    pub dir: RunDir,
+    /// Its configuration.
+    pub config: Config,
+    /// Its manifest.
+    pub manifest: Manifest,
+    /// Its scene.
+    pub scene: Scene,
+    /// The field of its last checkpoint.
+    pub field: TrainedField,
+}
+
+/// Opens the run in the folder `run`: reads its configuration, changed by
+/// `configure`, its scene, and its last checkpoint.
+///
+/// `scene` is the folder of the scene; `None` takes the one that the run was
+/// trained on.
+///
+/// # Errors
+/// If a part of the run or the scene cannot be read, or the backend cannot be
+/// used.
+pub fn open_run<E>(
+    run: &Path,
+    scene: Option<&Path>,
+    backend: Backend,
+    configure: impl FnOnce(Config) -> Result<Config, E>,
+    on_event: OnEvent<'_>,
+) -> Result<OpenedRun, E>
+where
+    E: From<PipelineError>,
+{
+    let dir = RunDir::open(run).map_err(PipelineError::from)?;
+    let config = configure(dir.config().map_err(PipelineError::from)?)?;
+    Ok(read_run(dir, config, scene, backend, on_event)?)
+}
+
+fn read_run(
+    dir: RunDir,
+    config: Config,
+    scene: Option<&Path>,
+    backend: Backend,
+    on_event: OnEvent<'_>,
+) -> Result<OpenedRun, PipelineError> {
+    let device = backend.device()?;
+    let manifest = dir.manifest()?;
+    let scene_dir = scene.unwrap_or(&manifest.scene);
+    let (loaded, _) = timed(on_event, Stage::Load, |on_event| {
+        load(scene_dir, &config, on_event)
+    })?;
+    let checkpoint = dir.read_latest_checkpoint()?;
+    let field = TrainedField::load(&config, &checkpoint, &device)?;
+    Ok(OpenedRun {
+        dir,
+        config,
+        manifest,
+        scene: loaded.scene,
+        field,
+    })
+}
+
+/// Reads a scene as a run needs it, and passes its warnings on.
+fn load(
+    scene: &Path,
+    config: &Config,
+    on_event: OnEvent<'_>,
+) -> Result<LoadedScene, PipelineError> {
+    let options = LoadOptions {
+        pixel_center: config.data.pixel_center,
+        min_segment_score: config.data.min_segment_score,
+        ..LoadOptions::default()
+    };
+    let loaded = load_scene(scene, &options)?;
+    for warning in &loaded.warnings {
+        on_event(Event::Warning(warning.to_string()));
+    }
+    Ok(loaded)
+}
+
+/// Does a stage outside of a session; returns its time too.
+pub(crate) fn timed<T>(
+    on_event: OnEvent<'_>,
+    stage: Stage,
+    work: impl FnOnce(OnEvent<'_>) -> Result<T, PipelineError>,
+) -> Result<(T, f64), PipelineError> {
+    on_event(Event::StageStarted(stage));
+    let start = Instant::now();
+    let value = work(on_event)?;
+    let seconds = start.elapsed().as_secs_f64();
+    on_event(Event::StageFinished { stage, seconds });
+    Ok((value, seconds))
+}
+
+/// The path from the root, so that the manifest leads there from anywhere.
+fn absolute(path: &Path) -> Result<PathBuf, SceneError> {
+    std::path::absolute(path).map_err(|source| SceneError::Read {
+        path: path.into(),
+        source,
+    })
+}
+
+/// The adapter of a GPU, or the name of a CPU device.
+fn device_name(device: &Device) -> String {
+    #[cfg(feature = "wgpu")]
+    if let Some(identity) = device.identity() {
+        return identity.name;
+    }
+    format!("{device:?}")
+}
