@@ -1,2 +1,21 @@
-//! neat
-fn main() {}
+//! `neat`: posed photographs in, 3D wireframes out.
+
+mod arguments;
+mod commands;
+mod duration;
+mod error;
+mod interrupt;
+mod output;
+mod progress;
+
+use arguments::Cli;
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match cli.run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => error.report(),
+    }
+}

@@ -1,0 +1,133 @@
+//! The command line: what all commands share.
+
+use crate::commands::Command;
+use crate::error::CliError;
+use crate::{duration, output};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser};
+use neat_pipeline::config::Config;
+use neat_pipeline::overrides::apply_overrides;
+use neat_pipeline::preset::Preset;
+use neat_pipeline::run_dir::parse_config;
+use neat_tensor::Backend;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Turns posed photographs and their 2D wireframes into one 3D wireframe.
+#[derive(Debug, Parser)]
+#[command(
+    name = "neat",
+    version,
+    arg_required_else_help = true,
+    after_help = "\
+Start here:
+  neat demo --out demo                   make a scene, reconstruct it, and measure the result
+  neat info SCENE                        what is in a folder of photographs
+  neat reconstruct SCENE --out RUN       from the photographs to RUN/wireframe.json
+  neat eval --pred RUN/wireframe.json --gt SCENE/gt_wireframe.json
+
+Exit codes:
+  0    done
+  1    the run failed
+  2    the arguments or the input cannot be used
+  130  interrupted: Ctrl-C ends training after the current step and leaves a checkpoint to
+       continue from with --resume; a second Ctrl-C ends at once"
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// Say nothing but results, warnings and errors
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// Use so many CPU threads instead of all; results do not depend on it
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+impl Cli {
+    /// Does what was asked for.
+    pub fn run(self) -> Result<(), CliError> {
+        output::init_log();
+        if let Some(threads) = self.threads {
+            rayon::ThreadPoolBuilder::new()
+                .num_threads(threads.into())
+                .build_global()?;
+        }
+        self.command.run(self.quiet)
+    }
+}
+
+/// The method, its numbers and its seed.
+#[derive(Debug, Args)]
+pub struct MethodArgs {
+    /// Configuration to start from
+    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = preset_parser())]
+    pub preset: Preset,
+    /// Configuration file to start from instead of a preset, such as a run's config.toml
+    #[arg(long, value_name = "FILE", conflicts_with = "preset")]
+    pub config: Option<PathBuf>,
+    /// Change one value of the configuration, such as train.rays=512; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Number of training steps, the same as --set train.steps=N
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub steps: Option<u64>,
+}
+
+impl MethodArgs {
+    /// The configuration: a preset or a file, with everything that was set.
+    pub fn config(&self) -> Result<Config, CliError> {
+        let base = match &self.config {
+            Some(path) => parse_config(path)?,
+            None => self.preset.config(),
+        };
+        self.apply(&base)
+    }
+
+    /// `base` with everything that was set.
+    pub fn apply(&self, base: &Config) -> Result<Config, CliError> {
+        let mut config = apply_overrides(base, &self.set)?;
+        if let Some(steps) = self.steps {
+            config.train.steps = steps;
+        }
+        Ok(config)
+    }
+
+    /// What the configuration starts from, in words.
+    pub fn name(&self) -> String {
+        match &self.config {
+            Some(path) => path.display().to_string(),
+            None => self.preset.to_string(),
+        }
+    }
+}
+
+/// What computes, and for how long.
+#[derive(Debug, Args)]
+pub struct ComputeArgs {
+    #[command(flatten)]
+    pub backend: BackendArg,
+    /// End training after this long (90s, 10m, 1h30m) if its steps are not done before; the
+    /// learning rate follows
+    #[arg(long, value_name = "TIME", value_parser = duration::parse)]
+    pub time_budget: Option<Duration>,
+}
+
+/// What computes.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct BackendArg {
+    /// What computes: a GPU (wgpu), the CPU (flex, ndarray), or the best there is (auto)
+    #[arg(long, value_name = "NAME", default_value = "auto", value_parser = backend_parser())]
+    pub backend: Backend,
+}
+
+/// Takes the name of a preset.
+fn preset_parser() -> impl TypedValueParser<Value = Preset> {
+    PossibleValuesParser::new(Preset::ALL.map(Preset::name)).try_map(|name| name.parse::<Preset>())
+}
+
+/// Takes the name of a backend.
+pub fn backend_parser() -> impl TypedValueParser<Value = Backend> {
+    PossibleValuesParser::new(["auto", "flex", "ndarray", "wgpu"])
+        .try_map(|name| name.parse::<Backend>())
+}

@@ -1,0 +1,45 @@
+//! One file per subcommand.
+
+mod compare_backends;
+mod demo;
+mod distill;
+mod eval;
+mod info;
+mod reconstruct;
+mod render;
+mod synth;
+mod train;
+
+use crate::error::CliError;
+use clap::Subcommand;
+
+/// What neat can do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    Reconstruct(reconstruct::ReconstructArgs),
+    Train(train::TrainArgs),
+    Distill(distill::DistillArgs),
+    Eval(eval::EvalArgs),
+    Render(render::RenderArgs),
+    Synth(synth::SynthArgs),
+    Info(info::InfoArgs),
+    Demo(demo::DemoArgs),
+    CompareBackends(compare_backends::CompareBackendsArgs),
+}
+
+impl Command {
+    /// Does what was asked for.
+    pub fn run(self, quiet: bool) -> Result<(), CliError> {
+        match self {
+            Self::Reconstruct(args) => args.run(quiet),
+            Self::Train(args) => args.run(quiet),
+            Self::Distill(args) => args.run(quiet),
+            Self::Eval(args) => args.run(),
+            Self::Render(args) => args.run(quiet),
+            Self::Synth(args) => args.run(),
+            Self::Info(args) => args.run(),
+            Self::Demo(args) => args.run(quiet),
+            Self::CompareBackends(args) => args.run(quiet),
+        }
+    }
+}

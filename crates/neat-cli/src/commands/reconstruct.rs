@@ -1,0 +1,54 @@
+//! `neat reconstruct`.
+
+use super::train::RunArgs;
+use crate::error::CliError;
+use crate::progress::Progress;
+use crate::{interrupt, output};
+use clap::Args;
+use neat_pipeline::reconstruct::{Reconstruction, reconstruct};
+
+/// Turn a scene into a 3D wireframe: train, distil, and write all results
+///
+/// RUN then holds config.toml, manifest.json, metrics.jsonl, checkpoints/, the wireframe as
+/// .json, .obj and .ply in the frame of the scene's files, a picture of it, and overlays/ on
+/// some of the photographs.
+///
+/// Ctrl-C ends training after the current step and leaves a checkpoint (exit code 130).
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  neat reconstruct SCENE --out RUN
+  neat reconstruct SCENE --out RUN --time-budget 10m
+  neat reconstruct SCENE --out RUN --preset paper-dtu --backend wgpu
+  neat reconstruct SCENE --out RUN --set train.rays=512 --set data.scene_radius=1.5
+  neat reconstruct SCENE --out RUN --resume            after an interrupt
+  neat reconstruct SCENE --out AGAIN --config RUN/config.toml
+
+Every key that --set takes stands in the config.toml of a run; a wrong key lists the right ones.")]
+pub struct ReconstructArgs {
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+impl ReconstructArgs {
+    pub fn run(self, quiet: bool) -> Result<(), CliError> {
+        let options = self.run.options()?;
+        let interrupted = interrupt::flag()?;
+        let mut progress = Progress::new(quiet);
+        let reconstruction =
+            reconstruct(&options, &interrupted, &mut |event| progress.show(event))?;
+        drop(progress);
+        output::print(&summary(&reconstruction))
+    }
+}
+
+/// One line about the result.
+pub fn summary(reconstruction: &Reconstruction) -> String {
+    let wireframe = &reconstruction.wireframe;
+    format!(
+        "wireframe: {} junctions, {} edges: {}",
+        wireframe.junctions.len(),
+        wireframe.edges.len(),
+        reconstruction.run.wireframe("json").display()
+    )
+}

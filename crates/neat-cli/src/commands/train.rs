@@ -1,0 +1,103 @@
+//! `neat train`, and the arguments that it shares with `neat reconstruct`.
+
+use crate::arguments::{ComputeArgs, MethodArgs};
+use crate::error::CliError;
+use crate::progress::Progress;
+use crate::{interrupt, output};
+use clap::Args;
+use neat_pipeline::reconstruct::{RunOptions, train};
+use neat_pipeline::run_dir::{Existing, RunDir};
+use std::path::PathBuf;
+
+/// Train on a scene, without taking the wireframe out
+///
+/// RUN then holds config.toml, manifest.json, metrics.jsonl and checkpoints/. `neat distill
+/// RUN` does the rest.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  neat train SCENE --out RUN
+  neat train SCENE --out RUN --preset paper-abc --time-budget 8h
+  neat train SCENE --out RUN --resume         after Ctrl-C (exit code 130)")]
+pub struct TrainArgs {
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+/// A scene, a run folder, and how to get from one to the other.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// Folder of the scene: images, poses and 2D wireframes (see `neat info`)
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+    /// Folder for everything that the run leaves; it must be new or empty
+    #[arg(long, value_name = "RUN")]
+    out: PathBuf,
+    /// Replace an earlier run in that folder
+    #[arg(long)]
+    overwrite: bool,
+    /// Continue the run in that folder from its last checkpoint, with its configuration and seed
+    #[arg(long, conflicts_with_all = ["overwrite", "preset", "config", "seed"])]
+    resume: bool,
+    #[command(flatten)]
+    method: MethodArgs,
+    /// Seed of all randomness
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    compute: ComputeArgs,
+}
+
+impl RunArgs {
+    /// The options of the run.
+    pub fn options(&self) -> Result<RunOptions, CliError> {
+        let (existing, config, preset, seed) = if self.resume {
+            let run = RunDir::open(&self.out)?;
+            let manifest = run.manifest()?;
+            let config = self.method.apply(&run.config()?)?;
+            (Existing::Resume, config, manifest.preset, manifest.seed)
+        } else {
+            let existing = existing(self.overwrite);
+            let config = self.method.config()?;
+            (existing, config, self.method.name(), self.seed)
+        };
+        Ok(RunOptions {
+            scene: self.scene.clone(),
+            out: self.out.clone(),
+            existing,
+            config,
+            preset,
+            backend: self.compute.backend.backend,
+            seed,
+            time_budget: self.compute.time_budget,
+            command_line: command_line(),
+        })
+    }
+}
+
+/// What `--overwrite` means for a folder.
+pub fn existing(overwrite: bool) -> Existing {
+    if overwrite {
+        Existing::Overwrite
+    } else {
+        Existing::Refuse
+    }
+}
+
+/// The arguments of this program, for the manifest.
+pub fn command_line() -> Vec<String> {
+    std::env::args_os()
+        .map(|argument| argument.to_string_lossy().into_owned())
+        .collect()
+}
+
+impl TrainArgs {
+    pub fn run(self, quiet: bool) -> Result<(), CliError> {
+        let options = self.run.options()?;
+        let interrupted = interrupt::flag()?;
+        let mut progress = Progress::new(quiet);
+        let run = train(&options, &interrupted, &mut |event| progress.show(event))?;
+        drop(progress);
+        output::print(&format!("trained: {}", run.latest_checkpoint()?.display()))
+    }
+}
