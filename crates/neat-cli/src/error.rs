@@ -44,7 +44,7 @@ pub enum CliError {
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// The operating system does not tell of Ctrl-C.
     #[error("Ctrl-C cannot be caught")]
-    Interrupt(#[from] ctrlc::Error),
+    Interrupt(#[source] std::io::Error),
     /// Nobody takes the output.
     #[error("the output cannot be written")]
     Output(#[from] std::io::Error),

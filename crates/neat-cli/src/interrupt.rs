@@ -1,19 +1,19 @@
 //! Ctrl-C: the first one asks the run to end, the second one ends it.
 
 use crate::error::{CliError, INTERRUPTED};
-use crate::output;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// A flag that the first Ctrl-C, or a request to terminate, sets.
 pub fn flag() -> Result<Arc<AtomicBool>, CliError> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let set = Arc::clone(&flag);
-    ctrlc::set_handler(move || {
-        if set.swap(true, Ordering::Relaxed) {
-            std::process::exit(INTERRUPTED.into());
-        }
-        output::note("ending after this step; press Ctrl-C again to end at once");
-    })?;
-    Ok(flag)
+    let interrupted = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        // Registered first, so that it acts on the second signal only.
+        flag::register_conditional_shutdown(signal, INTERRUPTED.into(), Arc::clone(&interrupted))
+            .and_then(|_| flag::register(signal, Arc::clone(&interrupted)))
+            .map_err(CliError::Interrupt)?;
+    }
+    Ok(interrupted)
 }

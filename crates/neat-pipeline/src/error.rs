@@ -6,6 +6,7 @@ use crate::trainer::TrainError;
 use neat_core::SceneError;
 use neat_core::synthetic::SyntheticError;
 use neat_tensor::BackendError;
+use neat_tensor::checkpoint::CheckpointError;
 use neat_wireframe::export::ExportError;
 use neat_wireframe::metrics::MetricsError;
 use std::path::PathBuf;
@@ -57,7 +58,9 @@ impl PipelineError {
         match self {
             Self::Scene(error) => !is_write_error(error),
             Self::RunDir(RunDirError::File(error)) => !is_write_error(error),
-            Self::RunDir(RunDirError::Serialize(_) | RunDirError::Checkpoint(_)) => false,
+            Self::RunDir(
+                RunDirError::Serialize(_) | RunDirError::Checkpoint(CheckpointError::Io { .. }),
+            ) => false,
             Self::RunDir(_)
             | Self::Backend(_)
             | Self::SceneDirNotEmpty(_)

@@ -1,0 +1,220 @@
+//! Every command on a tiny scene: the files it leaves, and what it prints.
+
+mod support;
+
+use neat_core::ground_truth::read_wireframe;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use support::{TestScene, neat, stderr, stdout, truncate};
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn reconstruct_leaves_every_result() {
+    let scene = TestScene::new();
+    let assert = scene.run("reconstruct", "2").assert().success();
+    assert!(stdout(&assert).contains("wireframe.json"));
+
+    let run = scene.file("run");
+    let config: toml::Table = fs::read_to_string(run.join("config.toml"))
+        .unwrap()
+        .parse()
+        .unwrap();
+    assert_eq!(config["train"]["steps"].as_integer(), Some(2));
+    let manifest = json(&run.join("manifest.json"));
+    assert_eq!(manifest["status"], "finished");
+    assert_eq!(manifest["steps"], 2);
+    assert_eq!(manifest["backend"], "flex");
+    // One file of cameras, and an image and a wireframe per view.
+    assert_eq!(manifest["inputs"].as_object().unwrap().len(), 9);
+    let metrics = fs::read_to_string(run.join("metrics.jsonl")).unwrap();
+    let lines: Vec<Value> = metrics
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(lines.len(), 2);
+    assert!(lines[1]["losses"]["total"].is_number());
+    assert!(run.join("checkpoints/step-00000002.safetensors").exists());
+
+    let wireframe = read_wireframe(&run.join("wireframe.json")).unwrap();
+    let obj = fs::read_to_string(run.join("wireframe.obj")).unwrap();
+    let vertices = obj.lines().filter(|line| line.starts_with("v ")).count();
+    let edges = obj.lines().filter(|line| line.starts_with("l ")).count();
+    assert_eq!(
+        (vertices, edges),
+        (wireframe.junctions.len(), wireframe.edges.len())
+    );
+    let ply = fs::read_to_string(run.join("wireframe.ply")).unwrap();
+    assert!(ply.contains(&format!("element vertex {vertices}\n")));
+    assert!(ply.contains(&format!("element edge {edges}\n")));
+    image::open(run.join("wireframe.png")).unwrap();
+    for i in 0..4 {
+        let overlay = image::open(run.join(format!("overlays/image_000{i}.png"))).unwrap();
+        assert_eq!((overlay.width(), overlay.height()), (48, 48));
+    }
+
+    // The same once more, on one thread.
+    let again = scene.path("again");
+    neat(&["reconstruct", &scene.path("scene"), "--out", &again])
+        .args(["--config", &scene.path("run/config.toml")])
+        .args(["--backend", "flex", "--threads", "1"])
+        .assert()
+        .success();
+    assert_eq!(
+        fs::read_to_string(scene.file("again/metrics.jsonl")).unwrap(),
+        metrics
+    );
+    assert_eq!(
+        read_wireframe(&scene.file("again/wireframe.json")).unwrap(),
+        wireframe
+    );
+}
+
+#[test]
+fn a_trained_run_can_be_distilled_rendered_and_continued() {
+    let scene = TestScene::new();
+    scene.run("train", "1").assert().success();
+    let run = scene.path("run");
+    assert!(!scene.file("run/wireframe.json").exists());
+
+    neat(&["distill", &run, "--backend", "flex"])
+        .assert()
+        .success();
+    read_wireframe(&scene.file("run/wireframe.json")).unwrap();
+
+    let render = neat(&["render", &run, "--backend", "flex"])
+        .args(["--view", "image_0002", "--downscale", "4"])
+        .assert()
+        .success();
+    assert!(stdout(&render).contains("image_0002: PSNR"));
+    for kind in ["color", "depth", "normal"] {
+        let path = scene.file(&format!("run/renders/image_0002-{kind}.png"));
+        assert_eq!(image::open(path).unwrap().width(), 12);
+    }
+    let unknown = neat(&["render", &run, "--view", "nowhere"])
+        .assert()
+        .code(2);
+    assert!(stderr(&unknown).contains("`nowhere`"));
+    assert!(stderr(&unknown).contains("image_0003"));
+
+    scene.run("train", "3").arg("--resume").assert().success();
+    assert_eq!(json(&scene.file("run/manifest.json"))["steps"], 3);
+    let metrics = fs::read_to_string(scene.file("run/metrics.jsonl")).unwrap();
+    assert_eq!(metrics.lines().count(), 2, "{metrics}");
+
+    truncate(&scene.file("run/checkpoints/step-00000003.safetensors"));
+    let damaged = neat(&["distill", &run]).assert().code(2);
+    assert!(stderr(&damaged).contains("step-00000003.safetensors"));
+
+    scene
+        .run("train", "1")
+        .arg("--overwrite")
+        .assert()
+        .success();
+    assert!(!scene.file("run/wireframe.json").exists());
+}
+
+#[test]
+fn eval_prints_and_saves_scores() {
+    let scene = TestScene::new();
+    let truth = scene.path("scene/gt_wireframe.json");
+    let assert = neat(&["eval", "--pred", &truth, "--gt", &truth])
+        .args(["--json", &scene.path("scores.json")])
+        .assert()
+        .success();
+    let table = stdout(&assert);
+    assert!(
+        table.contains("P 0.01") && table.contains("R 0.05"),
+        "{table}"
+    );
+    let scores = json(&scene.file("scores.json"));
+    assert_eq!(scores["wireframe"]["segments_max"][0]["recall"], 1.0);
+
+    let cloud = scene.file("cloud.ply");
+    let header = "ply\nformat ascii 1.0\nelement vertex 1\n\
+                  property float x\nproperty float y\nproperty float z\nend_header\n";
+    fs::write(&cloud, format!("{header}0 0 0\n")).unwrap();
+    let assert = neat(&[
+        "eval",
+        "--pred",
+        &truth,
+        "--points",
+        &scene.path("cloud.ply"),
+    ])
+    .assert()
+    .success();
+    assert!(stdout(&assert).contains("ACC-L"));
+}
+
+#[test]
+fn info_describes_a_scene() {
+    let scene = TestScene::new();
+    let assert = neat(&["info", &scene.path("scene")]).assert().success();
+    let text = stdout(&assert);
+    for fragment in ["ABC", "views", "48×48", "scene ball", "0.5"] {
+        assert!(text.contains(fragment), "no `{fragment}` in:\n{text}");
+    }
+    assert_eq!(stderr(&assert), "");
+
+    fs::remove_dir_all(scene.file("scene/hawp")).unwrap();
+    let assert = neat(&["info", &scene.path("scene")]).assert().success();
+    assert!(stderr(&assert).contains("no view has a segment"));
+}
+
+#[test]
+fn demo_goes_all_the_way() {
+    let scene = TestScene::new();
+    let out = scene.path("demo");
+    let demo = || {
+        let mut command = neat(&["demo", "--out", &out, "--backend", "flex"]);
+        command.args(["--views", "4", "--image-size", "48", "--steps", "1"]);
+        command
+    };
+    let assert = demo().assert().success();
+    assert!(stdout(&assert).contains("junctions"));
+    assert!(scene.file("demo/scene/gt_wireframe.json").exists());
+    assert!(scene.file("demo/run/wireframe.json").exists());
+    assert!(json(&scene.file("demo/evaluation.json"))["wireframe"].is_object());
+
+    demo().assert().code(2);
+    demo().arg("--overwrite").assert().success();
+}
+
+#[test]
+fn backends_are_compared() {
+    let scene = TestScene::new();
+    let out = scene.path("comparison");
+    neat(&["compare-backends", &scene.path("scene"), "--out", &out])
+        .args(["--backends", "flex,ndarray", "--steps", "2"])
+        .assert()
+        .success();
+    let table = fs::read_to_string(scene.file("comparison/comparison.md")).unwrap();
+    assert!(
+        table.contains("flex") && table.contains("ndarray"),
+        "{table}"
+    );
+    assert!(json(&scene.file("comparison/comparison.json")).is_object());
+}
+
+#[test]
+fn help_teaches() {
+    let text = stdout(&neat(&["--help"]).assert().success());
+    assert!(text.contains("Exit codes") && text.contains("130"));
+    for command in [
+        "reconstruct",
+        "train",
+        "distill",
+        "eval",
+        "render",
+        "synth",
+        "info",
+        "demo",
+        "compare-backends",
+    ] {
+        let text = stdout(&neat(&[command, "--help"]).assert().success());
+        assert!(text.contains("Examples:") || command == "info", "{command}");
+    }
+}
