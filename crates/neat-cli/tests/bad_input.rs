@@ -228,6 +228,7 @@ fn run_folders_that_cannot_be_used() {
 
 #[cfg(unix)]
 #[test]
+#[expect(clippy::print_stderr, reason = "a skipped test must say so")]
 fn read_only_folders() {
     use std::os::unix::fs::PermissionsExt;
     let scene = TestScene::new();
@@ -235,7 +236,7 @@ fn read_only_folders() {
     fs::create_dir(&run).unwrap();
     fs::set_permissions(&run, fs::Permissions::from_mode(0o555)).unwrap();
     if fs::write(run.join("probe"), "").is_ok() {
-        println!("skipped: this user may write anywhere");
+        eprintln!("skipped: this user may write anywhere");
         return;
     }
     let assert = scene.run("train", "1").assert().code(2);
