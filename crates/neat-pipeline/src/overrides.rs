@@ -73,10 +73,18 @@ where
         value: text.to_owned(),
         reason,
     };
+    let values = parse_value(text).map_err(wrong_value)?;
     // JSON, because it spells out the optional keys that have no value.
     let mut tree = serde_json::to_value(config).map_err(|e| wrong_value(e.to_string()))?;
-    *slot(&mut tree, key)? = parse_value(text).map_err(wrong_value)?;
-    serde_json::from_value(tree).map_err(|e| wrong_value(e.to_string()))
+    let mut reason = String::new();
+    for value in values {
+        *slot(&mut tree, key)? = value;
+        match T::deserialize(&tree) {
+            Ok(config) => return Ok(config),
+            Err(error) => reason = error.to_string(),
+        }
+    }
+    Err(wrong_value(reason))
 }
 
 /// The place in the tree that `key` names.
@@ -123,15 +131,19 @@ fn unknown_key(key: String, level: &str, part: &str, keys: &[String]) -> Overrid
     }
 }
 
-/// Reads a value as TOML; what is not TOML is a plain string.
-fn parse_value(text: &str) -> Result<Value, String> {
+/// Reads a value as TOML; what is not TOML is a plain string. `none` may be no
+/// value or a word: what it can mean, in the order in which to try.
+fn parse_value(text: &str) -> Result<Vec<Value>, String> {
+    let word = || Value::String(text.to_owned());
     if text == "none" {
-        return Ok(Value::Null);
+        return Ok(vec![Value::Null, word()]);
     }
     match text.parse::<toml::Value>() {
         Ok(toml::Value::Float(x)) if !x.is_finite() => Err("it must be a finite number".into()),
-        Ok(value) => serde_json::to_value(value).map_err(|e| e.to_string()),
-        Err(_) => Ok(Value::String(text.to_owned())),
+        Ok(value) => serde_json::to_value(value)
+            .map(|value| vec![value])
+            .map_err(|e| e.to_string()),
+        Err(_) => Ok(vec![word()]),
     }
 }
 
@@ -187,6 +199,7 @@ mod tests {
     enum Views {
         One,
         All,
+        None,
     }
 
     fn tree() -> Tree {
@@ -226,6 +239,8 @@ mod tests {
         // The last one wins, and what is none can get a value again.
         let again = applied(&["train.radius=none", "train.radius=2.5"]).unwrap();
         assert_eq!(again.train.radius, Some(2.5));
+        // A variant may have that very name.
+        assert_eq!(applied(&["views=none"]).unwrap().views, Views::None);
         let table = applied(&["train={ steps = 1, learning_rate = 2.0 }"]).unwrap();
         assert_eq!(table.train.steps, 1);
     }

@@ -113,6 +113,7 @@ impl FromStr for Preset {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::overrides::apply_overrides;
 
     #[test]
     fn every_preset_survives_the_way_to_disk_and_back() {
@@ -120,6 +121,13 @@ mod tests {
             let config = preset.config();
             let text = toml::to_string_pretty(&config).unwrap();
             assert_eq!(toml::from_str::<Config>(&text).unwrap(), config, "{preset}");
+            // Setting what is already set changes nothing, optional values included.
+            let steps = format!("train.steps={}", config.train.steps);
+            assert_eq!(
+                apply_overrides(&config, &[steps]).unwrap(),
+                config,
+                "{preset}"
+            );
             assert_eq!(preset.name().parse(), Ok(preset));
         }
         let message = "fats".parse::<Preset>().unwrap_err().to_string();
@@ -143,5 +151,13 @@ mod tests {
             ];
             assert_eq!(weights, [1.0, 0.1, 0.0, 0.01, 0.1, 0.01], "{preset}");
         }
+    }
+
+    #[test]
+    fn the_fast_preset_leaves_out_what_the_published_code_has() {
+        let config = Preset::Fast.config();
+        assert_eq!(config.data.scene_radius, None);
+        assert_eq!(config.model.implicit.skip_layer, None);
+        assert_eq!(config.model.implicit.bounding_sphere_slope, None);
     }
 }

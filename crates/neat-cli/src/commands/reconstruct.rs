@@ -24,7 +24,7 @@ Examples:
   neat reconstruct SCENE --out RUN --resume            after an interrupt
   neat reconstruct SCENE --out AGAIN --config RUN/config.toml
 
-Every key that --set takes stands in the config.toml of a run; a wrong key lists the right ones.")]
+The keys of --set are those of a run's config.toml; a wrong one lists the right ones.")]
 pub struct ReconstructArgs {
     #[command(flatten)]
     run: RunArgs,
