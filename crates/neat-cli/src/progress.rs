@@ -67,13 +67,14 @@ impl Progress {
     }
 
     fn update(&mut self, fraction: f64, message: &str) {
-        let left = self.time_left(fraction);
-        let message = match (message, left) {
-            ("", None) => String::new(),
-            ("", Some(left)) => left,
-            (message, None) => message.to_owned(),
-            (message, Some(left)) => format!("{message}, {left}"),
-        };
+        // Time first: a narrow terminal cuts the end off.
+        let parts = [self.time_left(fraction), Some(message.to_owned())];
+        let parts: Vec<String> = parts
+            .into_iter()
+            .flatten()
+            .filter(|part| !part.is_empty())
+            .collect();
+        let message = parts.join(", ");
         if let Some(bar) = &self.bar {
             bar.set_position((fraction * TICKS as f64) as u64);
             bar.set_message(message);
@@ -119,7 +120,7 @@ impl Drop for Progress {
 fn bar() -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(TICKS), ProgressDrawTarget::stderr());
     // The template is fixed; were it wrong, the bar would look plain.
-    if let Ok(style) = ProgressStyle::with_template("{prefix} {bar:24} {percent:>3} % {msg}") {
+    if let Ok(style) = ProgressStyle::with_template("{prefix} {bar:24} {percent:>3} % {wide_msg}") {
         bar.set_style(style);
     }
     bar
@@ -128,7 +129,7 @@ fn bar() -> ProgressBar {
 fn describe(report: &StepReport) -> String {
     let losses = &report.losses;
     format!(
-        "step {}: loss {:.4} (rgb {:.4}, eikonal {:.4}, segment {:.4}, junction {:.4}), segment ends {:.1} px off",
+        "step {}, loss {:.4} (rgb {:.4}, eikonal {:.4}, segment {:.4}, junction {:.4}), ends {:.1} px off",
         report.iteration,
         losses.total,
         losses.rgb,
