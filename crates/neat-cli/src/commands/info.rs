@@ -135,5 +135,20 @@ fn warnings(loaded: &LoadedScene, min_score: f64) -> Vec<String> {
             "{inside} cameras stand within the scene ball: set data.scene_radius to the object's size"
         ));
     }
+    let blind = scene.views.iter().filter(|view| !sees_origin(view)).count();
+    if blind > 0 {
+        warnings.push(format!(
+            "{blind} cameras do not see the world origin: a ball around it is modelled, so move the origin of the poses into the object"
+        ));
+    }
     warnings
+}
+
+fn sees_origin(view: &View) -> bool {
+    let camera = &view.camera;
+    let projection = camera.project(&Default::default());
+    let within = |x: f64, size: u32| (0.0..f64::from(size)).contains(&x);
+    projection.depth > 0.0
+        && within(projection.pixel.x, camera.width)
+        && within(projection.pixel.y, camera.height)
 }
