@@ -7,7 +7,7 @@
 //! --set train.steps=500
 //! --set train.views=all
 //! --set data.scene_radius=none
-//! --set 'train.adam={ beta_1 = 0.9, beta_2 = 0.99, epsilon = 1e-8 }'
+//! --set 'train.adam={ beta1 = 0.9, beta2 = 0.99 }'
 //! ```
 
 use crate::config::Config;
