@@ -1,1 +1,23 @@
-//! neat-tensor
+//! Devices, coordinate networks with input gradients, and checkpoints, on burn.
+//!
+//! A backend is a run-time [`burn::tensor::Device`]; nothing here is generic
+//! over backends. What the networks need beyond plain layers — the positional
+//! encoding's Jacobian, softplus with its derivative, a multilayer perceptron
+//! that also returns the gradient of its output with respect to its input — is
+//! written in plain tensor operations, so that first-order reverse mode
+//! differentiates the input gradient once more.
+
+pub mod adam;
+pub mod backend;
+pub mod checkpoint;
+pub mod coordinate_mlp;
+pub mod encoding;
+pub mod linear;
+pub mod parameters;
+pub mod random;
+pub mod softplus;
+
+pub use backend::{Backend, BackendError};
+pub use coordinate_mlp::{CoordinateMlp, Evaluation, GradientRows};
+pub use encoding::PositionalEncoding;
+pub use linear::{Linear, ReluMlp};

@@ -1,0 +1,102 @@
+//! The attraction network: a 3D segment for every point (paper eq. 2).
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+use neat_tensor::{PositionalEncoding, ReluMlp};
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+/// Size and inputs of the attraction network.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AttractionNetworkConfig {
+    /// Number of hidden layers.
+    pub hidden_layers: usize,
+    /// Width of the hidden layers.
+    pub width: usize,
+    /// Frequencies of the encoding of the point; 0 gives the raw point, as
+    /// published.
+    pub octaves: usize,
+    /// Whether the raw viewing direction is an input (paper table 2).
+    pub view_direction: bool,
+    /// Whether the layers are weight-normalised.
+    pub weight_norm: bool,
+    /// Factor on the initial weights of the last layer.
+    pub initial_scale: f64,
+}
+
+impl Default for AttractionNetworkConfig {
+    /// As published: 4 × 256, raw point and raw viewing direction.
+    fn default() -> Self {
+        Self {
+            hidden_layers: 4,
+            width: 256,
+            octaves: 0,
+            view_direction: true,
+            weight_norm: true,
+            initial_scale: 1.0,
+        }
+    }
+}
+
+/// Point, viewing direction, gradient and features → both ends of a segment.
+#[derive(Module, Debug)]
+pub struct AttractionNetwork {
+    /// The perceptron; its outputs are offsets from the point.
+    pub mlp: ReluMlp,
+    /// Frequencies of the encoding of the point.
+    #[module(skip)]
+    pub octaves: usize,
+    /// Whether the viewing direction is an input.
+    #[module(skip)]
+    pub view_direction: bool,
+}
+
+impl AttractionNetworkConfig {
+    /// A network for `features` wide features.
+    pub fn init(&self, features: usize, rng: &mut impl Rng, device: &Device) -> AttractionNetwork {
+        let encoding = PositionalEncoding {
+            octaves: self.octaves,
+        };
+        let view = if self.view_direction { 3 } else { 0 };
+        let mut widths = vec![encoding.output_width(3) + view + 3 + features];
+        widths.extend(vec![self.width; self.hidden_layers]);
+        widths.push(6);
+        let mut mlp = ReluMlp::new(&widths, self.weight_norm, rng, device);
+        if self.initial_scale != 1.0
+            && let Some(last) = mlp.layers.pop()
+        {
+            mlp.layers.push(last.scaled(self.initial_scale));
+        }
+        AttractionNetwork {
+            mlp,
+            octaves: self.octaves,
+            view_direction: self.view_direction,
+        }
+    }
+}
+
+impl AttractionNetwork {
+    /// `points`, `view_directions` (unit), `gradients` (raw, of the distance)
+    /// `[N, 3]` and `features` `[N, F]` → absolute ends `[N, 6]`: both ends'
+    /// coordinates one after the other.
+    pub fn forward(
+        &self,
+        points: Tensor<2>,
+        view_directions: Tensor<2>,
+        gradients: Tensor<2>,
+        features: Tensor<2>,
+    ) -> Tensor<2> {
+        let encoded = PositionalEncoding {
+            octaves: self.octaves,
+        }
+        .encode(points.clone());
+        let mut inputs = vec![encoded];
+        if self.view_direction {
+            inputs.push(view_directions);
+        }
+        inputs.extend([gradients, features]);
+        let offsets = self.mlp.forward(Tensor::cat(inputs, 1));
+        offsets + Tensor::cat(vec![points.clone(), points], 1)
+    }
+}

@@ -1,0 +1,58 @@
+//! What rendered segments look like in the image, and where they touch the
+//! surface.
+
+use burn::tensor::Tensor;
+
+/// Cameras of a batch of rays, one per ray.
+#[derive(Clone, Debug)]
+pub struct RayCameras {
+    /// Rotations from the world to the camera, `[R, 9]`, row-major.
+    pub camera_from_world: Tensor<2>,
+    /// Centres of projection in the world, `[R, 3]`.
+    pub center: Tensor<2>,
+    /// `fx, fy, skew` of the intrinsics, `[R, 3]`.
+    pub focal: Tensor<2>,
+}
+
+/// Depths nearer to zero than this are moved to it before dividing.
+const MIN_DEPTH: f64 = 1e-8;
+
+/// Ends `[R, 6]` in the world → calibrated coordinates `[R, 4]` (x, y of both
+/// ends on z = 1).
+pub fn project_calibrated(ends: Tensor<2>, cameras: &RayCameras) -> Tensor<2> {
+    let first = project_point(ends.clone().narrow(1, 0, 3), cameras);
+    let second = project_point(ends.narrow(1, 3, 3), cameras);
+    Tensor::cat(vec![first, second], 1)
+}
+
+fn project_point(point: Tensor<2>, cameras: &RayCameras) -> Tensor<2> {
+    let relative = point - cameras.center.clone();
+    let coordinate = |row: usize| {
+        (cameras.camera_from_world.clone().narrow(1, 3 * row, 3) * relative.clone()).sum_dim(1)
+    };
+    let z = coordinate(2);
+    // Pushed off zero on its own side, as the published projection does.
+    let too_near = z.clone().abs().lower_elem(MIN_DEPTH);
+    let side = z.clone().greater_equal_elem(0.0).float().mul_scalar(2.0) - 1.0;
+    let guarded = z.clone() + side.mul_scalar(MIN_DEPTH);
+    let z = z.mask_where(too_near, guarded);
+    Tensor::cat(vec![coordinate(0), coordinate(1)], 1) / z
+}
+
+/// Differences of calibrated coordinates `[R, 4]` → differences in pixels.
+pub fn calibrated_difference_in_pixels(difference: Tensor<2>, cameras: &RayCameras) -> Tensor<2> {
+    let column = |t: &Tensor<2>, i: usize| t.clone().narrow(1, i, 1);
+    let (fx, fy, skew) = (
+        column(&cameras.focal, 0),
+        column(&cameras.focal, 1),
+        column(&cameras.focal, 2),
+    );
+    let end = |i: usize| {
+        let (dx, dy) = (column(&difference, i), column(&difference, i + 1));
+        vec![
+            fx.clone() * dx + skew.clone() * dy.clone(),
+            fy.clone() * dy,
+        ]
+    };
+    Tensor::cat([end(0), end(2)].concat(), 1)
+}

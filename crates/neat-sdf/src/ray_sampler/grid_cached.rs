@@ -1,0 +1,229 @@
+//! Importance sampling of a cached grid of distances.
+//!
+//! A coarse copy of the distance field on the host replaces the many network
+//! evaluations of the error-bounded sampler: a share of its nodes is refreshed
+//! every few iterations.
+
+use super::inverse_cdf::inverse_cdf;
+use super::{DistanceQuery, RayBundle, RaySamples, SamplingNoise};
+use crate::density::laplace_density_scalar;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Numbers of the grid-cached sampler.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GridCachedConfig {
+    /// Nodes of the grid along each axis.
+    pub resolution: usize,
+    /// Nodes are refreshed every so many iterations …
+    pub refresh_interval: u64,
+    /// … one in so many of them, in turn.
+    pub refresh_stride: usize,
+    /// Look-ups in the grid per ray.
+    pub lookups: usize,
+    /// Samples drawn from the grid's rendering weights.
+    pub importance_samples: usize,
+    /// Samples spread evenly over the ray.
+    pub uniform_samples: usize,
+    /// Added to every look-up's weight.
+    pub weight_floor: f64,
+}
+
+impl Default for GridCachedConfig {
+    fn default() -> Self {
+        Self {
+            resolution: 48,
+            refresh_interval: 8,
+            refresh_stride: 8,
+            lookups: 64,
+            importance_samples: 8,
+            uniform_samples: 4,
+            weight_floor: 1e-4,
+        }
+    }
+}
+
+/// Signed distances at the centres of the cells of a cube around the origin.
+#[derive(Clone, Debug)]
+pub struct DistanceGrid {
+    resolution: usize,
+    radius: f32,
+    /// `[x][y][z]`, row-major.
+    values: Vec<f32>,
+}
+
+impl DistanceGrid {
+    /// The distances to a sphere of `sphere_radius`, over the cube that encloses
+    /// the ball of `radius`.
+    pub fn sphere(resolution: usize, radius: f32, sphere_radius: f32) -> Self {
+        let mut grid = Self {
+            resolution,
+            radius,
+            values: Vec::new(),
+        };
+        grid.values = (0..resolution.pow(3))
+            .map(|i| {
+                let [x, y, z] = grid.node(i);
+                (x * x + y * y + z * z).sqrt() - sphere_radius
+            })
+            .collect();
+        grid
+    }
+
+    /// Edge length of a cell.
+    pub fn cell(&self) -> f32 {
+        2.0 * self.radius / self.resolution as f32
+    }
+
+    /// Radius of the ball that the grid encloses.
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    /// Position of node `index`.
+    fn node(&self, index: usize) -> [f32; 3] {
+        let n = self.resolution;
+        let coordinate = |i: usize| ((i as f32 + 0.5) / n as f32 * 2.0 - 1.0) * self.radius;
+        [
+            coordinate(index / (n * n)),
+            coordinate(index / n % n),
+            coordinate(index % n),
+        ]
+    }
+
+    /// Evaluates the nodes `offset`, `offset + stride`, ….
+    pub fn update_interleaved(
+        &mut self,
+        offset: usize,
+        stride: usize,
+        query: &mut impl DistanceQuery,
+    ) {
+        let nodes: Vec<usize> = (offset..self.values.len()).step_by(stride).collect();
+        for nodes in nodes.chunks(QUERY_CHUNK) {
+            let points: Vec<[f32; 3]> = nodes.iter().map(|i| self.node(*i)).collect();
+            for (node, value) in nodes.iter().zip(query.distances(&points)) {
+                self.values[*node] = value;
+            }
+        }
+    }
+
+    /// Trilinear interpolation; beyond the outer nodes their value holds.
+    pub fn lookup(&self, point: [f32; 3]) -> f32 {
+        let n = self.resolution;
+        let scale = n as f32 / (2.0 * self.radius);
+        let mut base = [0usize; 3];
+        let mut fraction = [0f32; 3];
+        for axis in 0..3 {
+            let x = ((point[axis] + self.radius) * scale - 0.5).clamp(0.0, (n - 1) as f32);
+            base[axis] = (x as usize).min(n.saturating_sub(2));
+            fraction[axis] = x - base[axis] as f32;
+        }
+        let at = |dx: usize, dy: usize, dz: usize| {
+            let index = |axis: usize, d: usize| (base[axis] + d).min(n - 1);
+            self.values[(index(0, dx) * n + index(1, dy)) * n + index(2, dz)]
+        };
+        let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
+        let [fx, fy, fz] = fraction;
+        let along_z = |dx, dy| mix(at(dx, dy, 0), at(dx, dy, 1), fz);
+        let along_y = |dx| mix(along_z(dx, 0), along_z(dx, 1), fy);
+        mix(along_y(0), along_y(1), fx)
+    }
+}
+
+/// Points per query while a grid is refreshed: bounds the memory of the network.
+const QUERY_CHUNK: usize = 16_384;
+
+/// Rays that miss the ball are treated as if they grazed it.
+const MIN_HALF_CHORD_SQUARED: f32 = 1e-4;
+/// Sampling starts at least this far from the camera.
+const MIN_NEAR: f32 = 0.01;
+
+impl GridCachedConfig {
+    /// Refreshes the share of the grid that is due at `iteration`; everything at
+    /// the first.
+    pub(super) fn refresh(
+        &self,
+        grid: &mut DistanceGrid,
+        iteration: u64,
+        query: &mut impl DistanceQuery,
+    ) {
+        if iteration == 0 {
+            grid.update_interleaved(0, 1, query);
+        } else if iteration.is_multiple_of(self.refresh_interval) {
+            let turn = (iteration / self.refresh_interval) as usize % self.refresh_stride;
+            grid.update_interleaved(turn, self.refresh_stride, query);
+        }
+    }
+
+    pub(super) fn sample(
+        &self,
+        rays: &RayBundle,
+        beta: f32,
+        grid: &DistanceGrid,
+        noise: &mut impl SamplingNoise,
+    ) -> RaySamples {
+        let (lookups, drawn, even) = (
+            self.lookups,
+            self.importance_samples,
+            self.uniform_samples,
+        );
+        let per_ray = drawn + even;
+        let stratum = lookups + drawn + even;
+        let noise = noise.uniform(rays.len() * stratum);
+        // A density sharper than the grid resolves would miss the surface.
+        let beta = beta.max(0.5 * grid.cell());
+        let mut far = vec![0.0f32; rays.len()];
+        let mut z = vec![0.0f32; rays.len() * per_ray];
+        z.par_chunks_mut(per_ray)
+            .zip(far.par_iter_mut())
+            .enumerate()
+            .for_each(|(ray, (z, far))| {
+                let jitter = |i: usize| noise.as_ref().map_or(0.5, |u| u[ray * stratum + i]);
+                let (near, end) = chord(rays, ray, grid.radius);
+                *far = end;
+                let at = |t: f32| near + (end - near) * t;
+                let mut edges: Vec<f32> = (0..lookups)
+                    .map(|i| at((i as f32 + jitter(i)) / lookups as f32))
+                    .collect();
+                edges.push(end);
+                let mut passed = 0.0f32;
+                let masses: Vec<f32> = edges
+                    .windows(2)
+                    .map(|e| {
+                        let sdf = grid.lookup(rays.point(ray, e[0]));
+                        let here = (e[1] - e[0]).max(0.0) * laplace_density_scalar(sdf, beta);
+                        let weight = (-passed).exp() * (1.0 - (-here).exp());
+                        passed += here;
+                        weight + self.weight_floor as f32
+                    })
+                    .collect();
+                let mut positions = Vec::with_capacity(per_ray);
+                inverse_cdf(
+                    &edges,
+                    masses.iter().copied(),
+                    1e-8,
+                    (0..drawn).map(|i| (i as f32 + jitter(lookups + i)) / drawn as f32),
+                    &mut positions,
+                    &mut Vec::with_capacity(lookups + 1),
+                );
+                positions.extend(
+                    (0..even).map(|i| at((i as f32 + jitter(lookups + drawn + i)) / even as f32)),
+                );
+                positions.sort_unstable_by(f32::total_cmp);
+                z.copy_from_slice(&positions);
+            });
+        RaySamples::new(z, per_ray, |ray, last| (far[ray] - last).max(0.0))
+    }
+}
+
+/// Where a ray enters and leaves the ball of `radius` around the origin.
+fn chord(rays: &RayBundle, ray: usize, radius: f32) -> (f32, f32) {
+    let (o, d) = (rays.origins[ray], rays.directions[ray]);
+    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let b = dot(o, d);
+    let half = (b * b - dot(o, o) + radius * radius)
+        .max(MIN_HALF_CHORD_SQUARED)
+        .sqrt();
+    ((-b - half).max(MIN_NEAR), -b + half)
+}

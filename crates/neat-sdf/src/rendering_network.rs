@@ -1,0 +1,78 @@
+//! The radiance network (VolSDF's, in the "idr" mode of IDR).
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor, activation};
+use neat_tensor::{PositionalEncoding, ReluMlp};
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+/// Size of the radiance network.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RenderingNetworkConfig {
+    /// Number of hidden layers.
+    pub hidden_layers: usize,
+    /// Width of the hidden layers.
+    pub width: usize,
+    /// Frequencies of the encoding of the viewing direction.
+    pub view_octaves: usize,
+    /// Whether the layers are weight-normalised.
+    pub weight_norm: bool,
+}
+
+impl Default for RenderingNetworkConfig {
+    /// As published: 4 × 256, 4 octaves.
+    fn default() -> Self {
+        Self {
+            hidden_layers: 4,
+            width: 256,
+            view_octaves: 4,
+            weight_norm: true,
+        }
+    }
+}
+
+/// Point, viewing direction, normal and features → colour in (0, 1).
+#[derive(Module, Debug)]
+pub struct RenderingNetwork {
+    /// The perceptron.
+    pub mlp: ReluMlp,
+    /// Frequencies of the encoding of the viewing direction.
+    #[module(skip)]
+    pub view_octaves: usize,
+}
+
+impl RenderingNetworkConfig {
+    /// A network for `features` wide features.
+    pub fn init(&self, features: usize, rng: &mut impl Rng, device: &Device) -> RenderingNetwork {
+        let view = PositionalEncoding {
+            octaves: self.view_octaves,
+        };
+        let mut widths = vec![3 + view.output_width(3) + 3 + features];
+        widths.extend(vec![self.width; self.hidden_layers]);
+        widths.push(3);
+        RenderingNetwork {
+            mlp: ReluMlp::new(&widths, self.weight_norm, rng, device),
+            view_octaves: self.view_octaves,
+        }
+    }
+}
+
+impl RenderingNetwork {
+    /// `points`, `view_directions` (unit), `gradients` (raw, of the distance)
+    /// `[N, 3]` and `features` `[N, F]` → colours `[N, 3]`.
+    pub fn forward(
+        &self,
+        points: Tensor<2>,
+        view_directions: Tensor<2>,
+        gradients: Tensor<2>,
+        features: Tensor<2>,
+    ) -> Tensor<2> {
+        let view = PositionalEncoding {
+            octaves: self.view_octaves,
+        }
+        .encode(view_directions);
+        let input = Tensor::cat(vec![points, view, gradients, features], 1);
+        activation::sigmoid(self.mlp.forward(input))
+    }
+}

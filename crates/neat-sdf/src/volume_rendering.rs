@@ -1,0 +1,58 @@
+//! The rendering integral and its quadrature (paper eq. 1 and 4).
+
+use burn::tensor::{IndexingUpdateOp, Int, Tensor, TensorData};
+
+/// Weight of every sample: `w_i = (1 − exp(−δ_i σ_i)) · exp(−Σ_{j<i} δ_j σ_j)`.
+///
+/// `density` and `deltas` (lengths of the intervals that begin at the samples)
+/// are `[R, S]`.
+pub fn rendering_weights(density: Tensor<2>, deltas: Tensor<2>) -> Tensor<2> {
+    let free_energy = density * deltas;
+    let [_, samples] = free_energy.dims();
+    // The exclusive running sum as a product with a triangle of ones: parallel
+    // over samples on every backend, where a scan is serial or absent.
+    let triangle = strictly_upper_ones(samples, &free_energy);
+    let passed = free_energy.clone().matmul(triangle);
+    let transmittance = passed.neg().exp();
+    let opacity = free_energy.neg().exp().neg().add_scalar(1.0);
+    opacity * transmittance
+}
+
+fn strictly_upper_ones(n: usize, like: &Tensor<2>) -> Tensor<2> {
+    let ones: Vec<f32> = (0..n * n)
+        .map(|i| if i / n < i % n { 1.0 } else { 0.0 })
+        .collect();
+    let options = burn::tensor::TensorCreationOptions::new(like.device()).with_dtype(like.dtype());
+    Tensor::from_data(TensorData::new(ones, [n, n]), options)
+}
+
+/// `Σ_i w_i v_i` per ray: `weights` `[R, S]`, `values` `[R·S, C]` → `[R, C]`.
+pub fn integrate(weights: Tensor<2>, values: Tensor<2>) -> Tensor<2> {
+    let [rays, samples] = weights.dims();
+    let channels = values.dims()[1];
+    let weighted = values * weights.reshape([rays * samples, 1]);
+    weighted
+        .reshape([rays, samples, channels])
+        .sum_dim(1)
+        .reshape([rays, channels])
+}
+
+/// [`integrate`] over some of the samples only: `weights` `[M, 1]` and `values`
+/// `[M, C]` of samples that belong to the rays `ray_of_sample` `[M]` → `[R, C]`.
+pub fn integrate_selected(
+    weights: Tensor<2>,
+    values: Tensor<2>,
+    ray_of_sample: Tensor<1, Int>,
+    rays: usize,
+) -> Tensor<2> {
+    let channels = values.dims()[1];
+    let weighted = values * weights;
+    let options =
+        burn::tensor::TensorCreationOptions::new(weighted.device()).with_dtype(weighted.dtype());
+    Tensor::zeros([rays, channels], options).select_assign(
+        0,
+        ray_of_sample,
+        weighted,
+        IndexingUpdateOp::Add,
+    )
+}

@@ -1,0 +1,178 @@
+//! Affine layers, plain or with weight normalisation, and the ReLU perceptron.
+
+use crate::random::standard_normal;
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor, TensorData, activation};
+use rand::{Rng, RngExt};
+
+/// Initial weights of one layer, row-major `[out, in]`, before normalisation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearInit {
+    /// `[out, in]`, row-major.
+    pub weight: Vec<f32>,
+    /// `[out]`.
+    pub bias: Vec<f32>,
+}
+
+impl LinearInit {
+    /// Uniform in ±1/√in for weights and biases: PyTorch's default for a linear
+    /// layer, which the published radiance, attraction and junction networks keep.
+    pub fn uniform(inputs: usize, outputs: usize, rng: &mut impl Rng) -> Self {
+        let bound = 1.0 / (inputs as f64).sqrt();
+        let mut draw = |n| -> Vec<f32> {
+            (0..n)
+                .map(|_| ((rng.random::<f64>() * 2.0 - 1.0) * bound) as f32)
+                .collect()
+        };
+        Self {
+            weight: draw(inputs * outputs),
+            bias: draw(outputs),
+        }
+    }
+
+    /// Normal weights with the given deviation around `mean`, constant bias.
+    pub fn normal(
+        inputs: usize,
+        outputs: usize,
+        mean: f64,
+        deviation: f64,
+        bias: f32,
+        rng: &mut impl Rng,
+    ) -> Self {
+        Self {
+            weight: (0..inputs * outputs)
+                .map(|_| (mean + deviation * standard_normal(rng)) as f32)
+                .collect(),
+            bias: vec![bias; outputs],
+        }
+    }
+}
+
+/// `y = x Wᵀ + b`.
+///
+/// With weight normalisation (Salimans & Kingma 2016) `W = g v / ‖v‖` per output
+/// row; the parameters are `weight_v` and `weight_g`. Without it the parameter is
+/// `weight`.
+#[derive(Module, Debug)]
+pub struct Linear {
+    /// The plain weight `[out, in]`.
+    pub weight: Option<Param<Tensor<2>>>,
+    /// Direction `v` of the normalised weight, `[out, in]`.
+    pub weight_v: Option<Param<Tensor<2>>>,
+    /// Length `g` of each row of the normalised weight, `[out, 1]`.
+    pub weight_g: Option<Param<Tensor<2>>>,
+    /// `[out]`.
+    pub bias: Param<Tensor<1>>,
+}
+
+impl Linear {
+    /// A layer with the given initial values. Weight normalisation starts with
+    /// `g = ‖v‖`, so that the effective weight is the given one.
+    pub fn new(
+        init: &LinearInit,
+        inputs: usize,
+        outputs: usize,
+        weight_norm: bool,
+        device: &Device,
+    ) -> Self {
+        let matrix = |values: Vec<f32>, shape: [usize; 2]| {
+            Param::from_data(TensorData::new(values, shape), device)
+        };
+        let bias = Param::from_data(TensorData::new(init.bias.clone(), [outputs]), device);
+        let weight = matrix(init.weight.clone(), [outputs, inputs]);
+        if !weight_norm {
+            return Self {
+                weight: Some(weight),
+                weight_v: None,
+                weight_g: None,
+                bias,
+            };
+        }
+        let lengths = init
+            .weight
+            .chunks(inputs)
+            .map(|row| row.iter().map(|w| w * w).sum::<f32>().sqrt())
+            .collect();
+        Self {
+            weight: None,
+            weight_v: Some(weight),
+            weight_g: Some(matrix(lengths, [outputs, 1])),
+            bias,
+        }
+    }
+
+    /// The matrix `W` that multiplies the input, `[out, in]`.
+    pub fn effective_weight(&self) -> Tensor<2> {
+        match (&self.weight, &self.weight_v, &self.weight_g) {
+            (Some(weight), _, _) => weight.val(),
+            (None, Some(v), Some(g)) => {
+                let v = v.val();
+                let length = v.clone().square().sum_dim(1).sqrt();
+                v * (g.val() / length)
+            }
+            _ => unreachable!("Linear::new sets either `weight` or both of `weight_v`, `weight_g`"),
+        }
+    }
+
+    /// The layer with its weight (not its bias) multiplied by `factor`.
+    pub fn scaled(mut self, factor: f64) -> Self {
+        let scale = |param: Param<Tensor<2>>| {
+            param.map(|w| {
+                let tracked = w.is_require_grad();
+                w.detach().mul_scalar(factor).set_require_grad(tracked)
+            })
+        };
+        self.weight = self.weight.map(scale);
+        self.weight_g = self.weight_g.map(scale);
+        self
+    }
+
+    /// Number of outputs.
+    pub fn outputs(&self) -> usize {
+        self.bias.val().dims()[0]
+    }
+
+    /// `[N, in]` → `[N, out]`.
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        affine(x, self.effective_weight(), self.bias.val())
+    }
+}
+
+/// `x Wᵀ + b` with `W` `[out, in]`.
+pub(crate) fn affine(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<1>) -> Tensor<2> {
+    x.matmul(weight.transpose()) + bias.unsqueeze()
+}
+
+/// A perceptron with ReLU between its layers and a linear last layer.
+#[derive(Module, Debug)]
+pub struct ReluMlp {
+    /// The layers, first to last.
+    pub layers: Vec<Linear>,
+}
+
+impl ReluMlp {
+    /// `widths[0]` inputs, then each layer's outputs; PyTorch's default
+    /// initialisation.
+    pub fn new(widths: &[usize], weight_norm: bool, rng: &mut impl Rng, device: &Device) -> Self {
+        let layers = widths
+            .windows(2)
+            .map(|w| {
+                let init = LinearInit::uniform(w[0], w[1], rng);
+                Linear::new(&init, w[0], w[1], weight_norm, device)
+            })
+            .collect();
+        Self { layers }
+    }
+
+    /// `[N, in]` → `[N, out]`.
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        let (last, hidden) = self
+            .layers
+            .split_last()
+            .expect("ReluMlp: a perceptron has at least one layer");
+        let x = hidden
+            .iter()
+            .fold(x, |x, layer| activation::relu(layer.forward(x)));
+        last.forward(x)
+    }
+}

@@ -1,0 +1,141 @@
+//! Parameters of a module by name: reading, writing, counting.
+
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use burn::tensor::{DType, Tensor, TensorData};
+use std::collections::BTreeMap;
+
+/// Follows a module's fields down to its parameters and names them
+/// `field.field.parameter`.
+#[derive(Default)]
+pub(crate) struct PathStack(Vec<String>);
+
+impl PathStack {
+    pub(crate) fn enter(&mut self, name: &str) {
+        self.0.push(name.to_owned());
+    }
+
+    pub(crate) fn exit(&mut self) {
+        self.0.pop();
+    }
+
+    pub(crate) fn name(&self) -> String {
+        self.0.join(".")
+    }
+}
+
+struct Reader {
+    path: PathStack,
+    values: BTreeMap<String, TensorData>,
+}
+
+impl ModuleVisitor for Reader {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.enter(name);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.exit();
+    }
+
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        self.values.insert(self.path.name(), param.val().into_data());
+    }
+}
+
+/// All parameters of a module with their names, on the host.
+pub fn named_parameters<M: Module>(module: &M) -> BTreeMap<String, TensorData> {
+    let mut reader = Reader {
+        path: PathStack::default(),
+        values: BTreeMap::new(),
+    };
+    module.visit(&mut reader);
+    reader.values
+}
+
+/// Why parameters could not be put into a module.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+pub enum ParameterError {
+    /// The module has a parameter that was not given.
+    #[error("parameter `{0}` is missing")]
+    Missing(String),
+    /// A parameter was given that the module does not have.
+    #[error("parameter `{0}` does not belong to this model")]
+    Unexpected(String),
+    /// A parameter has another shape than the module's.
+    #[error("parameter `{name}` has shape {found:?}; this model needs {expected:?}")]
+    Shape {
+        /// Name of the parameter.
+        name: String,
+        /// Shape in the module.
+        expected: Vec<usize>,
+        /// Shape that was given.
+        found: Vec<usize>,
+    },
+}
+
+struct Writer {
+    path: PathStack,
+    values: BTreeMap<String, TensorData>,
+    dtype: Option<DType>,
+    error: Option<ParameterError>,
+}
+
+impl ModuleMapper for Writer {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.enter(name);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.exit();
+    }
+
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let name = self.path.name();
+        let Some(data) = self.values.remove(&name) else {
+            self.error.get_or_insert(ParameterError::Missing(name));
+            return param;
+        };
+        let expected = param.lazy_shape();
+        if *data.shape() != expected {
+            self.error.get_or_insert(ParameterError::Shape {
+                name,
+                expected: expected.to_vec(),
+                found: data.shape().to_vec(),
+            });
+            return param;
+        }
+        let dtype = self.dtype;
+        param.map(|old| {
+            let dtype = dtype.unwrap_or(old.dtype());
+            let options = burn::tensor::TensorCreationOptions::new(old.device()).with_dtype(dtype);
+            Tensor::from_data(data, options).set_require_grad(old.is_require_grad())
+        })
+    }
+}
+
+/// Replaces every parameter of `module` by the value of its name.
+///
+/// `dtype` converts all parameters to that type; without it they keep theirs.
+///
+/// # Errors
+/// If a name is missing, unknown, or has another shape.
+pub fn load_parameters<M: Module>(
+    module: M,
+    values: BTreeMap<String, TensorData>,
+    dtype: Option<DType>,
+) -> Result<M, ParameterError> {
+    let mut writer = Writer {
+        path: PathStack::default(),
+        values,
+        dtype,
+        error: None,
+    };
+    let module = module.map(&mut writer);
+    if let Some(error) = writer.error {
+        return Err(error);
+    }
+    match writer.values.into_keys().next() {
+        Some(name) => Err(ParameterError::Unexpected(name)),
+        None => Ok(module),
+    }
+}
