@@ -1,9 +1,11 @@
 //! Where the centre of a pixel lies in the coordinates of the intrinsics.
 
 use crate::Camera;
+use serde::{Deserialize, Serialize};
 
 /// Which image coordinates the centre of the first pixel has.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PixelCenter {
     /// Told by the principal point, where it is the middle of the image; else as
     /// in the published code.
