@@ -103,6 +103,7 @@ pub fn distill_run(
         config,
         manifest,
         scene,
+        device,
         field,
     } = opened;
     let mut session = Session {
@@ -110,6 +111,7 @@ pub fn distill_run(
         config,
         manifest,
         scene,
+        device,
         on_event,
     };
     // Distillation is repeated: only the last one's time counts.

@@ -20,6 +20,7 @@ pub(super) struct Session<'a> {
     pub config: Config,
     pub manifest: Manifest,
     pub scene: Scene,
+    pub device: Device,
     pub on_event: OnEvent<'a>,
 }
 
@@ -28,7 +29,9 @@ impl<'a> Session<'a> {
     /// `manifest.json`: bad input leaves no folder behind.
     pub fn start(options: &RunOptions, on_event: OnEvent<'a>) -> Result<Self, PipelineError> {
         RunDir::check(&options.out, options.existing)?;
-        let device = options.backend.device()?;
+        // Once: looking for GPUs takes a while.
+        let backend = options.backend.resolve();
+        let device = backend.device()?;
         let earlier = match options.existing {
             Existing::Resume => Some(RunDir::open(&options.out)?.manifest()?),
             Existing::Refuse | Existing::Overwrite => None,
@@ -56,7 +59,7 @@ impl<'a> Session<'a> {
             target: env!("NEAT_TARGET").to_owned(),
             command_line: options.command_line.clone(),
             preset: options.preset.clone(),
-            backend: options.backend.resolve().to_string(),
+            backend: backend.to_string(),
             device: device_name(&device),
             threads: rayon::current_num_threads(),
             seed: options.seed,
@@ -76,6 +79,7 @@ impl<'a> Session<'a> {
             config: options.config.clone(),
             manifest,
             scene: loaded.scene,
+            device,
             on_event,
         };
         session.add_seconds(Stage::Load, seconds);
@@ -146,6 +150,8 @@ pub struct OpenedRun {
     pub manifest: Manifest,
     /// Its scene.
     pub scene: Scene,
+    /// What computes.
+    pub device: Device,
     /// The field of its last checkpoint.
     pub field: TrainedField,
 }
@@ -194,6 +200,7 @@ fn read_run(
         config,
         manifest,
         scene: loaded.scene,
+        device,
         field,
     })
 }
@@ -238,11 +245,15 @@ fn absolute(path: &Path) -> Result<PathBuf, SceneError> {
     })
 }
 
-/// The adapter of a GPU, or the name of a CPU device.
+/// The name of a GPU; only those have one.
+#[cfg(feature = "wgpu")]
 fn device_name(device: &Device) -> String {
-    #[cfg(feature = "wgpu")]
-    if let Some(identity) = device.identity() {
-        return identity.name;
-    }
-    format!("{device:?}")
+    let identity = device.identity();
+    identity.map_or_else(|| "CPU".to_owned(), |identity| identity.name)
+}
+
+/// Without GPU backends everything is computed by the CPU.
+#[cfg(not(feature = "wgpu"))]
+fn device_name(_: &Device) -> String {
+    "CPU".to_owned()
 }

@@ -86,14 +86,14 @@ impl Session<'_> {
 
     /// A new trainer, or one that continues from the last checkpoint.
     fn trainer(&self, options: &RunOptions) -> Result<Trainer, PipelineError> {
-        let device = options.backend.device()?;
-        let (scene, config, seed) = (&self.scene, &self.config, options.seed);
+        let (scene, config, device) = (&self.scene, &self.config, &self.device);
+        let seed = options.seed;
         Ok(match options.existing {
             Existing::Resume => {
                 let checkpoint = self.dir.read_latest_checkpoint()?;
-                Trainer::resume(scene, config, seed, &device, checkpoint)?
+                Trainer::resume(scene, config, seed, device, checkpoint)?
             }
-            Existing::Refuse | Existing::Overwrite => Trainer::new(scene, config, seed, &device)?,
+            Existing::Refuse | Existing::Overwrite => Trainer::new(scene, config, seed, device)?,
         })
     }
 
