@@ -7,7 +7,8 @@ use neat_field::AttractionNetworkConfig;
 use neat_gjp::{CandidateConfig, MatchingConfig, PerceiverConfig};
 use neat_sdf::{DensityConfig, ImplicitNetworkConfig, RaySamplerConfig, RenderingNetworkConfig};
 use neat_tensor::adam::AdamConfig;
-use neat_wireframe::{FastBackEndConfig, PaperBackEndConfig};
+use neat_wireframe::fast_back_end::FastBackEndConfig;
+use neat_wireframe::paper_back_end::PaperBackEndConfig;
 use serde::{Deserialize, Serialize};
 
 /// All choices of a run.
@@ -78,6 +79,9 @@ pub struct TrainConfig {
     pub background_share: f64,
     /// Which views the rays of one iteration come from.
     pub views: BatchViews,
+    /// Whether a pixel may be drawn twice in a batch from one view (published:
+    /// yes for ABC, no for DTU and BlendedMVS).
+    pub with_replacement: bool,
     /// Where samples lie along a ray.
     pub sampler: RaySamplerConfig,
     /// Radiance, attraction and gradients are evaluated only at samples whose
@@ -89,6 +93,8 @@ pub struct TrainConfig {
     pub loss: LossConfig,
     /// How rendered end points become targets of the global junctions.
     pub candidates: CandidateConfig,
+    /// Only rays that count in the segment term suggest junctions.
+    pub only_counted_ends: bool,
     /// How targets and global junctions are paired.
     pub matching: MatchingConfig,
     /// The junction losses are taken in every so many iterations.

@@ -66,7 +66,14 @@ impl PipelineError {
             | Self::SceneDirNotEmpty(_)
             | Self::Synthetic(_)
             | Self::Metrics(_) => true,
-            Self::Train(_) | Self::Distill(_) | Self::Export(_) | Self::Interrupted { .. } => false,
+            Self::Train(error) => matches!(
+                error,
+                TrainError::Config(_)
+                    | TrainError::NoRegionPixel(_)
+                    | TrainError::Parameters(_)
+                    | TrainError::Checkpoint(_)
+            ),
+            Self::Distill(_) | Self::Export(_) | Self::Interrupted { .. } => false,
         }
     }
 }

@@ -61,24 +61,12 @@ fn image_of(width: u32, height: u32, color: impl Fn(usize) -> [f32; 3]) -> RgbIm
     })
 }
 
-/// The photograph reduced by a whole factor: every pixel is the mean of a square
-/// of them. What is left over at the right and lower border is cut off.
-pub fn downscaled(photo: &RgbImage, factor: u32) -> RgbImage {
-    let factor = factor.max(1);
-    let pixels = u64::from(factor) * u64::from(factor);
-    RgbImage::from_fn(photo.width() / factor, photo.height() / factor, |x, y| {
-        let mut sum = [0_u64; 3];
-        for v in 0..factor {
-            for u in 0..factor {
-                let pixel = photo.get_pixel(x * factor + u, y * factor + v);
-                for (sum, value) in sum.iter_mut().zip(pixel.0) {
-                    *sum += u64::from(value);
-                }
-            }
-        }
-        // A mean of bytes is a byte.
-        Rgb(sum.map(|sum| ((sum + pixels / 2) / pixels) as u8))
-    })
+/// Every `step`-th pixel of a photograph along both axes, beginning with the
+/// first one: those that [`crate::render::render_view`] renders.
+pub fn every_nth_pixel(photo: &RgbImage, step: u32) -> RgbImage {
+    let step = step.max(1);
+    let (width, height) = (photo.width().div_ceil(step), photo.height().div_ceil(step));
+    RgbImage::from_fn(width, height, |x, y| *photo.get_pixel(x * step, y * step))
 }
 
 /// Peak signal-to-noise ratio of colours from 0 to 1 against a photograph, in
@@ -113,12 +101,13 @@ mod tests {
     }
 
     #[test]
-    fn reduced_photographs_are_means() {
-        let photo = RgbImage::from_fn(5, 4, |x, y| Rgb([(10 * x) as u8, (10 * y) as u8, 7]));
-        let half = downscaled(&photo, 2);
-        assert_eq!(half.dimensions(), (2, 2));
-        assert_eq!(half.get_pixel(1, 1).0, [25, 25, 7]);
-        assert_eq!(downscaled(&photo, 1), photo);
+    fn every_nth_pixel_begins_with_the_first() {
+        let photo = RgbImage::from_fn(5, 4, |x, y| Rgb([x as u8, y as u8, 7]));
+        let third = every_nth_pixel(&photo, 3);
+        assert_eq!(third.dimensions(), (2, 2));
+        assert_eq!(third.get_pixel(0, 0).0, [0, 0, 7]);
+        assert_eq!(third.get_pixel(1, 1).0, [3, 3, 7]);
+        assert_eq!(every_nth_pixel(&photo, 1), photo);
     }
 
     #[test]

@@ -1,1 +1,23 @@
-//! neat-pipeline
+//! From a scene to its wireframe: training, distillation, run folders.
+//!
+//! Everything here reports through events and results; nothing draws.
+
+pub mod compare_backends;
+pub mod config;
+pub mod demo;
+pub mod distill;
+pub mod error;
+pub mod event;
+pub mod field;
+pub mod image_io;
+pub mod losses;
+pub mod manifest;
+pub mod model;
+pub mod overlay;
+pub mod overrides;
+pub mod preset;
+pub mod reconstruct;
+pub mod render;
+pub mod run_dir;
+pub mod trainer;
+pub mod training_data;

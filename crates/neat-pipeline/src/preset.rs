@@ -157,7 +157,7 @@ mod tests {
     fn the_fast_preset_leaves_out_what_the_published_code_has() {
         let config = Preset::Fast.config();
         assert_eq!(config.data.scene_radius, None);
-        assert_eq!(config.model.implicit.skip_layer, None);
-        assert_eq!(config.model.implicit.bounding_sphere_slope, None);
+        assert_eq!(config.model.implicit.skip_layer, 0);
+        assert_eq!(config.model.implicit.bounding_sphere_slope, 0.0);
     }
 }

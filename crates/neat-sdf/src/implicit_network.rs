@@ -1,9 +1,9 @@
 //! The signed distance network (VolSDF; paper Appendix C.1).
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Int, Tensor};
 use neat_tensor::linear::{Linear, LinearInit};
-use neat_tensor::{CoordinateMlp, Evaluation, GradientRows, PositionalEncoding};
+use neat_tensor::{CoordinateMlp, PositionalEncoding, Recorded};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -23,9 +23,8 @@ pub struct ImplicitNetworkConfig {
     /// Frequencies of the positional encoding of the point.
     pub octaves: usize,
     /// Layer whose input is `[h, encoding] / √2`; the layer before it is
-    /// narrower by the width of the encoding.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub skip_layer: Option<usize>,
+    /// narrower by the width of the encoding. 0 skips nothing.
+    pub skip_layer: usize,
     /// Whether the layers are weight-normalised.
     pub weight_norm: bool,
     /// Radius of the sphere that the initial network approximates, as a share of
@@ -35,9 +34,8 @@ pub struct ImplicitNetworkConfig {
     /// code does; otherwise they start random.
     pub features_start_as_distance: bool,
     /// Slope of the bounding sphere that caps the distance:
-    /// `min(sdf, slope (R − |x|))`. `None` models no background.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub bounding_sphere_slope: Option<f64>,
+    /// `min(sdf, slope (R − |x|))`. 0 models no background.
+    pub bounding_sphere_slope: f64,
 }
 
 impl Default for ImplicitNetworkConfig {
@@ -48,11 +46,11 @@ impl Default for ImplicitNetworkConfig {
             width: 256,
             features: 256,
             octaves: 6,
-            skip_layer: Some(4),
+            skip_layer: 4,
             weight_norm: true,
             initial_sphere: 0.2,
             features_start_as_distance: true,
-            bounding_sphere_slope: Some(20.0),
+            bounding_sphere_slope: 20.0,
         }
     }
 }
@@ -64,8 +62,8 @@ pub struct ImplicitOutput {
     pub sdf: Tensor<2>,
     /// Features `[N, F]`, never capped.
     pub features: Tensor<2>,
-    /// Raw gradient of the distance `[M, 3]` at the rows asked for.
-    pub gradient: Option<Tensor<2>>,
+    /// Raw gradient of the distance `[N, 3]`.
+    pub gradient: Tensor<2>,
 }
 
 /// Points → signed distance and features.
@@ -100,7 +98,7 @@ impl ImplicitNetworkConfig {
             let inputs = if l == 0 { encoded } else { self.width };
             let outputs = match l {
                 _ if l == last => 1 + self.features,
-                _ if self.skip_layer == Some(l + 1) => self
+                _ if self.skip_layer == l + 1 => self
                     .width
                     .checked_sub(encoded)
                     .filter(|w| *w > 0)
@@ -114,7 +112,7 @@ impl ImplicitNetworkConfig {
                 let mut init = LinearInit::normal(inputs, outputs, 0.0, deviation, 0.0, rng);
                 // The encoded columns start at zero: only x, y, z speak.
                 let silent = encoded - 3;
-                if l == 0 || self.skip_layer == Some(l) {
+                if l == 0 || self.skip_layer == l {
                     for row in init.weight.chunks_mut(inputs) {
                         row[inputs - silent..].fill(0.0);
                     }
@@ -133,10 +131,10 @@ impl ImplicitNetworkConfig {
             mlp: CoordinateMlp {
                 layers,
                 octaves: self.octaves,
-                skip: self.skip_layer,
+                skip: Some(self.skip_layer).filter(|l| *l > 0),
                 sharpness: SOFTPLUS_SHARPNESS,
             },
-            bounding_sphere_slope: self.bounding_sphere_slope,
+            bounding_sphere_slope: Some(self.bounding_sphere_slope).filter(|s| *s > 0.0),
             scene_radius,
         }
     }
@@ -170,54 +168,105 @@ impl ImplicitNetworkConfig {
     }
 }
 
-impl ImplicitNetwork {
-    /// Distance capped by the bounding sphere, features, and the gradient of the
-    /// capped distance at `rows`. This is what is rendered.
-    pub fn evaluate(&self, points: Tensor<2>, rows: GradientRows) -> ImplicitOutput {
-        let raw = self.evaluate_uncapped(points.clone(), rows.clone());
-        let Some(slope) = self.bounding_sphere_slope else {
-            return raw;
-        };
-        // [N, 1]
-        let distance = points.clone().square().sum_dim(1).sqrt();
-        let cap = distance
-            .clone()
-            .neg()
-            .add_scalar(self.scene_radius)
-            .mul_scalar(slope);
-        let capped = raw.sdf.clone().greater(cap.clone());
-        let gradient = raw.gradient.map(|gradient| {
-            let of_cap = points.div(distance).mul_scalar(-slope);
-            let (of_cap, capped) = match rows {
-                GradientRows::Selected(rows) => (
-                    of_cap.select(0, rows.clone()),
-                    capped.clone().select(0, rows),
-                ),
-                _ => (of_cap, capped.clone()),
-            };
-            let shape = gradient.dims();
-            gradient.mask_where(capped.expand(shape), of_cap)
-        });
-        ImplicitOutput {
-            sdf: raw.sdf.mask_where(capped, cap),
-            features: raw.features,
-            gradient,
-        }
+/// A forward pass, to be asked for gradients at some of its rows.
+#[derive(Clone, Debug)]
+pub struct RecordedDistances {
+    pass: Recorded,
+    /// Capped distance `[N, 1]`.
+    sdf: Tensor<2>,
+}
+
+impl RecordedDistances {
+    /// Capped distance `[N, 1]`.
+    pub fn sdf(&self) -> Tensor<2> {
+        self.sdf.clone()
     }
 
-    /// The same without the bounding sphere: what the eikonal term looks at.
-    pub fn evaluate_uncapped(&self, points: Tensor<2>, rows: GradientRows) -> ImplicitOutput {
-        let Evaluation { outputs, gradient } = self.mlp.evaluate(points, rows);
-        let features = outputs.dims()[1] - 1;
+    /// Distance, features and gradient at `rows` `[M]`; `network` made the pass.
+    pub fn at_rows(&self, network: &ImplicitNetwork, rows: Tensor<1, Int>) -> ImplicitOutput {
+        network.with_gradient(self.pass.select(rows))
+    }
+}
+
+impl ImplicitNetwork {
+    /// Distance capped by the bounding sphere, features, and the gradient of the
+    /// capped distance, at every point. This is what is rendered.
+    pub fn evaluate(&self, points: Tensor<2>) -> ImplicitOutput {
+        self.with_gradient(self.mlp.record(points))
+    }
+
+    /// The same forward pass, leaving open at which rows the gradient is wanted.
+    pub fn record(&self, points: Tensor<2>) -> RecordedDistances {
+        let pass = self.mlp.record(points);
+        let raw = pass.outputs.clone().narrow(1, 0, 1);
+        let sdf = match self.cap(&pass.points) {
+            None => raw,
+            Some(Cap { value, .. }) => {
+                let capped = raw.clone().greater(value.clone());
+                raw.mask_where(capped, value)
+            }
+        };
+        RecordedDistances { pass, sdf }
+    }
+
+    /// Distance, features and gradient without the bounding sphere: what the
+    /// eikonal term looks at.
+    pub fn evaluate_uncapped(&self, points: Tensor<2>) -> ImplicitOutput {
+        let pass = self.mlp.record(points);
         ImplicitOutput {
-            sdf: outputs.clone().narrow(1, 0, 1),
-            features: outputs.narrow(1, 1, features),
-            gradient,
+            gradient: pass.gradient(&self.mlp),
+            sdf: pass.outputs.clone().narrow(1, 0, 1),
+            features: features(pass.outputs),
         }
     }
 
     /// The capped distance alone, `[N, 1]`.
     pub fn sdf(&self, points: Tensor<2>) -> Tensor<2> {
-        self.evaluate(points, GradientRows::None).sdf
+        self.record(points).sdf
     }
+
+    fn with_gradient(&self, pass: Recorded) -> ImplicitOutput {
+        let gradient = pass.gradient(&self.mlp);
+        let raw = pass.outputs.clone().narrow(1, 0, 1);
+        let features = features(pass.outputs);
+        let Some(cap) = self.cap(&pass.points) else {
+            return ImplicitOutput {
+                sdf: raw,
+                features,
+                gradient,
+            };
+        };
+        let capped = raw.clone().greater(cap.value.clone());
+        let shape = gradient.dims();
+        ImplicitOutput {
+            sdf: raw.mask_where(capped.clone(), cap.value),
+            features,
+            gradient: gradient.mask_where(capped.expand(shape), cap.gradient),
+        }
+    }
+
+    fn cap(&self, points: &Tensor<2>) -> Option<Cap> {
+        let slope = self.bounding_sphere_slope?;
+        let distance = points.clone().square().sum_dim(1).sqrt();
+        Some(Cap {
+            value: distance
+                .clone()
+                .neg()
+                .add_scalar(self.scene_radius)
+                .mul_scalar(slope),
+            gradient: points.clone().div(distance).mul_scalar(-slope),
+        })
+    }
+}
+
+/// The bounding sphere's distance `[N, 1]` and its gradient `[N, 3]`.
+struct Cap {
+    value: Tensor<2>,
+    gradient: Tensor<2>,
+}
+
+/// Everything but the distance.
+fn features(outputs: Tensor<2>) -> Tensor<2> {
+    let width = outputs.dims()[1] - 1;
+    outputs.narrow(1, 1, width)
 }

@@ -13,26 +13,6 @@ use crate::softplus::{softplus, softplus_derivative};
 use burn::module::Module;
 use burn::tensor::{Int, Tensor};
 
-/// At which rows the gradient with respect to the point is wanted.
-#[derive(Clone, Debug)]
-pub enum GradientRows {
-    /// Nowhere.
-    None,
-    /// At every point.
-    All,
-    /// At these row indices `[M]`.
-    Selected(Tensor<1, Int>),
-}
-
-/// What a coordinate network says of `N` points.
-#[derive(Clone, Debug)]
-pub struct Evaluation {
-    /// All outputs `[N, out]`; column 0 is the signed distance.
-    pub outputs: Tensor<2>,
-    /// Gradient of column 0 with respect to the point, `[M, 3]`, if asked for.
-    pub gradient: Option<Tensor<2>>,
-}
-
 /// A softplus perceptron over the positional encoding of points.
 #[derive(Module, Debug)]
 pub struct CoordinateMlp {
@@ -56,8 +36,9 @@ impl CoordinateMlp {
         }
     }
 
-    /// Evaluates the network at `points` `[N, 3]`, and its gradient at `rows`.
-    pub fn evaluate(&self, points: Tensor<2>, rows: GradientRows) -> Evaluation {
+    /// Evaluates the network at `points` `[N, 3]` and keeps what the gradient
+    /// needs: callers decide by the outputs where they want it.
+    pub fn record(&self, points: Tensor<2>) -> Recorded {
         let weights: Vec<_> = self.layers.iter().map(Linear::effective_weight).collect();
         let encoded = self.encoding().encode(points.clone());
         let last = self.layers.len() - 1;
@@ -75,36 +56,50 @@ impl CoordinateMlp {
                 h = z;
             }
         }
-        let gradient = match rows {
-            GradientRows::None => None,
-            GradientRows::All => Some(self.gradient(points, &pre_activations, &weights)),
-            GradientRows::Selected(rows) => {
-                let at_rows: Vec<_> = pre_activations
-                    .into_iter()
-                    .map(|z| z.select(0, rows.clone()))
-                    .collect();
-                Some(self.gradient(points.select(0, rows), &at_rows, &weights))
-            }
-        };
-        Evaluation {
+        Recorded {
+            points,
             outputs: h,
-            gradient,
+            pre_activations,
+            weights,
         }
     }
 
     /// The outputs `[N, out]` alone.
     pub fn forward(&self, points: Tensor<2>) -> Tensor<2> {
-        self.evaluate(points, GradientRows::None).outputs
+        self.record(points).outputs
+    }
+}
+
+/// A forward pass with everything its gradient needs.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    /// Where the network was evaluated, `[N, 3]`.
+    pub points: Tensor<2>,
+    /// Its outputs, `[N, out]`.
+    pub outputs: Tensor<2>,
+    /// Inputs of the activations, `[N, width]` per hidden layer.
+    pre_activations: Vec<Tensor<2>>,
+    /// Effective weights, `[out, in]` per layer.
+    weights: Vec<Tensor<2>>,
+}
+
+impl Recorded {
+    /// The same pass at some of its rows only.
+    pub fn select(&self, rows: Tensor<1, Int>) -> Self {
+        let at_rows = |t: &Tensor<2>| t.clone().select(0, rows.clone());
+        Self {
+            points: at_rows(&self.points),
+            outputs: at_rows(&self.outputs),
+            pre_activations: self.pre_activations.iter().map(at_rows).collect(),
+            weights: self.weights.clone(),
+        }
     }
 
-    /// Reverse sweep from output 0 to the points `[M, 3]`.
-    fn gradient(
-        &self,
-        points: Tensor<2>,
-        pre_activations: &[Tensor<2>],
-        weights: &[Tensor<2>],
-    ) -> Tensor<2> {
-        let rows = points.dims()[0];
+    /// Gradient of output 0 with respect to the points, `[N, 3]`: the reverse
+    /// sweep through `mlp`, which made the pass.
+    pub fn gradient(&self, mlp: &CoordinateMlp) -> Tensor<2> {
+        let weights = &self.weights;
+        let rows = self.points.dims()[0];
         let last = weights.len() - 1;
         let inputs = |l: usize| weights[l].dims()[1];
         // d output 0 / d input of layer l; starts as row 0 of the last weight.
@@ -115,10 +110,10 @@ impl CoordinateMlp {
         let mut to_encoding: Option<Tensor<2>> = None;
         for l in (0..=last).rev() {
             if l < last {
-                g = (g * softplus_derivative(pre_activations[l].clone(), self.sharpness))
-                    .matmul(weights[l].clone());
+                let slope = softplus_derivative(self.pre_activations[l].clone(), mlp.sharpness);
+                g = (g * slope).matmul(weights[l].clone());
             }
-            if self.skip == Some(l) {
+            if mlp.skip == Some(l) {
                 let scaled = g.div_scalar(std::f64::consts::SQRT_2);
                 let hidden = weights[l - 1].dims()[0];
                 to_encoding = Some(scaled.clone().narrow(1, hidden, inputs(l) - hidden));
@@ -128,6 +123,6 @@ impl CoordinateMlp {
         if let Some(skipped) = to_encoding {
             g = g + skipped;
         }
-        self.encoding().pull_back(points, g)
+        mlp.encoding().pull_back(self.points.clone(), g)
     }
 }

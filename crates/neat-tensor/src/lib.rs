@@ -18,6 +18,6 @@ pub mod random;
 pub mod softplus;
 
 pub use backend::{Backend, BackendError};
-pub use coordinate_mlp::{CoordinateMlp, Evaluation, GradientRows};
+pub use coordinate_mlp::{CoordinateMlp, Recorded};
 pub use encoding::PositionalEncoding;
 pub use linear::{Linear, ReluMlp};

@@ -119,7 +119,12 @@ impl Linear {
         let scale = |param: Param<Tensor<2>>| {
             param.map(|w| {
                 let tracked = w.is_require_grad();
-                w.detach().mul_scalar(factor).set_require_grad(tracked)
+                let scaled = w.inner().mul_scalar(factor);
+                if tracked {
+                    Tensor::from_inner(scaled).require_grad()
+                } else {
+                    scaled
+                }
             })
         };
         self.weight = self.weight.map(scale);

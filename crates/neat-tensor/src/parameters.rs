@@ -1,6 +1,7 @@
 //! Parameters of a module by name: reading, writing, counting.
 
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use burn::optim::GradientsParams;
 use burn::tensor::{DType, Tensor, TensorData};
 use std::collections::BTreeMap;
 
@@ -46,6 +47,43 @@ impl ModuleVisitor for Reader {
 pub fn named_parameters<M: Module>(module: &M) -> BTreeMap<String, TensorData> {
     let mut reader = Reader {
         path: PathStack::default(),
+        values: BTreeMap::new(),
+    };
+    module.visit(&mut reader);
+    reader.values
+}
+
+struct GradientReader<'a> {
+    path: PathStack,
+    gradients: &'a mut GradientsParams,
+    values: BTreeMap<String, TensorData>,
+}
+
+impl ModuleVisitor for GradientReader<'_> {
+    fn enter_module(&mut self, name: &str, _container_type: &str) {
+        self.path.enter(name);
+    }
+
+    fn exit_module(&mut self, _name: &str, _container_type: &str) {
+        self.path.exit();
+    }
+
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        if let Some(gradient) = self.gradients.remove::<D>(param.id) {
+            self.values.insert(self.path.name(), gradient.into_data());
+        }
+    }
+}
+
+/// The gradients of a module's parameters with the parameters' names, on the
+/// host; parameters without a gradient are left out.
+pub fn named_gradients<M: Module>(
+    module: &M,
+    gradients: &mut GradientsParams,
+) -> BTreeMap<String, TensorData> {
+    let mut reader = GradientReader {
+        path: PathStack::default(),
+        gradients,
         values: BTreeMap::new(),
     };
     module.visit(&mut reader);

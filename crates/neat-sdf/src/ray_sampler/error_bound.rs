@@ -77,7 +77,6 @@ struct RayState {
     error_at_beta0: f32,
     /// Positions that still need a distance.
     new_z: Vec<f32>,
-    masses: Vec<f32>,
     cdf: Vec<f32>,
 }
 
@@ -144,6 +143,9 @@ impl ErrorBoundConfig {
 
 /// One batched query for the new positions of all rays, merged in order.
 fn evaluate_new(rays: &RayBundle, states: &mut [RayState], query: &mut impl DistanceQuery) {
+    if states.is_empty() {
+        return;
+    }
     let points: Vec<[f32; 3]> = states
         .iter()
         .enumerate()
@@ -169,7 +171,6 @@ impl RayState {
             beta: (squares / (4.0 * (epsilon + 1.0).ln())).sqrt(),
             error_at_beta0: 0.0,
             new_z: z.to_vec(),
-            masses: Vec::new(),
             cdf: Vec::new(),
         }
     }
@@ -185,7 +186,12 @@ impl RayState {
         new.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut z = Vec::with_capacity(self.z.len() + new.len());
         let mut sdf = Vec::with_capacity(z.capacity());
-        let mut old = self.z.iter().copied().zip(self.sdf.iter().copied()).peekable();
+        let mut old = self
+            .z
+            .iter()
+            .copied()
+            .zip(self.sdf.iter().copied())
+            .peekable();
         for (new_z, new_sdf) in new {
             while let Some((old_z, old_sdf)) = old.next_if(|(old_z, _)| *old_z <= new_z) {
                 z.push(old_z);
@@ -228,35 +234,28 @@ impl RayState {
 
     /// The largest bound on the opacity's error over all sections.
     fn error_bound(&self, beta: f32) -> f32 {
-        let mut error_integral = 0.0f32;
-        let mut free_energy = 0.0f32;
-        let mut bound = 0.0f32;
-        for i in 0..self.d_star.len() {
+        self.section_bounds(beta).fold(0.0, f32::max)
+    }
+
+    /// The bound on the opacity's error at each section (VolSDF eq. 15).
+    fn section_bounds(&self, beta: f32) -> impl Iterator<Item = f32> {
+        let (mut error_integral, mut free_energy) = (0.0, 0.0);
+        self.d_star.iter().enumerate().map(move |(i, d_star)| {
             let length = self.z[i + 1] - self.z[i];
-            error_integral += section_error(length, self.d_star[i], beta);
-            let error = error_integral.exp().min(MAX_ERROR_FACTOR) - 1.0;
-            bound = bound.max(error * (-free_energy).exp());
-            free_energy += length * laplace_density_scalar(self.sdf[i], beta);
-        }
-        bound
+            error_integral += f64::from(section_error(length, *d_star, beta));
+            let error = (error_integral as f32).exp().min(MAX_ERROR_FACTOR) - 1.0;
+            let bound = error * transmittance(free_energy);
+            free_energy += f64::from(length * laplace_density_scalar(self.sdf[i], beta));
+            bound
+        })
     }
 
     /// `n` new positions where the bound is large.
     fn upsample(&mut self, n: usize) {
-        self.masses.clear();
-        let mut error_integral = 0.0f32;
-        let mut free_energy = 0.0f32;
-        for i in 0..self.d_star.len() {
-            let length = self.z[i + 1] - self.z[i];
-            error_integral += section_error(length, self.d_star[i], self.beta);
-            let error = error_integral.exp().min(MAX_ERROR_FACTOR) - 1.0;
-            self.masses
-                .push(error * (-free_energy).exp() + UPSAMPLING_MASS_FLOOR);
-            free_energy += length * laplace_density_scalar(self.sdf[i], self.beta);
-        }
+        let masses: Vec<f32> = self.section_bounds(self.beta).collect();
         inverse_cdf(
             &self.z,
-            self.masses.iter().copied(),
+            masses.iter().copied(),
             FLAT_STEP,
             (0..n).map(|i| linspace(i, n)),
             &mut self.new_z,
@@ -266,20 +265,21 @@ impl RayState {
 
     /// `n` positions drawn from the rendering weights, at `u` or evenly.
     fn draw(&mut self, n: usize, u: Option<&[f32]>) -> Vec<f32> {
-        self.masses.clear();
-        let mut free_energy = 0.0f32;
-        for i in 0..self.z.len() - 1 {
-            let here =
-                (self.z[i + 1] - self.z[i]) * laplace_density_scalar(self.sdf[i], self.beta);
-            let weight = (1.0 - (-here).exp()) * (-free_energy).exp();
-            self.masses.push(weight + FINAL_MASS_FLOOR);
-            free_energy += here;
-        }
+        let mut free_energy = 0.0;
+        let masses: Vec<f32> = (0..self.z.len() - 1)
+            .map(|i| {
+                let length = self.z[i + 1] - self.z[i];
+                let here = length * laplace_density_scalar(self.sdf[i], self.beta);
+                let weight = (1.0 - (-here).exp()) * transmittance(free_energy);
+                free_energy += f64::from(here);
+                weight + FINAL_MASS_FLOOR
+            })
+            .collect();
         let mut drawn = Vec::with_capacity(n);
         let u = (0..n).map(|i| u.map_or_else(|| linspace(i, n), |u| u[i]));
         inverse_cdf(
             &self.z,
-            self.masses.iter().copied(),
+            masses.iter().copied(),
             FLAT_STEP,
             u,
             &mut drawn,
@@ -289,8 +289,11 @@ impl RayState {
     }
 }
 
-/// Added to every section's mass before upsampling, as published.
-const UPSAMPLING_MASS_FLOOR: f32 = 1e-6;
+/// What passes a stretch of the given free energy. Running sums are float64, as
+/// PyTorch's on the CPU: float32 would lose the small sections behind large ones.
+fn transmittance(free_energy: f64) -> f32 {
+    (-free_energy as f32).exp()
+}
 
 /// Error of one section's density integral (VolSDF eq. 14).
 fn section_error(length: f32, d_star: f32, beta: f32) -> f32 {

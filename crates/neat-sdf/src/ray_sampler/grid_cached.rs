@@ -81,6 +81,20 @@ impl DistanceGrid {
         self.radius
     }
 
+    /// The distances at all nodes, `[x][y][z]`.
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// Replaces the distances at all nodes; `false` if their number is wrong.
+    pub fn set_values(&mut self, values: Vec<f32>) -> bool {
+        let fits = values.len() == self.values.len();
+        if fits {
+            self.values = values;
+        }
+        fits
+    }
+
     /// Position of node `index`.
     fn node(&self, index: usize) -> [f32; 3] {
         let n = self.resolution;

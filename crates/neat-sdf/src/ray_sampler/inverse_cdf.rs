@@ -4,7 +4,8 @@
 /// `masses` over the intervals between `edges` (one more edge than masses).
 ///
 /// Cumulative steps below `flat` count as 1, so that positions in an interval
-/// without mass stay at its lower edge (published: 1e-5).
+/// without mass stay at its lower edge (published: 1e-5). Without any mass every
+/// interval is as likely (the published code answers NaN).
 pub(super) fn inverse_cdf(
     edges: &[f32],
     masses: impl Iterator<Item = f32> + Clone,
@@ -13,13 +14,19 @@ pub(super) fn inverse_cdf(
     out: &mut Vec<f32>,
     cdf: &mut Vec<f32>,
 ) {
-    let total: f32 = masses.clone().sum();
+    let total = masses.clone().map(f64::from).sum::<f64>() as f32;
     cdf.clear();
     cdf.push(0.0);
-    let mut sum = 0.0;
+    let intervals = (edges.len() - 1) as f32;
+    let mut sum = 0.0f64;
     for mass in masses {
-        sum += mass / total;
-        cdf.push(sum);
+        let share = if total > 0.0 {
+            mass / total
+        } else {
+            1.0 / intervals
+        };
+        sum += f64::from(share);
+        cdf.push(sum as f32);
     }
     let last = cdf.len() - 1;
     for u in u {
@@ -64,5 +71,19 @@ mod tests {
             &mut cdf,
         );
         assert_eq!(out, vec![0.5, 1.0, 1.5]);
+    }
+
+    #[test]
+    fn without_mass_all_intervals_are_alike() {
+        let (mut out, mut cdf) = (Vec::new(), Vec::new());
+        inverse_cdf(
+            &[0.0, 1.0, 4.0],
+            [0.0, 0.0].into_iter(),
+            1e-5,
+            [0.25, 0.75].into_iter(),
+            &mut out,
+            &mut cdf,
+        );
+        assert_eq!(out, vec![0.5, 2.5]);
     }
 }

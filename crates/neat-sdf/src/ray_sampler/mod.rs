@@ -140,6 +140,22 @@ impl RaySampler {
         }
     }
 
+    /// Cached values that a checkpoint must keep for an exact resume.
+    pub fn state(&self) -> Option<&[f32]> {
+        match self {
+            Self::GridCached(_, grid) => Some(grid.values()),
+            Self::ErrorBound(_) | Self::Uniform(_) => None,
+        }
+    }
+
+    /// Takes over cached values; `false` if they do not fit this sampler.
+    pub fn restore(&mut self, state: Vec<f32>) -> bool {
+        match self {
+            Self::GridCached(_, grid) => grid.set_values(state),
+            Self::ErrorBound(_) | Self::Uniform(_) => false,
+        }
+    }
+
     /// Sample positions along `rays` for a density of scale `beta`.
     pub fn sample(
         &self,

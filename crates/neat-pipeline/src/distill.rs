@@ -1,0 +1,289 @@
+//! From the trained field to the wireframe (paper §4.3, or the fast back end).
+
+use crate::config::{BackEnd, Config};
+use crate::field::TrainedField;
+use crate::model::host_vec;
+use crate::training_data::{push_ray, push_ray_through};
+use nalgebra::{Vector2, Vector3};
+use neat_core::{Camera, LineSegment3, Scene, Wireframe3d};
+use neat_field::attraction_region::AttractionRegions;
+use neat_sdf::RayBundle;
+use neat_wireframe::fast_back_end;
+use neat_wireframe::neat_lines;
+use neat_wireframe::paper_back_end::PaperBackEndError;
+use neat_wireframe::robust_segments::{self, RobustSegmentConfig, robust_segment};
+use neat_wireframe::{SegmentProposal, ViewObservation};
+use serde_json::json;
+
+/// Rays per rendering call: bounds the memory.
+const RAY_CHUNK: usize = 2048;
+/// Half the width of the thin regions that are queried (paper §4.3).
+const THIN_REGION: f64 = 1.0;
+
+/// Why no wireframe could be taken out of a field.
+#[derive(Debug, thiserror::Error)]
+pub enum DistillError {
+    /// The paper's back end refused its input.
+    #[error(transparent)]
+    Paper(#[from] PaperBackEndError),
+}
+
+/// A wireframe and how it came about.
+#[derive(Clone, Debug)]
+pub struct Distilled {
+    /// In the world frame of the scene's cameras.
+    pub wireframe: Wireframe3d,
+    /// Views that support each edge.
+    pub edge_support: Vec<usize>,
+    /// What each step kept and removed.
+    pub report: serde_json::Value,
+}
+
+/// Queries the thin regions of all views and assembles the wireframe.
+///
+/// `progress` receives the share that is done.
+///
+/// # Errors
+/// If the field's junctions or distances are not finite.
+pub fn distill(
+    scene: &Scene,
+    field: &TrainedField,
+    config: &Config,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Distilled, DistillError> {
+    match config.distill.back_end {
+        BackEnd::Paper => paper(scene, field, config, progress),
+        BackEnd::Fast => Ok(fast(scene, field, config, progress)),
+    }
+}
+
+/// Rays of one view, with the 2D segment that each asks for.
+struct Query {
+    rays: RayBundle,
+    /// Index into the view's segments.
+    segments: Vec<usize>,
+    /// Rays through the feet of the pixels on their segments.
+    feet: RayBundle,
+}
+
+/// Thin-region pixels of a view; `per_segment` limits how many per segment,
+/// spread evenly along it.
+fn thin_query(
+    camera: &Camera,
+    observation: &ViewObservation,
+    pixel_center: f64,
+    per_segment: Option<usize>,
+) -> Query {
+    let segments: Vec<_> = observation.segments.iter().map(|s| s.segment).collect();
+    let regions = AttractionRegions::compute(
+        &segments,
+        camera.width,
+        camera.height,
+        pixel_center,
+        THIN_REGION,
+    );
+    let entries: Vec<usize> = match per_segment {
+        None => (0..regions.len()).collect(),
+        Some(wanted) => {
+            let mut by_segment = vec![Vec::new(); segments.len()];
+            for entry in 0..regions.len() {
+                by_segment[regions.labels[entry] as usize].push(entry);
+            }
+            by_segment
+                .into_iter()
+                .flat_map(|mut entries| {
+                    entries.sort_by(|a, b| {
+                        regions.parameters[*a].total_cmp(&regions.parameters[*b])
+                    });
+                    spread(&entries, wanted)
+                })
+                .collect()
+        }
+    };
+    let mut query = Query {
+        rays: RayBundle::default(),
+        segments: Vec::with_capacity(entries.len()),
+        feet: RayBundle::default(),
+    };
+    for entry in entries {
+        let pixel = regions.pixels[entry];
+        push_ray(
+            &mut query.rays,
+            camera,
+            pixel_center,
+            pixel % camera.width,
+            pixel / camera.width,
+        );
+        let foot = Vector2::from(regions.feet[entry]).map(f64::from);
+        push_ray_through(&mut query.feet, camera, &foot);
+        query.segments.push(regions.labels[entry] as usize);
+    }
+    query
+}
+
+/// At most `wanted` of `entries`, evenly spread, first and last included.
+fn spread(entries: &[usize], wanted: usize) -> Vec<usize> {
+    if entries.len() <= wanted || wanted < 2 {
+        return entries.iter().copied().take(wanted.max(1)).collect();
+    }
+    (0..wanted)
+        .map(|i| entries[i * (entries.len() - 1) / (wanted - 1)])
+        .collect()
+}
+
+/// One rendered ray.
+struct RenderedRay {
+    segment: LineSegment3,
+    opacity: f64,
+    /// Rendered point `Σ w x`.
+    point: Vector3<f64>,
+}
+
+fn render_rays(field: &TrainedField, rays: &RayBundle) -> Vec<RenderedRay> {
+    let mut rendered = Vec::with_capacity(rays.len());
+    for start in (0..rays.len()).step_by(RAY_CHUNK) {
+        let end = (start + RAY_CHUNK).min(rays.len());
+        let chunk = RayBundle {
+            origins: rays.origins[start..end].to_vec(),
+            directions: rays.directions[start..end].to_vec(),
+        };
+        let samples = field.samples(&chunk);
+        let rendering = field.render(&chunk, &samples, false);
+        let ends = host_vec(rendering.segments.expect("segments of all rays"));
+        let weights = host_vec(rendering.weights);
+        for (ray, ends) in ends.chunks_exact(6).enumerate() {
+            let range = ray * samples.per_ray..(ray + 1) * samples.per_ray;
+            let mut point = Vector3::zeros();
+            let mut opacity = 0.0;
+            for i in range {
+                let weight = f64::from(weights[i]);
+                point += Vector3::from(chunk.point(ray, samples.z[i])).map(f64::from) * weight;
+                opacity += weight;
+            }
+            let end = |k: usize| Vector3::new(ends[k], ends[k + 1], ends[k + 2]).map(f64::from);
+            rendered.push(RenderedRay {
+                segment: LineSegment3::new(end(0), end(3)),
+                opacity,
+                point,
+            });
+        }
+    }
+    rendered
+}
+
+fn fast(
+    scene: &Scene,
+    field: &TrainedField,
+    config: &Config,
+    progress: &mut dyn FnMut(f64),
+) -> Distilled {
+    let views = ViewObservation::from_scene(scene, config.data.min_segment_score);
+    let proposals = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f));
+    let result = fast_back_end::run(
+        &views,
+        &proposals,
+        &field.junctions(),
+        &field.surface_grid(),
+        field.scene_radius,
+        &config.distill.fast,
+    );
+    progress(1.0);
+    Distilled {
+        edge_support: result.edges.iter().map(|e| e.support).collect(),
+        report: json!({
+            "back_end": "fast",
+            "proposals": proposals.len(),
+            "steps": result.report,
+        }),
+        wireframe: result.wireframe,
+    }
+}
+
+/// One robust 3D segment for every detected 2D segment that the field answers.
+pub fn propose_segments(
+    scene: &Scene,
+    field: &TrainedField,
+    config: &Config,
+    views: &[ViewObservation],
+    progress: &mut dyn FnMut(f64),
+) -> Vec<SegmentProposal> {
+    let robust = RobustSegmentConfig::default();
+    let mut proposals = Vec::new();
+    for (view, observation) in views.iter().enumerate() {
+        let query = thin_query(
+            &observation.camera,
+            observation,
+            scene.pixel_center,
+            Some(config.distill.rays_per_segment),
+        );
+        let rendered = render_rays(field, &query.rays);
+        let mut of_segment = vec![Vec::new(); observation.segments.len()];
+        for (ray, segment) in rendered.iter().zip(&query.segments) {
+            of_segment[*segment].push(robust_segments::RenderedSegment {
+                segment: ray.segment,
+                weight: ray.opacity,
+            });
+        }
+        proposals.extend(of_segment.iter().enumerate().filter_map(|(segment, rays)| {
+            robust_segment(views, view, segment, rays, &robust)
+        }));
+        progress((view + 1) as f64 / views.len() as f64);
+    }
+    proposals
+}
+
+fn paper(
+    scene: &Scene,
+    field: &TrainedField,
+    config: &Config,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Distilled, DistillError> {
+    let paper = &config.distill.paper;
+    let views = ViewObservation::from_scene(scene, paper.neat_lines.min_segment_score);
+    let mut rays_by_view = Vec::with_capacity(views.len());
+    for (index, observation) in views.iter().enumerate() {
+        let query = thin_query(&observation.camera, observation, scene.pixel_center, None);
+        let rendered = render_rays(field, &query.rays);
+        let points: Vec<[f32; 3]> = rendered
+            .iter()
+            .map(|r| r.point.map(|c| c as f32).into())
+            .collect();
+        let surface = field.distances_and_gradients(&points);
+        let rays = rendered
+            .iter()
+            .zip(surface)
+            .enumerate()
+            .map(|(i, (ray, (_, gradient)))| neat_lines::RenderedSegment {
+                segment: ray.segment,
+                support_point: support_point(
+                    &Vector3::from(query.feet.origins[i]).map(f64::from),
+                    &Vector3::from(query.feet.directions[i]).map(f64::from),
+                    &ray.point,
+                    &Vector3::from(gradient).map(f64::from),
+                ),
+            })
+            .collect();
+        rays_by_view.push(rays);
+        progress(0.95 * (index + 1) as f64 / views.len() as f64);
+    }
+    let result = paper.run(&field.junctions(), &views, &rays_by_view, field)?;
+    progress(1.0);
+    Ok(Distilled {
+        wireframe: result.wireframe,
+        edge_support: result.visible_views,
+        report: json!({ "back_end": "paper", "steps": result.counts }),
+    })
+}
+
+/// Where the ray through the foot meets the tangent plane at the rendered point
+/// (published `l3d`; denominators are kept 1e-6 off zero, as there).
+fn support_point(
+    origin: &Vector3<f64>,
+    direction: &Vector3<f64>,
+    point: &Vector3<f64>,
+    gradient: &Vector3<f64>,
+) -> Vector3<f64> {
+    let along = direction.dot(gradient);
+    let guard = if along < 0.0 { -1e-6 } else { 1e-6 };
+    origin + direction * ((point - origin).dot(gradient) / (along + guard))
+}

@@ -1,0 +1,342 @@
+//! The total loss of one iteration (paper eq. 8).
+
+use crate::config::TrainConfig;
+use crate::model::{NeatModel, RenderRequest, host_points, host_vec, point_tensor};
+use crate::training_data::Batch;
+use burn::tensor::{Device, Tensor, TensorData};
+use nalgebra::Vector2;
+use neat_core::assignment::{AssignmentError, assign};
+use neat_core::{Camera, LineSegment2};
+use neat_field::segment_loss::{SegmentLossConfig, segment_loss};
+use neat_field::segment_rendering::{RayCameras, project_calibrated};
+use neat_gjp::candidates::{JunctionView, RenderedSegment, matching_cost};
+use neat_gjp::junction_loss::{JunctionLoss, MatchedJunctions, junction_loss};
+use neat_sdf::RaySamples;
+use neat_sdf::losses::{eikonal_loss, mask_loss, rgb_loss};
+use serde::{Deserialize, Serialize};
+
+/// The loss terms of an iteration, before weighting, and their weighted sum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Losses {
+    /// The weighted sum that is minimised.
+    pub total: f64,
+    /// Colour.
+    pub rgb: f64,
+    /// Eikonal term.
+    pub eikonal: f64,
+    /// Silhouette.
+    pub mask: f64,
+    /// Segments, calibrated.
+    pub segment: f64,
+    /// Junctions in the world.
+    pub junction_3d: f64,
+    /// Junctions in the image, calibrated.
+    pub junction_2d: f64,
+}
+
+/// Everything random or observed of one iteration: with it the loss is a plain
+/// function of the parameters.
+#[derive(Clone, Debug)]
+pub struct StepInput<'a> {
+    /// The rays and what was observed.
+    pub batch: &'a Batch,
+    /// Where the rays are sampled.
+    pub samples: &'a RaySamples,
+    /// Points of the eikonal term besides rendered samples.
+    pub eikonal_points: &'a [[f32; 3]],
+    /// The views that [`Batch::view_of_ray`] speaks of: camera and 2D junctions.
+    pub views: &'a [JunctionView<'a>],
+    /// Whether the junction terms are due.
+    pub junctions_due: bool,
+}
+
+/// The loss as a tensor, and what is reported of its inside.
+#[derive(Clone, Debug)]
+pub struct StepLoss {
+    /// The weighted sum, `[1]`.
+    pub total: Tensor<1>,
+    /// `total`, then the terms in the order of [`Losses`], `[7]`, without gradient.
+    pub terms: Tensor<1>,
+    /// Rendered colour `[R, 3]`, without gradient.
+    pub color: Tensor<2>,
+    /// Mean pixel error of each rendered segment `[R']`.
+    pub segment_errors: Vec<f32>,
+    /// Samples at which all networks were evaluated.
+    pub rendered_samples: usize,
+    /// Matched pairs of local and global junctions.
+    pub targets: usize,
+}
+
+/// Renders the batch and adds up the terms.
+///
+/// # Errors
+/// If rendered end points are so far out that they cannot be matched.
+pub fn step_loss(
+    model: &NeatModel,
+    input: &StepInput<'_>,
+    beta: Tensor<1>,
+    config: &TrainConfig,
+    device: &Device,
+) -> Result<StepLoss, AssignmentError> {
+    let batch = input.batch;
+    let weights = &config.loss;
+    let segment_rays = batch.segment_of_ray.len();
+    let rendering = model.render(
+        &RenderRequest {
+            rays: &batch.rays,
+            samples: input.samples,
+            beta,
+            min_sample_weight: config.min_sample_weight,
+            segment_rays,
+            color: true,
+        },
+        device,
+    );
+    let zero = || Tensor::<1>::zeros([1], device);
+    let rays = batch.rays.len();
+
+    let color = rendering.color.expect("colour was asked for");
+    let rgb = rgb_loss(color.clone(), point_tensor(&batch.colors, device));
+
+    let mut gradients = Vec::new();
+    if !input.eikonal_points.is_empty() {
+        let points = point_tensor(input.eikonal_points, device);
+        gradients.push(model.implicit_network.evaluate_uncapped(points).gradient);
+    }
+    if config.eikonal.rendered_samples {
+        gradients.push(rendering.gradients.clone());
+    }
+    let eikonal = match gradients.is_empty() {
+        true => zero(),
+        false => eikonal_loss(Tensor::cat(gradients, 0)),
+    };
+
+    let mask = match weights.mask > 0.0 {
+        false => zero(),
+        true => mask_loss(
+            rendering.opacity.clone(),
+            Tensor::from_data(TensorData::new(batch.silhouette.clone(), [rays, 1]), device),
+        ),
+    };
+
+    let (mut segment, mut segment_errors) = (zero(), Vec::new());
+    let (mut junction_3d, mut junction_2d, mut targets) = (zero(), zero(), 0);
+    if let Some(ends) = rendering.segments {
+        let cameras = ray_cameras(input, device);
+        let (observed, score) = observed_segments(input, device);
+        let projected = project_calibrated(ends.clone(), &cameras);
+        let loss = segment_loss(
+            projected,
+            observed,
+            score,
+            rendering.opacity.narrow(0, 0, segment_rays),
+            &cameras,
+            SegmentLossConfig {
+                cutoff_in_pixels: weights.segment_cutoff_in_pixels,
+                min_opacity: weights.segment_min_opacity,
+                mean_over_all_rays: weights.segment_mean_over_all_rays,
+            },
+        );
+        segment = loss.loss;
+        // The one gathered transfer of an iteration: ends, error, counted or not.
+        let gathered = host_vec(Tensor::cat(
+            vec![
+                ends.detach(),
+                loss.error_in_pixels,
+                loss.counted,
+            ],
+            1,
+        ));
+        segment_errors = gathered.chunks_exact(8).map(|row| row[6]).collect();
+        if input.junctions_due {
+            let matched = junction_terms(model, input, config, &gathered, device)?;
+            targets = matched.0;
+            if let Some(JunctionLoss {
+                in_world,
+                calibrated,
+            }) = matched.1
+            {
+                junction_3d = in_world;
+                junction_2d = calibrated.unwrap_or_else(zero);
+            }
+        }
+    }
+
+    let total = rgb.clone().mul_scalar(weights.rgb)
+        + eikonal.clone().mul_scalar(weights.eikonal)
+        + mask.clone().mul_scalar(weights.mask)
+        + segment.clone().mul_scalar(weights.segment)
+        + junction_3d.clone().mul_scalar(weights.junction_3d)
+        + junction_2d.clone().mul_scalar(weights.junction_2d);
+    let terms = [
+        total.clone(),
+        rgb,
+        eikonal,
+        mask,
+        segment,
+        junction_3d,
+        junction_2d,
+    ];
+    Ok(StepLoss {
+        total,
+        terms: Tensor::cat(terms.map(Tensor::detach).into(), 0),
+        color: color.detach(),
+        segment_errors,
+        rendered_samples: rendering
+            .evaluated
+            .map_or(rays * input.samples.per_ray, |e| e.len()),
+        targets,
+    })
+}
+
+impl StepLoss {
+    /// The terms on the host.
+    pub fn losses(&self) -> Losses {
+        let terms = host_vec(self.terms.clone());
+        let term = |i: usize| f64::from(terms[i]);
+        Losses {
+            total: term(0),
+            rgb: term(1),
+            eikonal: term(2),
+            mask: term(3),
+            segment: term(4),
+            junction_3d: term(5),
+            junction_2d: term(6),
+        }
+    }
+}
+
+/// Local junctions from the rendered ends, matched with the global ones.
+///
+/// `gathered` holds 8 numbers per ray: six coordinates of the ends, the error in
+/// pixels, and whether the ray counts.
+fn junction_terms(
+    model: &NeatModel,
+    input: &StepInput<'_>,
+    config: &TrainConfig,
+    gathered: &[f32],
+    device: &Device,
+) -> Result<(usize, Option<JunctionLoss>), AssignmentError> {
+    let batch = input.batch;
+    let segments: Vec<RenderedSegment> = gathered
+        .chunks_exact(8)
+        .zip(batch.view_of_ray.iter().zip(&batch.segment_of_ray))
+        .filter(|(row, _)| !config.only_counted_ends || row[7] > 0.0)
+        .map(|(row, (view, detected))| RenderedSegment {
+            view: *view,
+            ends_in_world: [[row[0], row[1], row[2]], [row[3], row[4], row[5]]],
+            detected: detected.segment,
+        })
+        .collect();
+    let local = config.candidates.local_junctions(&segments, input.views)?;
+    if local.is_empty() {
+        return Ok((0, None));
+    }
+    let global = model.perceiver.junctions();
+    let global_in_world = host_points(global.clone());
+    let local_in_world: Vec<[f32; 3]> = local.iter().map(|l| l.in_world).collect();
+
+    // The 2D terms need a view per junction: they are those of a batch from one
+    // view (as published), and rest in batches over many.
+    let camera = match batch.view_of_ray.first() {
+        Some(view) if batch.view_of_ray.iter().all(|v| v == view) => {
+            Some(input.views[*view].camera)
+        }
+        _ => None,
+    };
+    let in_image = config.matching.weight_2d > 0.0 || config.loss.junction_2d > 0.0;
+    let camera = camera.filter(|_| in_image);
+    let calibrated = |camera: &Camera, points: &[[f32; 3]]| -> Vec<[f32; 2]> {
+        points
+            .iter()
+            .map(|p| {
+                let point = nalgebra::Vector3::from(*p).map(f64::from);
+                camera.project(&point).calibrated.map(|c| c as f32).into()
+            })
+            .collect()
+    };
+    let (local_calibrated, global_calibrated, weight_2d) = match camera {
+        Some(camera) => (
+            calibrated(camera, &local_in_world),
+            calibrated(camera, &global_in_world),
+            config.matching.weight_2d,
+        ),
+        None => (Vec::new(), Vec::new(), 0.0),
+    };
+    let cost = matching_cost(
+        &local_in_world,
+        &local_calibrated,
+        &global_in_world,
+        &global_calibrated,
+        weight_2d,
+        config.matching.norm,
+    );
+    let pairs = assign(&cost, local.len(), global_in_world.len())?;
+    let mut matched = MatchedJunctions::default();
+    for (l, g) in pairs.pairs() {
+        matched.targets.push(local_in_world[l]);
+        matched.junction_of_target.push(g);
+        if camera.is_some() {
+            matched.targets_calibrated.push(local_calibrated[l]);
+        }
+    }
+    let projected = camera.map(|camera| {
+        let junctions = global.dims()[0];
+        let cameras = camera_tensors(std::iter::repeat_n(camera, junctions), device);
+        let twice = Tensor::cat(vec![global.clone(), global.clone()], 1);
+        project_calibrated(twice, &cameras).narrow(1, 0, 2)
+    });
+    Ok((
+        matched.targets.len(),
+        junction_loss(global, projected, &matched),
+    ))
+}
+
+fn ray_cameras(input: &StepInput<'_>, device: &Device) -> RayCameras {
+    let batch = input.batch;
+    camera_tensors(
+        batch.view_of_ray.iter().map(|v| input.views[*v].camera),
+        device,
+    )
+}
+
+/// One camera per row.
+fn camera_tensors<'a>(cameras: impl Iterator<Item = &'a Camera>, device: &Device) -> RayCameras {
+    let (mut rotation, mut center, mut focal) = (Vec::new(), Vec::new(), Vec::new());
+    let mut rows = 0;
+    for camera in cameras {
+        rows += 1;
+        // Columns of world_from_camera are rows of camera_from_world.
+        rotation.extend(camera.world_from_camera.iter().map(|c| *c as f32));
+        center.extend(camera.center_in_world.iter().map(|c| *c as f32));
+        let k = camera.intrinsics;
+        focal.extend([k.fx, k.fy, k.skew].map(|f| f as f32));
+    }
+    let tensor = |values: Vec<f32>, columns: usize| {
+        Tensor::from_data(TensorData::new(values, [rows, columns]), device)
+    };
+    RayCameras {
+        camera_from_world: tensor(rotation, 9),
+        center: tensor(center, 3),
+        focal: tensor(focal, 3),
+    }
+}
+
+/// Calibrated ends `[R', 4]` and scores `[R', 1]` of the rays' 2D segments.
+fn observed_segments(input: &StepInput<'_>, device: &Device) -> (Tensor<2>, Tensor<2>) {
+    let batch = input.batch;
+    let rows = batch.segment_of_ray.len();
+    let mut ends = Vec::with_capacity(4 * rows);
+    let mut scores = Vec::with_capacity(rows);
+    for (segment, view) in batch.segment_of_ray.iter().zip(&batch.view_of_ray) {
+        let intrinsics = &input.views[*view].camera.intrinsics;
+        let calibrate = |p: &Vector2<f64>| intrinsics.calibrate(p);
+        let LineSegment2 { start, end } = segment.segment.map(calibrate);
+        ends.extend([start.x, start.y, end.x, end.y].map(|c| c as f32));
+        scores.push(segment.score as f32);
+    }
+    (
+        Tensor::from_data(TensorData::new(ends, [rows, 4]), device),
+        Tensor::from_data(TensorData::new(scores, [rows, 1]), device),
+    )
+}

@@ -1,0 +1,438 @@
+//! The optimisation of one scene.
+
+pub use crate::field::TrainedField;
+use crate::config::{Config, TrainConfig};
+use crate::losses::{Losses, StepInput, StepLoss, step_loss};
+use crate::model::{NeatModel, host_vec, point_tensor};
+use crate::training_data::{Batch, TrainingData};
+use burn::module::Module;
+use burn::optim::GradientsParams;
+use burn::tensor::{Device, Tensor, TensorData};
+use neat_core::Scene;
+use neat_core::assignment::AssignmentError;
+use neat_gjp::candidates::JunctionView;
+use neat_sdf::density::BetaSchedule;
+use neat_sdf::ray_sampler::{RaySampler, RaySamples, Seeded};
+use neat_tensor::adam::Adam;
+use neat_tensor::checkpoint::Checkpoint;
+use neat_tensor::parameters::{ParameterError, load_parameters, named_parameters};
+use neat_tensor::random::{Purpose, stream};
+use rand::RngExt;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Why training cannot start or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// The configuration contradicts itself.
+    #[error("the configuration cannot be used: {0}")]
+    Config(String),
+    /// No pixel of the scene lies in an attraction region.
+    #[error(
+        "no pixel lies within {0} px of a 2D segment: look at the scene's 2D wireframes, or raise data.attraction_distance"
+    )]
+    NoRegionPixel(f64),
+    /// The loss is no number any more.
+    #[error(
+        "the loss became {value} in iteration {iteration}; resume from the last checkpoint with a lower train.learning_rate"
+    )]
+    NonFinite {
+        /// The iteration.
+        iteration: u64,
+        /// The loss.
+        value: f64,
+    },
+    /// Junctions could not be matched.
+    #[error("junctions could not be matched in iteration {iteration}: {source}")]
+    Assignment {
+        /// The iteration.
+        iteration: u64,
+        /// What the assignment said.
+        source: AssignmentError,
+    },
+    /// The checkpoint belongs to another model.
+    #[error("the checkpoint does not fit this configuration: {0}")]
+    Parameters(#[from] ParameterError),
+    /// The checkpoint lacks something.
+    #[error("the checkpoint has no usable `{0}`")]
+    Checkpoint(String),
+}
+
+/// What one iteration did.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepReport {
+    /// The iteration that was done, counted from 1.
+    pub iteration: u64,
+    /// The loss terms.
+    pub losses: Losses,
+    /// Median over the rays of the mean pixel error of their segments.
+    pub segment_error_in_pixels: f64,
+    /// Samples at which all networks were evaluated.
+    pub rendered_samples: usize,
+    /// Matched pairs of local and global junctions.
+    pub targets: usize,
+    /// Learning rate of the networks.
+    pub learning_rate: f64,
+    /// Scale of the density.
+    pub beta: f64,
+}
+
+/// The state of an optimisation.
+pub struct Trainer {
+    data: TrainingData,
+    config: Config,
+    seed: u64,
+    device: Device,
+    scene_radius: f64,
+    model: NeatModel,
+    adam: Adam,
+    sampler: RaySampler,
+    iteration: u64,
+    /// β of the last iteration.
+    beta: f64,
+}
+
+/// Loss and gradients of an iteration, before the parameters move.
+#[derive(Clone, Debug)]
+pub struct Probe {
+    /// The loss terms.
+    pub losses: Losses,
+    /// Rendered colour, `[R · 3]`.
+    pub color: Vec<f32>,
+    /// Gradient of the total loss by parameter name.
+    pub gradients: BTreeMap<String, TensorData>,
+}
+
+impl Trainer {
+    /// Networks at their start and the scene prepared.
+    ///
+    /// # Errors
+    /// If the configuration contradicts itself or the scene has no usable pixel.
+    pub fn new(
+        scene: &Scene,
+        config: &Config,
+        seed: u64,
+        device: &Device,
+    ) -> Result<Self, TrainError> {
+        validate(config)?;
+        let data = TrainingData::new(scene, config);
+        if data.region_pixels() == 0 {
+            return Err(TrainError::NoRegionPixel(config.data.attraction_distance));
+        }
+        let scene_radius = scene_radius(scene, config);
+        let device = device.clone().autodiff();
+        let model = NeatModel::new(&config.model, scene_radius, seed, &device);
+        let initial_radius = config.model.implicit.initial_sphere * scene_radius;
+        Ok(Self {
+            data,
+            adam: Adam::new(config.train.adam),
+            sampler: config.train.sampler.init(scene_radius, initial_radius),
+            beta: config.model.density.initial_beta,
+            config: config.clone(),
+            seed,
+            device,
+            scene_radius,
+            model,
+            iteration: 0,
+        })
+    }
+
+    /// Goes on from a checkpoint of the same scene, configuration and seed.
+    ///
+    /// # Errors
+    /// As [`Self::new`], and if the checkpoint does not fit.
+    pub fn resume(
+        scene: &Scene,
+        config: &Config,
+        seed: u64,
+        device: &Device,
+        checkpoint: Checkpoint,
+    ) -> Result<Self, TrainError> {
+        let mut trainer = Self::new(scene, config, seed, device)?;
+        trainer.iteration = metadata(&checkpoint, "iteration")?;
+        trainer.beta = metadata(&checkpoint, "beta")?;
+        let mut parameters = BTreeMap::new();
+        let mut moments: BTreeMap<String, [Option<TensorData>; 2]> = BTreeMap::new();
+        for (name, data) in checkpoint.tensors {
+            if let Some(name) = name.strip_prefix("model.") {
+                parameters.insert(name.to_owned(), data);
+            } else if let Some(name) = name.strip_prefix("adam.first.") {
+                moments.entry(name.to_owned()).or_default()[0] = Some(data);
+            } else if let Some(name) = name.strip_prefix("adam.second.") {
+                moments.entry(name.to_owned()).or_default()[1] = Some(data);
+            } else if name == "sampler.grid" {
+                let values = data.convert::<f32>().try_into_vec_as::<f32>();
+                if !values.is_ok_and(|values| trainer.sampler.restore(values)) {
+                    return Err(TrainError::Checkpoint(name));
+                }
+            }
+        }
+        let mut state = BTreeMap::new();
+        for (name, pair) in moments {
+            match pair {
+                [Some(first), Some(second)] => state.insert(name, [first, second]),
+                _ => return Err(TrainError::Checkpoint(format!("adam.second.{name}"))),
+            };
+        }
+        trainer.model = load_parameters(trainer.model, parameters, None)?;
+        trainer.adam = Adam::restore(config.train.adam, trainer.iteration, state);
+        Ok(trainer)
+    }
+
+    /// Iterations done.
+    pub fn iteration(&self) -> u64 {
+        self.iteration
+    }
+
+    /// One iteration. `schedule` is the share of the run that is done, in [0, 1]:
+    /// the learning rate and an annealed β follow it.
+    ///
+    /// # Errors
+    /// If the loss is no number; the parameters are then as before.
+    pub fn step(&mut self, schedule: f64) -> Result<StepReport, TrainError> {
+        let loss = self.loss(schedule)?;
+        let losses = loss.losses();
+        if !losses.total.is_finite() {
+            return Err(TrainError::NonFinite {
+                iteration: self.iteration + 1,
+                value: losses.total,
+            });
+        }
+        let mut gradients = GradientsParams::from_grads(loss.total.backward(), &self.model);
+        let train = &self.config.train;
+        let factor = learning_rate_factor(train, self.iteration, schedule);
+        let networks = train.learning_rate * factor;
+        let junctions = train.junction_learning_rate * factor;
+        let rate = |name: &str| match name.starts_with("perceiver.") {
+            true => junctions,
+            false => networks,
+        };
+        let model = self.model.clone();
+        self.model = self.adam.step(model, &mut gradients, rate);
+        self.iteration += 1;
+        Ok(StepReport {
+            iteration: self.iteration,
+            losses,
+            segment_error_in_pixels: median(loss.segment_errors),
+            rendered_samples: loss.rendered_samples,
+            targets: loss.targets,
+            learning_rate: networks,
+            beta: self.beta,
+        })
+    }
+
+    /// Loss, outputs and gradients of the next iteration, without moving the
+    /// parameters: to compare backends.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn probe(&mut self, schedule: f64) -> Result<Probe, TrainError> {
+        let loss = self.loss(schedule)?;
+        let losses = loss.losses();
+        let color = host_vec(loss.color.clone());
+        let mut gradients = GradientsParams::from_grads(loss.total.backward(), &self.model);
+        Ok(Probe {
+            losses,
+            color,
+            gradients: neat_tensor::parameters::named_gradients(&self.model, &mut gradients),
+        })
+    }
+
+    fn loss(&mut self, schedule: f64) -> Result<StepLoss, TrainError> {
+        let density = &self.config.model.density;
+        let beta = match density.schedule {
+            BetaSchedule::Learned => self.model.density.beta(),
+            BetaSchedule::Annealed => {
+                Tensor::from_data([density.annealed_beta(schedule) as f32], &self.device)
+            }
+        };
+        self.beta = f64::from(host_vec(beta.clone())[0]);
+        let batch = self.data.batch(&self.config, self.seed, self.iteration);
+        let samples = self.sample(&batch);
+        let train = &self.config.train;
+        let eikonal_points = self.eikonal_points(&batch, &samples);
+        let views: Vec<JunctionView<'_>> = self
+            .data
+            .views
+            .iter()
+            .map(|view| JunctionView {
+                camera: &view.camera,
+                junctions_in_image: &view.junctions,
+            })
+            .collect();
+        let input = StepInput {
+            batch: &batch,
+            samples: &samples,
+            eikonal_points: &eikonal_points,
+            views: &views,
+            junctions_due: self.iteration.is_multiple_of(train.junction_interval.max(1)),
+        };
+        step_loss(&self.model, &input, beta, train, &self.device).map_err(|source| {
+            TrainError::Assignment {
+                iteration: self.iteration + 1,
+                source,
+            }
+        })
+    }
+
+    fn sample(&mut self, batch: &Batch) -> RaySamples {
+        let network = self.model.implicit_network.valid();
+        let device = self.device.clone().inner();
+        let mut query =
+            |points: &[[f32; 3]]| host_vec(network.sdf(point_tensor(points, &device)));
+        self.sampler.refresh(self.iteration, &mut query);
+        let mut noise = Seeded(stream(self.seed, Purpose::Samples, self.iteration));
+        self.sampler
+            .sample(&batch.rays, self.beta as f32, &mut query, &mut noise)
+    }
+
+    /// The points of the eikonal term besides rendered samples.
+    fn eikonal_points(&self, batch: &Batch, samples: &RaySamples) -> Vec<[f32; 3]> {
+        let config = &self.config.train.eikonal;
+        let mut rng = stream(self.seed, Purpose::Eikonal, self.iteration);
+        let radius = self.scene_radius as f32;
+        let count = config.uniform_points.unwrap_or(batch.rays.len());
+        let mut points: Vec<[f32; 3]> = (0..count)
+            .map(|_| std::array::from_fn(|_| (rng.random::<f32>() * 2.0 - 1.0) * radius))
+            .collect();
+        if config.one_sample_per_ray {
+            points.extend((0..batch.rays.len()).map(|ray| {
+                let sample = rng.random_range(0..samples.per_ray);
+                batch.rays.point(ray, samples.z[ray * samples.per_ray + sample])
+            }));
+        }
+        points
+    }
+
+    /// Everything that [`Self::resume`] needs.
+    pub fn checkpoint(&self) -> Checkpoint {
+        let mut checkpoint = Checkpoint::default();
+        for (name, data) in named_parameters(&self.model) {
+            checkpoint.tensors.insert(format!("model.{name}"), data);
+        }
+        for (name, [first, second]) in self.adam.state() {
+            checkpoint
+                .tensors
+                .insert(format!("adam.first.{name}"), first);
+            checkpoint
+                .tensors
+                .insert(format!("adam.second.{name}"), second);
+        }
+        if let Some(grid) = self.sampler.state() {
+            let len = grid.len();
+            checkpoint.tensors.insert(
+                "sampler.grid".to_owned(),
+                TensorData::new(grid.to_vec(), [len]),
+            );
+        }
+        let metadata = [
+            ("iteration", self.iteration.to_string()),
+            ("seed", self.seed.to_string()),
+            ("scene_radius", self.scene_radius.to_string()),
+            ("beta", self.beta.to_string()),
+        ];
+        checkpoint
+            .metadata
+            .extend(metadata.map(|(key, value)| (key.to_owned(), value)));
+        checkpoint
+    }
+
+    /// The field as it is now, for rendering and distillation.
+    pub fn field(&self) -> TrainedField {
+        TrainedField::new(
+            self.model.valid(),
+            self.sampler.clone(),
+            self.beta as f32,
+            self.scene_radius,
+            self.config.train.min_sample_weight,
+            self.device.clone().inner(),
+        )
+    }
+}
+
+/// Radius of the modelled ball: as configured, or what all cameras see.
+fn scene_radius(scene: &Scene, config: &Config) -> f64 {
+    config
+        .data
+        .scene_radius
+        .unwrap_or_else(|| scene.bounding_ball_radius())
+}
+
+pub(crate) fn metadata<T: std::str::FromStr>(
+    checkpoint: &Checkpoint,
+    key: &str,
+) -> Result<T, TrainError> {
+    checkpoint
+        .metadata
+        .get(key)
+        .and_then(|value| value.parse().ok())
+        .ok_or_else(|| TrainError::Checkpoint(key.to_owned()))
+}
+
+/// Warm-up times exponential decay.
+fn learning_rate_factor(train: &TrainConfig, iteration: u64, schedule: f64) -> f64 {
+    let warm_up = match train.warm_up_steps {
+        0 => 1.0,
+        steps => ((iteration + 1) as f64 / steps as f64).min(1.0),
+    };
+    warm_up * train.learning_rate_decay.powf(schedule)
+}
+
+fn median(mut values: Vec<f32>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    values.sort_unstable_by(f32::total_cmp);
+    f64::from(values[values.len() / 2])
+}
+
+/// Refuses configurations that would fail or silently ignore something.
+fn validate(config: &Config) -> Result<(), TrainError> {
+    let refuse = |reason: &str| Err(TrainError::Config(reason.to_owned()));
+    let (implicit, train) = (&config.model.implicit, &config.train);
+    let encoded = 3 * (1 + 2 * implicit.octaves);
+    if implicit.hidden_layers == 0 || implicit.width == 0 {
+        return refuse("model.implicit needs at least one hidden layer and a width above 0");
+    }
+    if implicit.skip_layer > 0 {
+        if implicit.skip_layer >= implicit.hidden_layers {
+            return refuse("model.implicit.skip_layer must come before the last hidden layer");
+        }
+        if implicit.width <= encoded {
+            return refuse(
+                "model.implicit.width must exceed the width of the encoding, 3 + 6 octaves, where a skip layer is used",
+            );
+        }
+    }
+    if implicit.octaves > 24 || config.model.attraction.octaves > 24 {
+        return refuse("more than 24 octaves exceed what float32 resolves");
+    }
+    if train.rays == 0 || !(0.0..1.0).contains(&train.background_share) {
+        return refuse("train.rays must be positive and train.background_share in [0, 1)");
+    }
+    if train.steps == 0 {
+        return refuse("train.steps must be positive");
+    }
+    if config.model.perceiver.junctions == 0 || config.model.perceiver.width == 0 {
+        return refuse("model.perceiver needs junctions and a width");
+    }
+    let positive = |x: f64| x.is_finite() && x > 0.0;
+    let density = &config.model.density;
+    if !positive(density.initial_beta) || !positive(density.final_beta) {
+        return refuse("model.density.initial_beta and final_beta must be positive");
+    }
+    if config.data.scene_radius.is_some_and(|r| !positive(r)) {
+        return refuse("data.scene_radius must be positive");
+    }
+    if !positive(train.learning_rate) || !positive(train.learning_rate_decay) {
+        return refuse("train.learning_rate and learning_rate_decay must be positive");
+    }
+    if train.views == crate::config::BatchViews::All
+        && (train.loss.junction_2d > 0.0 || train.matching.weight_2d > 0.0)
+    {
+        return refuse(
+            "train.loss.junction_2d and train.matching.weight_2d need train.views = \"one\": a junction from many views has no single image",
+        );
+    }
+    Ok(())
+}
