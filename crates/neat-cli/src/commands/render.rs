@@ -7,7 +7,7 @@ use crate::progress::Progress;
 use clap::Args;
 use neat_core::{View, file};
 use neat_pipeline::image_io::{
-    color_image, depth_image, downscaled, normal_image, psnr, write_png,
+    color_image, depth_image, every_nth_pixel, normal_image, psnr, write_png,
 };
 use neat_pipeline::reconstruct::{OpenedRun, open_run};
 use neat_pipeline::render::render_view;
@@ -29,7 +29,7 @@ pub struct RenderArgs {
     /// Name of a view, or `all`; may be repeated; the first view by default
     #[arg(long, value_name = "NAME")]
     view: Vec<String>,
-    /// Render at 1/N of the photographs' width and height
+    /// Render every N-th pixel along both axes
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     downscale: u32,
     /// Folder for the images instead of RUN/renders
@@ -93,7 +93,10 @@ fn render(
     for (kind, image) in images {
         write_png(&out.join(format!("{}-{kind}.png", view.name)), &image)?;
     }
-    Ok(psnr(&rendered.color, &downscaled(&view.image, downscale)))
+    Ok(psnr(
+        &rendered.color,
+        &every_nth_pixel(&view.image, downscale),
+    ))
 }
 
 /// The views of these names, in the order of the scene.
