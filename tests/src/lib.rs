@@ -1,1 +1,13 @@
-//! Tests that cross crates.
+//! What the tests that cross crates share: golden numbers, backends, named
+//! gradients and comparisons.
+
+#![allow(clippy::missing_panics_doc, reason = "tests fail by panicking")]
+
+pub mod backends;
+pub mod comparison;
+pub mod finite_differences;
+#[path = "../data/golden/reader.rs"]
+pub mod golden;
+pub mod named_gradients;
+pub mod published_names;
+pub mod tensors;

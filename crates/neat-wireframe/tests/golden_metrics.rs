@@ -2,7 +2,7 @@
 
 mod golden;
 
-use golden::Golden;
+use golden::{Geometry, Golden};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use neat_wireframe::Wireframe3d;
@@ -32,10 +32,10 @@ struct Case {
 
 impl Case {
     fn read() -> Self {
-        let golden = Golden::read("12_metrics.safetensors");
+        let golden = Golden::open("12_metrics");
         let truth = Wireframe3d {
             junctions: golden.points("gt_junctions"),
-            edges: golden.index_pairs("gt_lines"),
+            edges: golden.index_rows("gt_lines"),
         };
         Self { golden, truth }
     }

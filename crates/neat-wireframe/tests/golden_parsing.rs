@@ -6,7 +6,7 @@
 
 mod golden;
 
-use golden::{Golden, repository};
+use golden::{Geometry, Golden, repository};
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{Camera, Intrinsics, LineSegment3, hawp_json};
 use neat_wireframe::attraction::{AttractionConfig, attract, attracted_ends};
@@ -22,7 +22,7 @@ use std::path::PathBuf;
 const POSITION_TOLERANCE: f64 = 2e-6;
 
 fn golden() -> Golden {
-    Golden::read("11_final_parsing.safetensors")
+    Golden::open("11_final_parsing")
 }
 
 /// The largest difference of two lists of segments, end by end.
@@ -92,7 +92,7 @@ fn case_a_attraction() {
     assert_eq!(matched, golden.indices("a/is_matched"));
 
     let edges = attract(&lines, &junctions, &PUBLISHED_ATTRACTION);
-    assert_eq!(edges, golden.index_pairs("a/edges"));
+    assert_eq!(edges, golden.index_rows("a/edges"));
     assert_eq!(
         edges,
         edges_of_graph(&golden.numbers("a/graph"), junctions.len())
@@ -274,7 +274,7 @@ fn case_c_neat_lines() {
         .zip(&case.queried)
         .flat_map(|(lines, view)| lines.iter().map(|line| [*view, line.segment_in_view]))
         .collect();
-    assert_eq!(origin, case.golden.index_pairs("c/raw_view_and_segment"));
+    assert_eq!(origin, case.golden.index_rows("c/raw_view_and_segment"));
     let rays: Vec<usize> = published.iter().map(|line| line.rays).collect();
     assert_eq!(rays, case.golden.indices("c/raw_support"));
 
