@@ -25,17 +25,21 @@ pub fn color_image(width: u32, height: u32, colors: &[[f32; 3]]) -> RgbImage {
     image_of(width, height, |i| colors[i])
 }
 
-/// Depths, row by row, as grey levels: white is the nearest one, and black the
-/// farthest or none (depths that are not positive and finite).
+/// Depths, row by row, as grey levels: white is near, and black is far or none
+/// (depths that are not positive and finite).
+///
+/// The range leaves out the nearest tenth: rays that graze the object have some
+/// weight only, and with it a depth far in front of it.
 pub fn depth_image(width: u32, height: u32, depths: &[f32]) -> RgbImage {
+    const GRAZING_SHARE: f64 = 0.1;
     let is_depth = |depth: &f32| *depth > 0.0 && depth.is_finite();
-    let (near, far) = depths
-        .iter()
-        .copied()
-        .filter(is_depth)
-        .fold((f32::INFINITY, 0.0_f32), |(near, far), depth| {
-            (near.min(depth), far.max(depth))
-        });
+    let mut sorted: Vec<f32> = depths.iter().copied().filter(is_depth).collect();
+    sorted.sort_by(f32::total_cmp);
+    let grazing = (GRAZING_SHARE * sorted.len() as f64) as usize;
+    let (near, far) = match (sorted.get(grazing), sorted.last()) {
+        (Some(near), Some(far)) => (*near, *far),
+        _ => (0.0, 0.0),
+    };
     // All at one depth: all white.
     let range = if far > near {
         far - near

@@ -12,8 +12,8 @@ use neat_core::{Camera, LineSegment2, LineSegment3, View, Wireframe3d};
 
 /// Line width relative to the larger side of the image.
 const WIDTH_PER_SIZE: f64 = 1.0 / 400.0;
-const SEGMENT_COLOR: [u8; 3] = [255, 64, 32];
-const JUNCTION_COLOR: [u8; 3] = [32, 200, 255];
+const SEGMENT_COLOR: [f64; 3] = [255.0, 64.0, 32.0];
+const JUNCTION_COLOR: [f64; 3] = [32.0, 200.0, 255.0];
 
 /// The photograph of a view with the wireframe on it, hidden parts too. The
 /// wireframe is in the world frame of the cameras; what is behind the camera is
@@ -34,7 +34,7 @@ pub fn draw_overlay(view: &View, pixel_center: f64, wireframe: &Wireframe3d) -> 
     };
     for segment in wireframe.segments() {
         if let Some(segment) = visible_part(&segment, &view.camera, pixel_center) {
-            draw_segment(&mut image, &segment, &line);
+            draw_segment(&mut image, &segment, &[line; 2]);
         }
     }
     for junction in &wireframe.junctions {
@@ -126,7 +126,7 @@ mod tests {
             assert!(
                 [SEGMENT_COLOR, JUNCTION_COLOR]
                     .iter()
-                    .any(|c| (0..3).all(|i| c[i].abs_diff(pixel.0[i]) < 80)),
+                    .any(|c| (0..3).all(|i| (c[i] - f64::from(pixel.0[i])).abs() < 80.0)),
                 "{pixel:?}"
             );
         }

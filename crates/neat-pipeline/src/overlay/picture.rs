@@ -13,12 +13,16 @@ const SIZE: u32 = 1200;
 const DISTANCE: f64 = 4.0;
 /// The object fills so much of the picture's half width.
 const FILLED: f64 = 0.88;
-/// Lines are drawn in so many pieces, each in the colour of its depth.
-const PIECES: usize = 24;
-const NEAR_COLOR: [f64; 3] = [18.0, 44.0, 92.0];
-const FAR_COLOR: [f64; 3] = [172.0, 188.0, 212.0];
+const NEAR: Pen = Pen {
+    color: [18.0, 44.0, 92.0],
+    radius: 2.5,
+};
+const FAR: Pen = Pen {
+    color: [172.0, 188.0, 212.0],
+    radius: 1.5,
+};
 const JUNCTION: Pen = Pen {
-    color: [224, 72, 32],
+    color: [224.0, 72.0, 32.0],
     radius: 6.0,
 };
 
@@ -39,39 +43,22 @@ pub fn draw_wireframe(wireframe: &Wireframe3d, scene: &Scene) -> RgbImage {
     let camera = camera_at(&orientation, &center, radius);
 
     let depth = |point: &Vector3<f64>| camera.to_camera(point).z;
-    let mut pieces: Vec<_> = wireframe
-        .segments()
-        .iter()
-        .flat_map(|segment| {
-            (0..PIECES).map(|i| {
-                let [a, b] = [i, i + 1].map(|i| segment.point_at(i as f64 / PIECES as f64));
-                neat_core::LineSegment3::new(a, b)
-            })
-        })
-        .collect();
+    let pen = |point: &Vector3<f64>| {
+        let nearness = (DISTANCE + 1.0 - depth(point) / radius) / 2.0;
+        FAR.mix(&NEAR, nearness.clamp(0.0, 1.0))
+    };
+    let mut segments = wireframe.segments();
     // Near lines go over far ones.
-    pieces.sort_by(|a, b| depth(&b.point_at(0.5)).total_cmp(&depth(&a.point_at(0.5))));
-    for piece in &pieces {
-        let nearness = (DISTANCE + 1.0 - depth(&piece.point_at(0.5)) / radius) / 2.0;
-        let pen = line_pen(nearness.clamp(0.0, 1.0));
-        if let Some(segment) = visible_part(piece, &camera, 0.0) {
-            draw_segment(&mut picture, &segment, &pen);
+    segments.sort_by(|a, b| depth(&b.point_at(0.5)).total_cmp(&depth(&a.point_at(0.5))));
+    for segment in &segments {
+        if let Some(visible) = visible_part(segment, &camera, 0.0) {
+            draw_segment(&mut picture, &visible, &segment.ends().map(|end| pen(&end)));
         }
     }
     for junction in &wireframe.junctions {
         draw_disc(&mut picture, &camera.project(junction).pixel, &JUNCTION);
     }
     picture
-}
-
-fn line_pen(nearness: f64) -> Pen {
-    let color = std::array::from_fn(|i| {
-        (FAR_COLOR[i] + (NEAR_COLOR[i] - FAR_COLOR[i]) * nearness).round() as u8
-    });
-    Pen {
-        color,
-        radius: 1.5 + nearness,
-    }
 }
 
 /// Centre and radius of a ball around all junctions; `None` without any.
@@ -165,6 +152,7 @@ mod tests {
             edges: Vec::new(),
         };
         let picture = draw_wireframe(&lonely, &scene);
-        assert_eq!(picture.get_pixel(SIZE / 2, SIZE / 2).0, JUNCTION.color);
+        let color = picture.get_pixel(SIZE / 2, SIZE / 2).0.map(f64::from);
+        assert_eq!(color, JUNCTION.color);
     }
 }
