@@ -265,7 +265,7 @@ impl Trainer {
             samples: &samples,
             eikonal_points: &eikonal_points,
             views: &views,
-            junctions_due: self.iteration.is_multiple_of(train.junction_interval.max(1)),
+            junctions_due: (self.iteration + 1).is_multiple_of(train.junction_interval.max(1)),
         };
         step_loss(&self.model, &input, beta, train, &self.device).map_err(|source| {
             TrainError::Assignment {
