@@ -63,13 +63,14 @@ pub fn segment_loss(
         calibrated_difference_in_pixels(fixed - target.clone(), cameras)
             .abs()
             .mean_dim(1);
-    let mut counted = error_in_pixels
+    let mut counts = error_in_pixels
         .clone()
-        .lower_elem(config.cutoff_in_pixels)
-        .float();
+        .lower_elem(config.cutoff_in_pixels);
     if let Some(min_opacity) = config.min_opacity {
-        counted = counted * opacity.detach().greater_elem(min_opacity).float();
+        counts = counts.bool_and(opacity.detach().greater_elem(min_opacity));
     }
+    // Filled, not converted: a conversion would forget the precision.
+    let counted = error_in_pixels.zeros_like().mask_fill(counts, 1.0);
     let denominator = if config.mean_over_all_rays {
         Tensor::full_like(&counted.clone().sum(), rays as f64)
     } else {

@@ -33,8 +33,10 @@ fn project_point(point: Tensor<2>, cameras: &RayCameras) -> Tensor<2> {
     let z = coordinate(2);
     // Pushed off zero on its own side, as the published projection does.
     let too_near = z.clone().abs().lower_elem(MIN_DEPTH);
-    let side = z.clone().greater_equal_elem(0.0).float().mul_scalar(2.0) - 1.0;
-    let guarded = z.clone() + side.mul_scalar(MIN_DEPTH);
+    let guard = z
+        .full_like(MIN_DEPTH)
+        .mask_fill(z.clone().lower_elem(0.0), -MIN_DEPTH);
+    let guarded = z.clone() + guard;
     let z = z.mask_where(too_near, guarded);
     Tensor::cat(vec![coordinate(0), coordinate(1)], 1) / z
 }
