@@ -25,18 +25,21 @@ pub fn color_image(width: u32, height: u32, colors: &[[f32; 3]]) -> RgbImage {
     image_of(width, height, |i| colors[i])
 }
 
-/// Depths, row by row, as grey levels: white is near, and black is far or none
-/// (depths that are not positive and finite).
+/// Depths, row by row, as grey levels: white is near, and black is far or none.
 ///
-/// The range leaves out the nearest tenth: rays that graze the object have some
-/// weight only, and with it a depth far in front of it.
+/// Depths that are not finite, or less than half of the median of the positive
+/// ones, are none: a ray that only grazes something has little weight, and with
+/// it a depth in front of everything. For the same reason the nearest tenth does
+/// not count for the range.
 pub fn depth_image(width: u32, height: u32, depths: &[f32]) -> RgbImage {
-    const GRAZING_SHARE: f64 = 0.1;
-    let is_depth = |depth: &f32| *depth > 0.0 && depth.is_finite();
-    let mut sorted: Vec<f32> = depths.iter().copied().filter(is_depth).collect();
+    let is_positive = |depth: &f32| *depth > 0.0 && depth.is_finite();
+    let mut sorted: Vec<f32> = depths.iter().copied().filter(is_positive).collect();
     sorted.sort_by(f32::total_cmp);
-    let grazing = (GRAZING_SHARE * sorted.len() as f64) as usize;
-    let (near, far) = match (sorted.get(grazing), sorted.last()) {
+    let least = sorted
+        .get(sorted.len() / 2)
+        .map_or(0.0, |median| median / 2.0);
+    sorted.retain(|depth| *depth >= least);
+    let (near, far) = match (sorted.get(sorted.len() / 10), sorted.last()) {
         (Some(near), Some(far)) => (*near, *far),
         _ => (0.0, 0.0),
     };
@@ -47,8 +50,12 @@ pub fn depth_image(width: u32, height: u32, depths: &[f32]) -> RgbImage {
         f32::INFINITY
     };
     image_of(width, height, |i| {
-        let level = 1.0 - (depths[i] - near) / range;
-        [if is_depth(&depths[i]) { level } else { 0.0 }; 3]
+        let depth = depths[i];
+        [if is_positive(&depth) && depth >= least {
+            1.0 - (depth - near) / range
+        } else {
+            0.0
+        }; 3]
     })
 }
 
@@ -116,12 +123,14 @@ mod tests {
 
     #[test]
     fn depths_are_bright_where_near() {
-        let depths = [1.0, 2.0, 3.0, 0.0, f32::INFINITY, f32::NAN];
-        let image = depth_image(3, 2, &depths);
+        let depths = [2.0, 3.0, 4.0, 0.0, f32::INFINITY, f32::NAN, 0.5, -1.0];
+        let image = depth_image(4, 2, &depths);
         let levels: Vec<u8> = image.pixels().map(|p| p.0[0]).collect();
-        assert_eq!(levels, [255, 128, 0, 0, 0, 0]);
+        assert_eq!(levels, [255, 128, 0, 0, 0, 0, 0, 0]);
         let flat = depth_image(2, 1, &[2.0, 2.0]);
         assert!(flat.pixels().all(|p| p.0 == [255; 3]));
+        let nothing = depth_image(2, 1, &[0.0, f32::NAN]);
+        assert!(nothing.pixels().all(|p| p.0 == [0; 3]));
     }
 
     #[test]

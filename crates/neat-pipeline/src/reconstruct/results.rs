@@ -92,6 +92,8 @@ impl Session<'_> {
             ("backend", json!(self.manifest.backend)),
             ("seed", json!(self.manifest.seed)),
             ("steps", json!(self.manifest.steps)),
+            // `neat distill` may have chosen others than those of config.toml.
+            ("distill", json!(self.config.distill)),
             ("report", distilled.report.clone()),
         ]
         .map(|(key, value)| (key.to_owned(), value))
