@@ -13,10 +13,7 @@ fn main() {
         .and_then(|output| String::from_utf8(output.stdout).ok());
     let version = version.as_deref().map_or("unknown", str::trim);
     let target = env::var("TARGET").unwrap_or_else(|_| "unknown".to_owned());
-    #[expect(clippy::print_stdout, reason = "this is how to talk to cargo")]
-    {
-        println!("cargo::rerun-if-changed=build.rs");
-        println!("cargo::rustc-env=NEAT_RUSTC={version}");
-        println!("cargo::rustc-env=NEAT_TARGET={target}");
-    }
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-env=NEAT_RUSTC={version}");
+    println!("cargo::rustc-env=NEAT_TARGET={target}");
 }
