@@ -1,8 +1,6 @@
 //! What the tests that cross crates share: golden numbers, backends, named
 //! gradients and comparisons.
 
-#![allow(clippy::missing_panics_doc, reason = "tests fail by panicking")]
-
 pub mod backends;
 pub mod comparison;
 pub mod finite_differences;

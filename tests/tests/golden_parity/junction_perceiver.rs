@@ -1,8 +1,8 @@
 //! Case 07: junctions from latents, and the losses of matched junctions.
 
+use crate::segment_projection::{camera, same_camera};
 use burn::tensor::{Device, Tensor};
-use nalgebra::{Matrix3, Matrix4};
-use neat_core::{Camera, Intrinsics};
+use neat_core::Camera;
 use neat_field::segment_rendering::project_calibrated;
 use neat_gjp::PerceiverConfig;
 use neat_gjp::junction_loss::{MatchedJunctions, junction_loss};
@@ -14,8 +14,6 @@ use neat_tests::golden::Golden;
 use neat_tests::named_gradients::{assert_gradients_close, named_gradients};
 use neat_tests::published_names::{gradients, parameters};
 use neat_tests::tensors::numbers;
-
-use crate::segment_projection::same_camera;
 
 const TOLERANCE: f64 = 1e-5;
 
@@ -82,12 +80,7 @@ fn check(golden: &Golden, camera: &Camera, problem: &str, device: &Device) {
 #[test]
 fn junctions_and_the_losses_of_matched_ones() {
     let golden = Golden::open("07_gjp_assignment");
-    let camera = Camera::from_matrices(
-        Intrinsics::from_matrix(&Matrix3::from_row_slice(&golden.numbers("K"))),
-        &Matrix4::from_row_slice(&golden.numbers("pose_c2w")),
-        512,
-        512,
-    );
+    let camera = camera(&golden, "K", "pose_c2w");
     on_each_cpu_backend(|device| {
         for problem in ["p20x64", "p64x64", "p90x64"] {
             check(&golden, &camera, problem, &device);

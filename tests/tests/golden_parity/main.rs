@@ -9,4 +9,5 @@ mod implicit_network;
 mod junction_perceiver;
 mod ray_networks;
 mod segment_projection;
+mod training_step;
 mod volume_rendering;

@@ -19,17 +19,19 @@ pub fn same_camera(camera: &Camera, rays: usize, device: &Device) -> RayCameras 
     };
     let Intrinsics { fx, fy, skew, .. } = camera.intrinsics;
     RayCameras {
-        // nalgebra iterates by columns: those of the transpose's transpose.
+        // Columns of world_from_camera, as nalgebra stores them, are rows of
+        // camera_from_world.
         camera_from_world: repeated(camera.world_from_camera.iter().copied().collect()),
         center: repeated(camera.center_in_world.iter().copied().collect()),
         focal: repeated(vec![fx, fy, skew]),
     }
 }
 
-fn camera(golden: &Golden, intrinsics: &str) -> Camera {
+/// A camera of 512 × 512 pixels from the matrices of these names.
+pub fn camera(golden: &Golden, intrinsics: &str, world_from_camera: &str) -> Camera {
     Camera::from_matrices(
         Intrinsics::from_matrix(&Matrix3::from_row_slice(&golden.numbers(intrinsics))),
-        &Matrix4::from_row_slice(&golden.numbers("pose_c2w")),
+        &Matrix4::from_row_slice(&golden.numbers(world_from_camera)),
         512,
         512,
     )
@@ -40,7 +42,7 @@ fn points_before_and_behind_the_camera() {
     let golden = Golden::open("10_rays_projection");
     let truth = golden.rows::<2>("f64.calibrated");
     let points = golden.rows::<3>("world_points");
-    let camera = camera(&golden, "K");
+    let camera = camera(&golden, "K", "pose_c2w");
     let by_camera: Vec<f64> = points
         .iter()
         .flat_map(|&p| camera.project(&Vector3::from(p)).calibrated.data.0[0])
@@ -88,7 +90,7 @@ fn points_at_the_camera_plane_are_pushed_off_it() {
 #[test]
 fn differences_become_pixels_by_focal_length_and_skew() {
     let golden = Golden::open("10_rays_projection");
-    let camera = camera(&golden, "skewed_K");
+    let camera = camera(&golden, "skewed_K", "pose_c2w");
     let differences = [[0.1, -0.2, 0.03, 0.04], [-0.5, 0.25, 0.0, 1.0]];
     let origin = camera.intrinsics.decalibrate(&Vector2::zeros());
     let expected: Vec<f64> = differences
