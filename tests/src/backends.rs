@@ -8,6 +8,9 @@ use neat_tensor::Backend;
 /// in and have a device are tested.
 const BACKENDS: &str = "NEAT_TEST_BACKENDS";
 
+/// See [`slack`].
+const GPU_SLACK: f64 = 1000.0;
+
 /// Runs `test` on a device with autodiff of every backend.
 pub fn on_each_backend(test: impl Fn(Device)) {
     on_each_of(&Backend::built(), test);
@@ -22,6 +25,16 @@ pub fn on_each_cpu_backend(test: impl Fn(Device)) {
 /// The one device in float64 that gradients are checked on: flex, with autodiff.
 pub fn flex() -> Device {
     Device::flex().autodiff()
+}
+
+/// How much wider tolerances are on `device`. A GPU rounds like a CPU, but Vulkan
+/// grants the sine of the encoding an error of 2⁻¹¹ where PyTorch's is below 2⁻²³.
+pub fn slack(device: &Device) -> f64 {
+    if device.identity().is_some() {
+        GPU_SLACK
+    } else {
+        1.0
+    }
 }
 
 #[expect(clippy::print_stderr, reason = "a skipped test must be seen")]

@@ -77,7 +77,7 @@ impl CliError {
             output::error(&self.chain());
         }
         if let Self::Pipeline(PipelineError::Interrupted { .. }) = self {
-            output::error_hint("continue with `neat reconstruct SCENE --out RUN --resume`");
+            output::error_hint("give the same command with --resume to continue");
         }
         code.into()
     }

@@ -44,7 +44,7 @@ struct HawpJson {
 }
 
 /// What to do about a missing wireframe.
-pub(crate) const REMEDY: &str = "run a wireframe detector (HAWP, or `neat detect`) on the images \
+pub(crate) const REMEDY: &str = "run a wireframe detector (HAWP) on the images \
      and keep one JSON file per image in the folder `hawp`";
 
 /// Reads a HAWP file and shifts its vertices by `pixel_center` to image

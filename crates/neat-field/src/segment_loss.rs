@@ -59,13 +59,10 @@ pub fn segment_loss(
     let keep = squared(&observed).lower(squared(&swapped));
     let target = swapped.mask_where(keep.expand([rays, 4]), observed);
 
-    let error_in_pixels =
-        calibrated_difference_in_pixels(fixed - target.clone(), cameras)
-            .abs()
-            .mean_dim(1);
-    let mut counts = error_in_pixels
-        .clone()
-        .lower_elem(config.cutoff_in_pixels);
+    let error_in_pixels = calibrated_difference_in_pixels(fixed - target.clone(), cameras)
+        .abs()
+        .mean_dim(1);
+    let mut counts = error_in_pixels.clone().lower_elem(config.cutoff_in_pixels);
     if let Some(min_opacity) = config.min_opacity {
         counts = counts.bool_and(opacity.detach().greater_elem(min_opacity));
     }

@@ -1,5 +1,4 @@
-//! What rendered segments look like in the image, and where they touch the
-//! surface.
+//! What rendered segments look like in the image.
 
 use burn::tensor::Tensor;
 
@@ -51,10 +50,7 @@ pub fn calibrated_difference_in_pixels(difference: Tensor<2>, cameras: &RayCamer
     );
     let end = |i: usize| {
         let (dx, dy) = (column(&difference, i), column(&difference, i + 1));
-        vec![
-            fx.clone() * dx + skew.clone() * dy.clone(),
-            fy.clone() * dy,
-        ]
+        vec![fx.clone() * dx + skew.clone() * dy.clone(), fy.clone() * dy]
     };
     Tensor::cat([end(0), end(2)].concat(), 1)
 }

@@ -40,8 +40,14 @@ fn main() {
     };
     let scene = generate(&config).expect("the default scene").scene;
 
-    println!("backend {backend}, {} threads", rayon::current_num_threads());
-    println!("yardstick: {:.1} GFLOP/s (SGEMM, {SIDE}³)", sgemm_gflops(&device));
+    println!(
+        "backend {backend}, {} threads",
+        rayon::current_num_threads()
+    );
+    println!(
+        "yardstick: {:.1} GFLOP/s (SGEMM, {SIDE}³)",
+        sgemm_gflops(&device)
+    );
     for preset in presets {
         let config = preset.config();
         let mut trainer = Trainer::new(&scene, &config, 0, &device).expect("a preset trains");

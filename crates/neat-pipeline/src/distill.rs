@@ -92,9 +92,8 @@ fn thin_query(
             by_segment
                 .into_iter()
                 .flat_map(|mut entries| {
-                    entries.sort_by(|a, b| {
-                        regions.parameters[*a].total_cmp(&regions.parameters[*b])
-                    });
+                    entries
+                        .sort_by(|a, b| regions.parameters[*a].total_cmp(&regions.parameters[*b]));
                     spread(&entries, wanted)
                 })
                 .collect()
@@ -224,9 +223,12 @@ pub fn propose_segments(
                 weight: ray.opacity,
             });
         }
-        proposals.extend(of_segment.iter().enumerate().filter_map(|(segment, rays)| {
-            robust_segment(views, view, segment, rays, &robust)
-        }));
+        proposals.extend(
+            of_segment
+                .iter()
+                .enumerate()
+                .filter_map(|(segment, rays)| robust_segment(views, view, segment, rays, &robust)),
+        );
         progress((view + 1) as f64 / views.len() as f64);
     }
     proposals

@@ -140,11 +140,7 @@ pub fn step_loss(
         segment = loss.loss;
         // The one gathered transfer of an iteration: ends, error, counted or not.
         let gathered = host_vec(Tensor::cat(
-            vec![
-                ends.detach(),
-                loss.error_in_pixels,
-                loss.counted,
-            ],
+            vec![ends.detach(), loss.error_in_pixels, loss.counted],
             1,
         ));
         segment_errors = gathered.chunks_exact(8).map(|row| row[6]).collect();

@@ -107,13 +107,10 @@ impl NeatModel {
         };
 
         let Some(min_weight) = request.min_sample_weight else {
-            let output = self
-                .implicit_network
-                .evaluate(points.clone());
+            let output = self.implicit_network.evaluate(points.clone());
             let weights = weights_of(output.sdf);
             let gradients = output.gradient;
-            let directions =
-                index_tensor((0..count * per_ray).map(|i| i / per_ray), device);
+            let directions = index_tensor((0..count * per_ray).map(|i| i / per_ray), device);
             let directions = point_tensor(&rays.directions, device).select(0, directions);
             let color = request.color.then(|| {
                 let color = self.rendering_network.forward(
@@ -157,8 +154,7 @@ impl NeatModel {
         let gradients = output.gradient;
         let ray_of_sample = index_tensor(evaluated.iter().map(|i| *i as usize / per_ray), device);
         let points = points.select(0, rows.clone());
-        let directions =
-            point_tensor(&rays.directions, device).select(0, ray_of_sample.clone());
+        let directions = point_tensor(&rays.directions, device).select(0, ray_of_sample.clone());
         let weight = weights
             .clone()
             .reshape([count * per_ray, 1])
@@ -173,8 +169,7 @@ impl NeatModel {
             integrate_selected(weight.clone(), color, ray_of_sample.clone(), count)
         });
         // Samples are ordered by ray, so those of the first rays come first.
-        let first = evaluated
-            .partition_point(|i| (*i as usize) < request.segment_rays * per_ray);
+        let first = evaluated.partition_point(|i| (*i as usize) < request.segment_rays * per_ray);
         let segments = (request.segment_rays > 0).then(|| {
             let head = |t: &Tensor<2>| t.clone().narrow(0, 0, first);
             if first == 0 {

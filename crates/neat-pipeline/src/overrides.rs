@@ -79,12 +79,30 @@ where
     let mut reason = String::new();
     for value in values {
         *slot(&mut tree, key)? = value;
+        forget_other_kinds(&mut tree, key, config)?;
         match T::deserialize(&tree) {
             Ok(config) => return Ok(config),
             Err(error) => reason = error.to_string(),
         }
     }
     Err(wrong_value(reason))
+}
+
+/// Where a new `kind` was chosen, the keys of the old one make way for defaults.
+fn forget_other_kinds<T: serde::Serialize>(
+    tree: &mut Value,
+    key: &str,
+    config: &T,
+) -> Result<(), OverrideError> {
+    let Some(table) = key.strip_suffix(".kind") else {
+        return Ok(());
+    };
+    let mut before = serde_json::to_value(config).unwrap_or_default();
+    let changed = slot(&mut before, key)? != slot(tree, key)?;
+    if changed && let Value::Object(table) = slot(tree, table)? {
+        table.retain(|key, _| key == "kind");
+    }
+    Ok(())
 }
 
 /// The place in the tree that `key` names.
@@ -211,6 +229,19 @@ mod tests {
             },
             views: Views::One,
         }
+    }
+
+    #[test]
+    fn a_new_kind_forgets_the_keys_of_the_old_one() {
+        let config = crate::preset::Preset::Fast.config();
+        let text = "train.sampler.kind=uniform".to_owned();
+        let uniform = apply_overrides(&config, &[text]).unwrap();
+        assert_eq!(
+            uniform.train.sampler,
+            neat_sdf::RaySamplerConfig::Uniform(Default::default())
+        );
+        let same = "train.sampler.kind=grid_cached".to_owned();
+        assert_eq!(apply_overrides(&config, &[same]).unwrap(), config);
     }
 
     fn applied(overrides: &[&str]) -> Result<Tree, OverrideError> {

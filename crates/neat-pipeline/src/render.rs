@@ -37,7 +37,11 @@ pub fn render_view(
     let step = downscale.max(1);
     let pixels: Vec<(u32, u32)> = (0..camera.height)
         .step_by(step as usize)
-        .flat_map(|y| (0..camera.width).step_by(step as usize).map(move |x| (x, y)))
+        .flat_map(|y| {
+            (0..camera.width)
+                .step_by(step as usize)
+                .map(move |x| (x, y))
+        })
         .collect();
     let mut view = RenderedView {
         width: camera.width.div_ceil(step),
@@ -84,9 +88,11 @@ impl RenderedView {
                 [0.0; 3]
             }
         }));
-        self.depth
-            .extend(weights.chunks(samples.per_ray).zip(samples.z.chunks(samples.per_ray)).map(
-                |(w, z)| w.iter().zip(z).map(|(w, z)| w * z).sum::<f32>(),
-            ));
+        self.depth.extend(
+            weights
+                .chunks(samples.per_ray)
+                .zip(samples.z.chunks(samples.per_ray))
+                .map(|(w, z)| w.iter().zip(z).map(|(w, z)| w * z).sum::<f32>()),
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! The optimisation of one scene.
 
-pub use crate::field::TrainedField;
 use crate::config::{Config, TrainConfig};
+pub use crate::field::TrainedField;
 use crate::losses::{Losses, StepInput, StepLoss, step_loss};
 use crate::model::{NeatModel, host_vec, point_tensor};
 use crate::training_data::{Batch, TrainingData};
@@ -278,8 +278,7 @@ impl Trainer {
     fn sample(&mut self, batch: &Batch) -> RaySamples {
         let network = self.model.implicit_network.valid();
         let device = self.device.clone().inner();
-        let mut query =
-            |points: &[[f32; 3]]| host_vec(network.sdf(point_tensor(points, &device)));
+        let mut query = |points: &[[f32; 3]]| host_vec(network.sdf(point_tensor(points, &device)));
         self.sampler.refresh(self.iteration, &mut query);
         let mut noise = Seeded(stream(self.seed, Purpose::Samples, self.iteration));
         self.sampler
@@ -298,7 +297,9 @@ impl Trainer {
         if config.one_sample_per_ray {
             points.extend((0..batch.rays.len()).map(|ray| {
                 let sample = rng.random_range(0..samples.per_ray);
-                batch.rays.point(ray, samples.z[ray * samples.per_ray + sample])
+                batch
+                    .rays
+                    .point(ray, samples.z[ray * samples.per_ray + sample])
             }));
         }
         points

@@ -72,7 +72,8 @@ impl TrainingData {
             .collect();
         let mut first_region_pixel = vec![0];
         for view in &views {
-            first_region_pixel.push(first_region_pixel[first_region_pixel.len() - 1] + view.regions.len());
+            first_region_pixel
+                .push(first_region_pixel[first_region_pixel.len() - 1] + view.regions.len());
         }
         Self {
             views,
@@ -164,9 +165,11 @@ impl TrainingData {
         let color = view.image.get_pixel(x, y).0.map(|c| f32::from(c) / 255.0);
         let largest = color.into_iter().fold(0.0, f32::max);
         batch.colors.push(color);
-        batch
-            .silhouette
-            .push(if largest > SILHOUETTE_THRESHOLD { 1.0 } else { 0.0 });
+        batch.silhouette.push(if largest > SILHOUETTE_THRESHOLD {
+            1.0
+        } else {
+            0.0
+        });
     }
 }
 

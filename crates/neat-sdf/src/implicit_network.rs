@@ -152,8 +152,7 @@ impl ImplicitNetworkConfig {
         } else {
             1
         };
-        let mut init =
-            LinearInit::normal(inputs, distance_rows, mean, 1e-4, -radius as f32, rng);
+        let mut init = LinearInit::normal(inputs, distance_rows, mean, 1e-4, -radius as f32, rng);
         let random = LinearInit::normal(
             inputs,
             outputs - distance_rows,

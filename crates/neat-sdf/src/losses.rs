@@ -25,7 +25,6 @@ pub fn eikonal_loss(gradient: Tensor<2>) -> Tensor<1> {
 pub fn mask_loss(opacity: Tensor<2>, mask: Tensor<2>) -> Tensor<1> {
     let p = opacity.clamp(1e-4, 1.0 - 1e-4);
     let outside = mask.clone().neg().add_scalar(1.0);
-    let log_likelihood =
-        mask * p.clone().log() + outside * p.neg().add_scalar(1.0).log();
+    let log_likelihood = mask * p.clone().log() + outside * p.neg().add_scalar(1.0).log();
     log_likelihood.mean().neg()
 }

@@ -164,9 +164,7 @@ impl<F: Fn(&str) -> f64> ModuleMapper for AdamStep<'_, F> {
             .clone()
             .div(second.clone().sqrt().add_scalar(epsilon * root_correction))
             .mul_scalar(rate);
-        self.adam
-            .moments
-            .insert(name, Box::new([first, second]));
+        self.adam.moments.insert(name, Box::new([first, second]));
         param.map(|value| {
             let tracked = value.is_require_grad();
             Tensor::from_inner(value.inner() - change).set_require_grad(tracked)

@@ -26,7 +26,9 @@ pub enum BackendError {
     #[error("unknown backend `{0}`; use one of auto, flex, ndarray, wgpu")]
     Unknown(String),
     /// The program was built without it.
-    #[error("this build of neat has no {0} backend; rebuild with `--features {0}` or choose one of: {1}")]
+    #[error(
+        "this build of neat has no {0} backend; rebuild with `--features {0}` or choose one of: {1}"
+    )]
     NotBuilt(Backend, String),
     /// There is no Vulkan device.
     #[error(

@@ -16,6 +16,9 @@ pub struct Checkpoint {
     pub metadata: BTreeMap<String, String>,
 }
 
+/// Name of the header entry that holds [`Checkpoint::metadata`] as JSON.
+const METADATA_KEY: &str = "neat";
+
 /// Why a checkpoint could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
@@ -67,7 +70,11 @@ impl Checkpoint {
                 .expect("Checkpoint::write: bytes agree with shape");
             (name.as_str(), view)
         });
-        let metadata: HashMap<String, String> = self.metadata.clone().into_iter().collect();
+        // One entry: the format takes a hash map, whose order would differ from run
+        // to run, and equal states must give equal bytes.
+        let text = serde_json::to_string(&self.metadata)
+            .expect("Checkpoint::write: a map of strings is JSON");
+        let metadata = HashMap::from([(METADATA_KEY.to_owned(), text)]);
         let content = safetensors::serialize(views, Some(metadata))
             .map_err(|e| io(std::io::Error::other(e.to_string())))?;
 
@@ -113,12 +120,10 @@ impl Checkpoint {
             debug_assert_eq!(DType::F32.size(), 4);
             tensors.insert(name, TensorData::new(values, view.shape().to_vec()));
         }
-        let metadata = header
-            .metadata()
-            .clone()
-            .unwrap_or_default()
-            .into_iter()
-            .collect();
+        let text = header.metadata().as_ref().and_then(|m| m.get(METADATA_KEY));
+        let metadata = text
+            .and_then(|text| serde_json::from_str(text).ok())
+            .ok_or_else(|| damaged(format!("its header has no `{METADATA_KEY}`")))?;
         Ok(Self { tensors, metadata })
     }
 }

@@ -39,7 +39,8 @@ impl ModuleVisitor for Reader {
     }
 
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        self.values.insert(self.path.name(), param.val().into_data());
+        self.values
+            .insert(self.path.name(), param.val().into_data());
     }
 }
 

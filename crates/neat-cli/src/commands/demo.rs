@@ -18,12 +18,12 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  neat demo --out demo
-  neat demo --out demo --solid stair-prism --views 40
-  neat demo --out demo --time-budget 20s")]
+  neat demo
+  neat demo --overwrite --solid stair-prism --views 40
+  neat demo --out OTHER --time-budget 20s")]
 pub struct DemoArgs {
     /// Folder for the scene and the run; it must be new or empty
-    #[arg(long, value_name = "OUT")]
+    #[arg(long, value_name = "OUT", default_value = "neat-demo")]
     out: PathBuf,
     /// Replace an earlier demonstration in that folder
     #[arg(long)]

@@ -177,11 +177,7 @@ impl GridCachedConfig {
         grid: &DistanceGrid,
         noise: &mut impl SamplingNoise,
     ) -> RaySamples {
-        let (lookups, drawn, even) = (
-            self.lookups,
-            self.importance_samples,
-            self.uniform_samples,
-        );
+        let (lookups, drawn, even) = (self.lookups, self.importance_samples, self.uniform_samples);
         let per_ray = drawn + even;
         let stratum = lookups + drawn + even;
         let noise = noise.uniform(rays.len() * stratum);

@@ -118,7 +118,11 @@ impl RaySamplerConfig {
             Self::ErrorBound(config) => RaySampler::ErrorBound(*config),
             Self::GridCached(config) => RaySampler::GridCached(
                 *config,
-                DistanceGrid::sphere(config.resolution, scene_radius as f32, initial_radius as f32),
+                DistanceGrid::sphere(
+                    config.resolution,
+                    scene_radius as f32,
+                    initial_radius as f32,
+                ),
             ),
             Self::Uniform(config) => RaySampler::Uniform(*config),
         }
