@@ -1,7 +1,6 @@
 //! The rendering integral and its quadrature (paper eq. 1 and 4).
 
 use burn::tensor::{IndexingUpdateOp, Int, Tensor, TensorData};
-use neat_tensor::matmul::matmul;
 
 /// Weight of every sample: `w_i = (1 − exp(−δ_i σ_i)) · exp(−Σ_{j<i} δ_j σ_j)`.
 ///
@@ -13,7 +12,7 @@ pub fn rendering_weights(density: Tensor<2>, deltas: Tensor<2>) -> Tensor<2> {
     // The exclusive running sum as a product with a triangle of ones: parallel
     // over samples on every backend, where a scan is serial or absent.
     let triangle = strictly_upper_ones(samples, &free_energy);
-    let passed = matmul(free_energy.clone(), triangle);
+    let passed = free_energy.clone().matmul(triangle);
     let transmittance = passed.neg().exp();
     let opacity = free_energy.neg().exp().neg().add_scalar(1.0);
     opacity * transmittance

@@ -9,7 +9,6 @@
 
 use crate::encoding::PositionalEncoding;
 use crate::linear::{Linear, affine};
-use crate::matmul::matmul;
 use crate::softplus::{softplus, softplus_derivative};
 use burn::module::Module;
 use burn::tensor::{Int, Tensor};
@@ -112,7 +111,7 @@ impl Recorded {
         for l in (0..=last).rev() {
             if l < last {
                 let slope = softplus_derivative(self.pre_activations[l].clone(), mlp.sharpness);
-                g = matmul(g * slope, weights[l].clone());
+                g = (g * slope).matmul(weights[l].clone());
             }
             if mlp.skip == Some(l) {
                 let scaled = g.div_scalar(std::f64::consts::SQRT_2);

@@ -13,7 +13,6 @@ pub mod checkpoint;
 pub mod coordinate_mlp;
 pub mod encoding;
 pub mod linear;
-pub mod matmul;
 pub mod parameters;
 pub mod random;
 pub mod softplus;

@@ -1,6 +1,5 @@
 //! Affine layers, plain or with weight normalisation, and the ReLU perceptron.
 
-use crate::matmul::matmul;
 use crate::random::standard_normal;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData, activation};
@@ -146,7 +145,7 @@ impl Linear {
 
 /// `x Wᵀ + b` with `W` `[out, in]`.
 pub(crate) fn affine(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<1>) -> Tensor<2> {
-    matmul(x, weight.transpose()) + bias.unsqueeze()
+    x.matmul(weight.transpose()) + bias.unsqueeze()
 }
 
 /// A perceptron with ReLU between its layers and a linear last layer.
