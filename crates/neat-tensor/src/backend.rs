@@ -35,7 +35,15 @@ pub enum BackendError {
         "no Vulkan device found for the wgpu backend; install a Vulkan driver, or use `--backend flex`"
     )]
     NoAdapter,
+    /// The only Vulkan device is a software rasteriser.
+    #[error(
+        "the only Vulkan device here is a software driver, on which GPU kernels give wrong numbers or crash; use `--backend flex`, or set {SOFTWARE_VULKAN}=1 to try it all the same"
+    )]
+    SoftwareOnly,
 }
+
+/// Name of the environment variable that lets a software driver be used.
+const SOFTWARE_VULKAN: &str = "NEAT_SOFTWARE_VULKAN";
 
 impl fmt::Display for Backend {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -129,12 +137,18 @@ impl Backend {
 #[cfg(feature = "wgpu")]
 fn vulkan_device() -> Result<Device, BackendError> {
     use burn::tensor::DeviceType;
+    let software = std::env::var_os(SOFTWARE_VULKAN).is_some_and(|value| value != "0");
     // Enumeration lists discrete GPUs first and software devices last.
-    Device::enumerate(DeviceType::Vulkan)
+    let device = Device::enumerate(DeviceType::Vulkan)
         .into_vec()
         .into_iter()
         .next()
-        .ok_or(BackendError::NoAdapter)
+        .ok_or(BackendError::NoAdapter)?;
+    if has_gpu() || software {
+        Ok(device)
+    } else {
+        Err(BackendError::SoftwareOnly)
+    }
 }
 
 /// Whether a real GPU, not a software rasteriser, is here.
