@@ -147,6 +147,16 @@ impl Scene {
         let nearest = self.views.iter().map(|view| seen(&view.camera));
         BALL_MARGIN * nearest.fold(f64::INFINITY, f64::min)
     }
+
+    /// The same scene in a world whose lengths are `factor` times as large;
+    /// [`Self::original_from_world`] still leads to the frame of the files.
+    pub fn scaled(mut self, factor: f64) -> Self {
+        for view in &mut self.views {
+            view.camera.center_in_world *= factor;
+        }
+        self.original_from_world.scale /= factor;
+        self
+    }
 }
 
 /// Errs at a name that cannot be a file name or is not above the one before it.
@@ -213,6 +223,20 @@ mod tests {
         let two = scene(vec![view("a", 9.0, 150, 200), view("b", 5.0, 200, 150)]);
         assert!((two.bounding_ball_radius() - 1.2 * 5.0 * 0.6).abs() < 1e-12);
         assert_eq!(scene(vec![]).bounding_ball_radius(), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_scaled_scene_shows_the_same_and_leads_back() {
+        let before = scene(vec![view("a", 9.0, 150, 200)]);
+        let after = before.clone().scaled(0.25);
+        let point = Vector3::new(0.3, -0.2, 0.1);
+        let seen = before.views[0].camera.project(&point).pixel;
+        let scaled = after.views[0].camera.project(&(point * 0.25)).pixel;
+        assert!((seen - scaled).norm() < 1e-9);
+        let back = after.original_from_world.apply(&(point * 0.25));
+        assert!((back - before.original_from_world.apply(&point)).norm() < 1e-12);
+        let (large, small) = (before.bounding_ball_radius(), after.bounding_ball_radius());
+        assert!((small - 0.25 * large).abs() < 1e-12);
     }
 
     #[test]

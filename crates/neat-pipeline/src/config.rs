@@ -37,7 +37,8 @@ pub struct DataConfig {
     /// Pixels nearer to a 2D segment than this belong to its attraction region
     /// (τ_d of the paper).
     pub attraction_distance: f64,
-    /// Radius of the modelled ball around the origin; `None` follows the cameras.
+    /// Radius of the modelled ball around the origin. `None` scales the world so
+    /// that the ball that all cameras see has radius 1.
     pub scene_radius: Option<f64>,
 }
 

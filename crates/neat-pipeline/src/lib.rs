@@ -19,5 +19,6 @@ pub mod preset;
 pub mod reconstruct;
 pub mod render;
 pub mod run_dir;
+pub mod scene;
 pub mod trainer;
 pub mod training_data;

@@ -7,15 +7,16 @@ use burn::tensor::{Tensor, activation};
 /// With the sharpness of 100 that VolSDF uses it is a ReLU rounded within a few
 /// hundredths of zero.
 pub fn softplus<const D: usize>(z: Tensor<D>, sharpness: f64) -> Tensor<D> {
-    // max(z, 0) + ln(1 + exp(-sharpness |z|)) / sharpness
-    let tail = z
+    // max(z, 0) + ln(1 + exp(-sharpness |z|)) / sharpness, where max(z, 0) is
+    // written with the same |z|: reverse mode then gives ½ at zero, as it must.
+    let magnitude = z.clone().abs();
+    let tail = magnitude
         .clone()
-        .abs()
         .mul_scalar(-sharpness)
         .exp()
         .log1p()
         .div_scalar(sharpness);
-    activation::relu(z) + tail
+    (z + magnitude).mul_scalar(0.5) + tail
 }
 
 /// The derivative of [`softplus`] with respect to `z`: `sigmoid(sharpness · z)`.

@@ -5,10 +5,11 @@ use crate::error::CliError;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
-use neat_core::{LoadOptions, file, load_scene};
+use neat_core::file;
 use neat_pipeline::compare_backends::compare_backends;
 use neat_pipeline::event::Event;
 use neat_pipeline::run_dir::RunDir;
+use neat_pipeline::scene::read_scene;
 use neat_tensor::Backend;
 use std::path::PathBuf;
 
@@ -58,13 +59,8 @@ impl CompareBackendsArgs {
         for backend in &backends {
             backend.device()?;
         }
-        let options = LoadOptions {
-            pixel_center: config.data.pixel_center,
-            min_segment_score: config.data.min_segment_score,
-            ..LoadOptions::default()
-        };
         let mut progress = Progress::new(quiet);
-        let loaded = load_scene(&self.scene, &options)?;
+        let loaded = read_scene(&self.scene, &config.data)?;
         for warning in &loaded.warnings {
             progress.show(Event::Warning(warning.to_string()));
         }

@@ -7,8 +7,9 @@ use crate::event::{Event, OnEvent, Stage};
 use crate::field::TrainedField;
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
 use crate::run_dir::{Existing, RunDir};
+use crate::scene::read_scene;
 use burn::tensor::Device;
-use neat_core::{LoadOptions, LoadedScene, Scene, SceneError, load_scene};
+use neat_core::{LoadedScene, Scene, SceneError};
 use neat_tensor::Backend;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -211,12 +212,7 @@ fn load(
     config: &Config,
     on_event: OnEvent<'_>,
 ) -> Result<LoadedScene, PipelineError> {
-    let options = LoadOptions {
-        pixel_center: config.data.pixel_center,
-        min_segment_score: config.data.min_segment_score,
-        ..LoadOptions::default()
-    };
-    let loaded = load_scene(scene, &options)?;
+    let loaded = read_scene(scene, &config.data)?;
     for warning in &loaded.warnings {
         on_event(Event::Warning(warning.to_string()));
     }

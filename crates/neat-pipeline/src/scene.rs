@@ -1,0 +1,64 @@
+//! Reading a scene as a configuration wants it.
+
+use crate::config::DataConfig;
+use neat_core::{LoadOptions, LoadedScene, SceneError, load_scene};
+use std::path::Path;
+
+/// Reads the scene in the folder `dir`.
+///
+/// Without a configured radius the world is scaled so that the ball that all
+/// cameras see has radius 1: every length of a configuration (β, grid, encoding)
+/// then means the same in a scene of millimetres and in one of metres.
+///
+/// # Errors
+/// If the scene cannot be read.
+pub fn read_scene(dir: &Path, config: &DataConfig) -> Result<LoadedScene, SceneError> {
+    let options = LoadOptions {
+        pixel_center: config.pixel_center,
+        min_segment_score: config.min_segment_score,
+        ..LoadOptions::default()
+    };
+    let mut loaded = load_scene(dir, &options)?;
+    let radius = loaded.scene.bounding_ball_radius();
+    if config.scene_radius.is_none() && radius.is_finite() && radius > 0.0 {
+        loaded.scene = loaded.scene.scaled(1.0 / radius);
+    }
+    Ok(loaded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::preset::Preset;
+    use neat_core::layout::abc::write_scene;
+    use neat_core::synthetic::{SyntheticScene, generate};
+
+    #[test]
+    fn units_of_the_files_do_not_reach_the_networks() {
+        let small = SyntheticScene {
+            views: 3,
+            image_size: 64,
+            min_visible_length: 2.0,
+            ..SyntheticScene::default()
+        };
+        let in_millimetres = generate(&small).unwrap().scene.scaled(1000.0);
+        // `scaled` remembers the unit it came from; these files are the original.
+        let in_millimetres = neat_core::Scene {
+            original_from_world: neat_core::Similarity::identity(),
+            ..in_millimetres
+        };
+        let dir = tempfile::tempdir().unwrap();
+        write_scene(&in_millimetres, dir.path()).unwrap();
+
+        let mut config = Preset::Fast.config().data;
+        let scaled = read_scene(dir.path(), &config).unwrap().scene;
+        assert!((scaled.bounding_ball_radius() - 1.0).abs() < 1e-12);
+        let camera = |scene: &neat_core::Scene| scene.views[1].camera.center_in_world;
+        let back = scaled.original_from_world.apply(&camera(&scaled));
+        assert!((back - camera(&in_millimetres)).norm() < 1e-9);
+
+        config.scene_radius = Some(1500.0);
+        let kept = read_scene(dir.path(), &config).unwrap().scene;
+        assert!((camera(&kept) - camera(&in_millimetres)).norm() < 1e-9);
+    }
+}
