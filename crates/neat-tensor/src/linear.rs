@@ -132,11 +132,6 @@ impl Linear {
         self
     }
 
-    /// Number of outputs.
-    pub fn outputs(&self) -> usize {
-        self.bias.val().dims()[0]
-    }
-
     /// `[N, in]` → `[N, out]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
         affine(x, self.effective_weight(), self.bias.val())

@@ -76,11 +76,6 @@ impl DistanceGrid {
         2.0 * self.radius / self.resolution as f32
     }
 
-    /// Radius of the ball that the grid encloses.
-    pub fn radius(&self) -> f32 {
-        self.radius
-    }
-
     /// The distances at all nodes, `[x][y][z]`.
     pub fn values(&self) -> &[f32] {
         &self.values
