@@ -279,7 +279,7 @@ fn paper(
 
 /// Where the ray through the foot meets the tangent plane at the rendered point
 /// (published `l3d`; denominators are kept 1e-6 off zero, as there).
-fn support_point(
+pub fn support_point(
     origin: &Vector3<f64>,
     direction: &Vector3<f64>,
     point: &Vector3<f64>,

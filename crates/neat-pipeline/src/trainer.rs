@@ -370,8 +370,9 @@ pub(crate) fn metadata<T: std::str::FromStr>(
         .ok_or_else(|| TrainError::Checkpoint(key.to_owned()))
 }
 
-/// Warm-up times exponential decay.
-fn learning_rate_factor(train: &TrainConfig, iteration: u64, schedule: f64) -> f64 {
+/// Factor on the learning rates in iteration `iteration` (counted from 0), when
+/// the share `schedule` of the run is done: warm-up times exponential decay.
+pub fn learning_rate_factor(train: &TrainConfig, iteration: u64, schedule: f64) -> f64 {
     let warm_up = match train.warm_up_steps {
         0 => 1.0,
         steps => ((iteration + 1) as f64 / steps as f64).min(1.0),

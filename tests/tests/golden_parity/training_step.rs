@@ -5,13 +5,15 @@ use crate::segment_projection::camera;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::Device;
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use neat_core::{Camera, LineSegment2, ScoredSegment2};
 use neat_gjp::candidates::{CandidateConfig, JunctionView};
 use neat_pipeline::config::Config;
+use neat_pipeline::distill::support_point;
 use neat_pipeline::losses::{StepInput, StepLoss, step_loss};
 use neat_pipeline::model::{NeatModel, RenderRequest};
 use neat_pipeline::preset::Preset;
+use neat_pipeline::trainer::learning_rate_factor;
 use neat_pipeline::training_data::{Batch, push_ray_through};
 use neat_sdf::{RayBundle, RaySamples};
 use neat_tensor::adam::{Adam, AdamConfig};
@@ -285,4 +287,47 @@ fn five_steps() {
         assert_close("parameters after five steps", &actual, &truth, rates[0]);
         assert_eq!(model.num_params(), actual.len());
     });
+}
+
+/// Tolerance of `l3d` in the golden README.
+const SUPPORT_POINT_TOLERANCE: f64 = 1e-4;
+
+#[test]
+fn support_points_lie_on_the_tangent_plane() {
+    let golden = Golden::open("06_training_step");
+    let camera = camera(&golden, "in/K", "in/pose_c2w");
+    let feet = golden.rows::<2>("in/uv_proj");
+    let points = golden.rows::<3>("common/points3d");
+    let gradients = golden.rows::<3>("common/points3d_gradient");
+    let found: Vec<f64> = feet
+        .into_iter()
+        .zip(points.into_iter().zip(gradients))
+        .flat_map(|(foot, (point, gradient))| {
+            let ray = camera.ray_through(&foot.into());
+            let point = support_point(&ray.origin, &ray.direction, &point.into(), &gradient.into());
+            <[f64; 3]>::from(Vector3::from(point))
+        })
+        .collect();
+    assert_close(
+        "l3d",
+        &found,
+        &golden.numbers("f64.common/l3d"),
+        SUPPORT_POINT_TOLERANCE,
+    );
+}
+
+#[test]
+fn the_learning_rate_falls_as_published() {
+    let golden = Golden::open("13_optimiser");
+    let train = Preset::PaperAbc.config().train;
+    // The recorded schedule spans 100 iterations.
+    let rates: Vec<f64> = (0..5)
+        .map(|i| train.learning_rate * learning_rate_factor(&train, i, i as f64 / 100.0))
+        .collect();
+    assert_close(
+        "learning rate",
+        &rates,
+        &golden.numbers("f64.learning_rates"),
+        1e-15,
+    );
 }
