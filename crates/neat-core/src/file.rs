@@ -1,8 +1,9 @@
 //! Whole files: bounded reading, and writing that leaves no half-written file.
 
 use crate::SceneError;
+use image::{ImageFormat, RgbImage};
 use std::fs;
-use std::io::{self, Read};
+use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 /// The largest text or array file that is read, in bytes.
@@ -81,6 +82,21 @@ pub fn create_dir(path: &Path) -> Result<(), SceneError> {
 fn temporary_name(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!(".{name}.{}.tmp", std::process::id()))
+}
+
+/// Writes a PNG, completely or not at all.
+///
+/// # Errors
+/// If the folder cannot be written or the disk is full.
+pub fn write_png(path: &Path, image: &RgbImage) -> Result<(), SceneError> {
+    let mut png = Cursor::new(Vec::new());
+    image
+        .write_to(&mut png, ImageFormat::Png)
+        .map_err(|source| SceneError::Image {
+            path: path.into(),
+            source,
+        })?;
+    write_atomically(path, png.get_ref())
 }
 
 #[cfg(test)]

@@ -1,24 +1,7 @@
 //! Rendered views as images on disk, and how near they are to the photograph.
 
-use image::{ImageFormat, Rgb, RgbImage};
-use neat_core::{SceneError, file};
-use std::io::Cursor;
-use std::path::Path;
-
-/// Writes a PNG, completely or not at all.
-///
-/// # Errors
-/// If the folder cannot be written or the disk is full.
-pub fn write_png(path: &Path, image: &RgbImage) -> Result<(), SceneError> {
-    let mut png = Cursor::new(Vec::new());
-    image
-        .write_to(&mut png, ImageFormat::Png)
-        .map_err(|source| SceneError::Image {
-            path: path.into(),
-            source,
-        })?;
-    file::write_atomically(path, png.get_ref())
-}
+use image::{Rgb, RgbImage};
+pub use neat_core::file::write_png;
 
 /// Colours from 0 to 1, row by row, as an image.
 pub fn color_image(width: u32, height: u32, colors: &[[f32; 3]]) -> RgbImage {

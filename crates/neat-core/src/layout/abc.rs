@@ -16,12 +16,10 @@ use super::poses::{
     similarity_of, view_error, wrong_shape,
 };
 use crate::npz::{NpyArray, NpzReader, write_npz};
-use crate::{Scene, SceneError, Similarity, View, ViewError, file, hawp_json};
-use image::ImageFormat;
+use crate::{Scene, SceneError, Similarity, ViewError, file, hawp_json};
 use nalgebra::{Matrix3, Matrix4, SMatrix};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::io::Cursor;
 use std::path::Path;
 
 pub(super) const INTRINSICS: &str = "intrinsics";
@@ -115,22 +113,11 @@ pub fn write_scene(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
     file::create_dir(&images_dir)?;
     file::create_dir(&hawp_dir)?;
     scene.views.par_iter().try_for_each(|view| {
-        write_png(view, &images_dir.join(format!("{}.png", view.name)))?;
+        file::write_png(&images_dir.join(format!("{}.png", view.name)), &view.image)?;
         let hawp = hawp_dir.join(format!("{}.json", view.name));
         hawp_json::write(&hawp, &view.wireframe, scene.pixel_center)
     })?;
     write_cameras(scene, &dir.join(CAMERAS_NPZ))
-}
-
-fn write_png(view: &View, path: &Path) -> Result<(), SceneError> {
-    let mut png = Cursor::new(Vec::new());
-    view.image
-        .write_to(&mut png, ImageFormat::Png)
-        .map_err(|source| SceneError::Image {
-            path: path.into(),
-            source,
-        })?;
-    file::write_atomically(path, png.get_ref())
 }
 
 fn write_cameras(scene: &Scene, path: &Path) -> Result<(), SceneError> {
