@@ -2,7 +2,7 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use neat_tensor::{PositionalEncoding, ReluMlp};
+use neat_tensor::{PositionalEncoding, ReluMlp, SampleInputs};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -77,26 +77,24 @@ impl AttractionNetworkConfig {
 }
 
 impl AttractionNetwork {
-    /// `points`, `view_directions` (unit), `gradients` (raw, of the distance)
-    /// `[N, 3]` and `features` `[N, F]` → absolute ends `[N, 6]`: both ends'
-    /// coordinates one after the other.
-    pub fn forward(
-        &self,
-        points: Tensor<2>,
-        view_directions: Tensor<2>,
-        gradients: Tensor<2>,
-        features: Tensor<2>,
-    ) -> Tensor<2> {
-        let encoded = PositionalEncoding {
+    /// `rays` `[N, 6]` (point, unit viewing direction), `gradients` (raw, of the
+    /// distance) `[N, 3]` and `features` `[N, F]` → absolute ends `[N, 6]`: both
+    /// ends' coordinates one after the other.
+    pub fn forward(&self, rays: Tensor<2>, gradients: Tensor<2>, features: Tensor<2>) -> Tensor<2> {
+        let point = PositionalEncoding {
             octaves: self.octaves,
-        }
-        .encode(points.clone());
-        let mut inputs = vec![encoded];
+        };
+        let mut ray_parts = vec![(0, 3, point)];
         if self.view_direction {
-            inputs.push(view_directions);
+            ray_parts.push((3, 3, PositionalEncoding { octaves: 0 }));
         }
-        inputs.extend([gradients, features]);
-        let offsets = self.mlp.forward(Tensor::cat(inputs, 1));
+        let points = rays.clone().narrow(1, 0, 3);
+        let offsets = self.mlp.forward_samples(SampleInputs {
+            rays,
+            ray_parts,
+            gradients,
+            features,
+        });
         offsets + Tensor::cat(vec![points.clone(), points], 1)
     }
 }

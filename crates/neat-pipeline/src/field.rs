@@ -5,8 +5,8 @@ use crate::model::{NeatModel, RenderRequest, Rendering, host_points, host_vec, p
 use crate::trainer::{TrainError, metadata};
 use burn::tensor::{Device, Tensor};
 use nalgebra::Vector3;
-use neat_sdf::RayBundle;
 use neat_sdf::ray_sampler::{Deterministic, DistanceGrid, RaySampler, RaySamples};
+use neat_sdf::{Distances, RayBundle};
 use neat_tensor::checkpoint::Checkpoint;
 use neat_tensor::parameters::load_parameters;
 use neat_wireframe::SignedDistance;
@@ -21,6 +21,7 @@ const SURFACE_RESOLUTION: usize = 64;
 #[derive(Debug)]
 pub struct TrainedField {
     model: NeatModel,
+    distances: Distances,
     sampler: RaySampler,
     /// Scale of the density.
     pub beta: f32,
@@ -40,6 +41,7 @@ impl TrainedField {
         device: Device,
     ) -> Self {
         let mut field = Self {
+            distances: model.implicit_network.distances(&device),
             model,
             sampler,
             beta,
@@ -114,13 +116,7 @@ impl TrainedField {
 
     /// The capped signed distance at each point.
     pub fn distances(&self, points: &[[f32; 3]]) -> Vec<f32> {
-        points
-            .chunks(POINT_CHUNK)
-            .flat_map(|chunk| {
-                let points = point_tensor(chunk, &self.device);
-                host_vec(self.model.implicit_network.sdf(points))
-            })
-            .collect()
+        self.distances.capped(points)
     }
 
     /// The capped signed distance and its raw gradient at each point.

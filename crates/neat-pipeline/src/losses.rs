@@ -101,7 +101,7 @@ pub fn step_loss(
     let mut gradients = Vec::new();
     if !input.eikonal_points.is_empty() {
         let points = point_tensor(input.eikonal_points, device);
-        gradients.push(model.implicit_network.evaluate_uncapped(points).gradient);
+        gradients.push(model.implicit_network.gradient_uncapped(points));
     }
     if config.eikonal.rendered_samples {
         gradients.push(rendering.gradients.clone());

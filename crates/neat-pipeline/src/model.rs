@@ -6,7 +6,9 @@ use burn::tensor::{Device, Int, Tensor, TensorData};
 use neat_field::AttractionNetwork;
 use neat_gjp::JunctionPerceiver;
 use neat_sdf::density::laplace_density;
-use neat_sdf::volume_rendering::{integrate, integrate_selected, rendering_weights};
+use neat_sdf::volume_rendering::{
+    integrate, integrate_selected, rendering_weights, rendering_weights_on_host,
+};
 use neat_sdf::{ImplicitNetwork, LaplaceDensity, RayBundle, RaySamples, RenderingNetwork};
 use neat_tensor::random::{Purpose, stream};
 
@@ -96,97 +98,92 @@ impl NeatModel {
         let RenderRequest { rays, samples, .. } = *request;
         let per_ray = samples.per_ray;
         let count = rays.len();
-        let points = point_tensor(&rays.points(&samples.z, per_ray), device); // [R S, 3]
+        let total = count * per_ray;
+        let points = rays.points(&samples.z, per_ray);
+
+        // Which samples are evaluated in full has to be known before; the
+        // distances that tell it are not computed again for the others.
+        let selection = request
+            .min_sample_weight
+            .map(|min_weight| self.select(request, &points, min_weight, device));
+        let (sdf, output) = match &selection {
+            None => self
+                .implicit_network
+                .evaluate_rows(point_tensor(&points, device), Vec::new()),
+            Some(Selection {
+                full,
+                order,
+                light_distances,
+            }) => {
+                let ordered: Vec<[f32; 3]> = order.iter().map(|i| points[*i]).collect();
+                let (sdf, output) = self
+                    .implicit_network
+                    .evaluate_rows(point_tensor(&ordered, device), light_distances.clone());
+                debug_assert_eq!(output.sdf.dims()[0], full.len());
+                let mut place = vec![0; total];
+                for (position, i) in order.iter().enumerate() {
+                    place[*i] = position;
+                }
+                (
+                    sdf.select(0, index_tensor(place.into_iter(), device)),
+                    output,
+                )
+            }
+        };
         let deltas = Tensor::<2>::from_data(
             TensorData::new(samples.deltas.clone(), [count, per_ray]),
             device,
         );
-        let weights_of = |sdf: Tensor<2>| {
-            let density = laplace_density(sdf.reshape([count, per_ray]), request.beta.clone());
-            rendering_weights(density, deltas.clone())
-        };
+        let density = laplace_density(sdf.reshape([count, per_ray]), request.beta.clone());
+        let weights = rendering_weights(density, deltas);
 
-        let Some(min_weight) = request.min_sample_weight else {
-            let output = self.implicit_network.evaluate(points.clone());
-            let weights = weights_of(output.sdf);
-            let gradients = output.gradient;
-            let directions = index_tensor((0..count * per_ray).map(|i| i / per_ray), device);
-            let directions = point_tensor(&rays.directions, device).select(0, directions);
-            let color = request.color.then(|| {
-                let color = self.rendering_network.forward(
-                    points.clone(),
-                    directions.clone(),
-                    gradients.clone(),
-                    output.features.clone(),
-                );
-                integrate(weights.clone(), color)
-            });
-            let rows = request.segment_rays * per_ray;
-            let segments = (rows > 0).then(|| {
-                let first = |t: &Tensor<2>| t.clone().narrow(0, 0, rows);
-                let ends = self.attraction_network.forward(
-                    first(&points),
-                    first(&directions),
-                    first(&gradients),
-                    first(&output.features),
-                );
-                let weights = weights.clone().detach().narrow(0, 0, request.segment_rays);
-                integrate(weights, ends)
-            });
-            return Rendering {
-                opacity: weights.clone().sum_dim(1),
-                weights,
-                color,
-                segments,
-                gradients,
-                evaluated: None,
-            };
+        // From here on only full samples; they are in the order of their rays.
+        let full = selection.map(|selection| selection.full);
+        let evaluated = full.as_ref().map_or(total, Vec::len);
+        let index = |i: usize| full.as_ref().map_or(i, |full| full[i] as usize);
+        let ray_columns = ray_columns(rays, &points, (0..evaluated).map(index), per_ray, device);
+        let integral = |values: Tensor<2>, weights: Tensor<2>, ray_count: usize| match &full {
+            None => integrate(weights.narrow(0, 0, ray_count), values),
+            Some(full) => {
+                let full = &full[..values.dims()[0]];
+                let rows = index_tensor(full.iter().map(|i| *i as usize), device);
+                let weights = weights.reshape([total, 1]).select(0, rows);
+                let ray_of_sample = full.iter().map(|i| *i as usize / per_ray);
+                integrate_selected(
+                    weights,
+                    values,
+                    index_tensor(ray_of_sample, device),
+                    ray_count,
+                )
+            }
         };
-
-        // The weights need distances only, but which samples matter is known
-        // after that: one forward pass serves both, and its recorded
-        // pre-activations give the gradient where it is wanted.
-        let distances = self.implicit_network.record(points.clone());
-        let weights = weights_of(distances.sdf());
-        let evaluated = heavy_samples(&weights, min_weight);
-        let rows = index_tensor(evaluated.iter().map(|i| *i as usize), device);
-        let output = distances.at_rows(&self.implicit_network, rows.clone());
         let gradients = output.gradient;
-        let ray_of_sample = index_tensor(evaluated.iter().map(|i| *i as usize / per_ray), device);
-        let points = points.select(0, rows.clone());
-        let directions = point_tensor(&rays.directions, device).select(0, ray_of_sample.clone());
-        let weight = weights
-            .clone()
-            .reshape([count * per_ray, 1])
-            .select(0, rows);
         let color = request.color.then(|| {
             let color = self.rendering_network.forward(
-                points.clone(),
-                directions.clone(),
+                ray_columns.clone(),
                 gradients.clone(),
                 output.features.clone(),
             );
-            integrate_selected(weight.clone(), color, ray_of_sample.clone(), count)
+            integral(color, weights.clone(), count)
         });
-        // Samples are ordered by ray, so those of the first rays come first.
-        let first = evaluated.partition_point(|i| (*i as usize) < request.segment_rays * per_ray);
+        let of_segments = request.segment_rays * per_ray;
+        let rows = full.as_ref().map_or(of_segments, |full| {
+            full.partition_point(|i| (*i as usize) < of_segments)
+        });
         let segments = (request.segment_rays > 0).then(|| {
-            let head = |t: &Tensor<2>| t.clone().narrow(0, 0, first);
-            if first == 0 {
+            if rows == 0 {
                 return Tensor::zeros([request.segment_rays, 6], device);
             }
+            let head = |t: Tensor<2>| match t.dims()[0] == rows {
+                true => t,
+                false => t.narrow(0, 0, rows),
+            };
             let ends = self.attraction_network.forward(
-                head(&points),
-                head(&directions),
-                head(&gradients),
-                head(&output.features),
+                head(ray_columns),
+                head(gradients.clone()),
+                head(output.features),
             );
-            integrate_selected(
-                head(&weight).detach(),
-                ends,
-                ray_of_sample.clone().narrow(0, 0, first),
-                request.segment_rays,
-            )
+            integral(ends, weights.clone().detach(), request.segment_rays)
         });
         Rendering {
             opacity: weights.clone().sum_dim(1),
@@ -194,26 +191,71 @@ impl NeatModel {
             color,
             segments,
             gradients,
-            evaluated: Some(evaluated),
+            evaluated: full,
+        }
+    }
+
+    /// Samples heavier than `min_weight`; never none (the heaviest stays), so that
+    /// no tensor is empty.
+    fn select(
+        &self,
+        request: &RenderRequest<'_>,
+        points: &[[f32; 3]],
+        min_weight: f64,
+        device: &Device,
+    ) -> Selection {
+        let query = self.implicit_network.distances(device);
+        let distances = query.uncapped(points);
+        let mut capped = distances.clone();
+        query.cap(points, &mut capped);
+        let beta = host_vec(request.beta.clone())[0];
+        let weights = rendering_weights_on_host(&capped, request.samples, beta);
+        let is_full = |i: &usize| weights[*i] > min_weight as f32;
+        let (mut order, mut light): (Vec<usize>, Vec<usize>) =
+            (0..weights.len()).partition(is_full);
+        if order.is_empty() {
+            let heaviest = (0..weights.len())
+                .max_by(|a, b| weights[*a].total_cmp(&weights[*b]))
+                .unwrap_or(0);
+            order.push(heaviest);
+            light.remove(heaviest);
+        }
+        let full = order.iter().map(|i| *i as u32).collect();
+        let light_distances = light.iter().map(|i| distances[*i]).collect();
+        order.extend(light);
+        Selection {
+            full,
+            order,
+            light_distances,
         }
     }
 }
 
-/// Indices of the samples heavier than `min_weight`, ascending; never empty
-/// (the heaviest stays), so that no tensor is.
-fn heavy_samples(weights: &Tensor<2>, min_weight: f64) -> Vec<u32> {
-    let weights = host_vec(weights.clone());
-    let min_weight = min_weight as f32;
-    let heavy: Vec<u32> = (0..weights.len() as u32)
-        .filter(|i| weights[*i as usize] > min_weight)
-        .collect();
-    if heavy.is_empty() {
-        let heaviest = (0..weights.len())
-            .max_by(|a, b| weights[*a].total_cmp(&weights[*b]))
-            .unwrap_or(0);
-        return vec![heaviest as u32];
+/// Which samples all networks are evaluated at.
+struct Selection {
+    /// Their indices, ascending.
+    full: Vec<u32>,
+    /// All indices: those of `full`, then the others.
+    order: Vec<usize>,
+    /// Uncapped distances of the others.
+    light_distances: Vec<f32>,
+}
+
+/// Point and viewing direction `[N, 6]` of the samples `indices`.
+fn ray_columns(
+    rays: &RayBundle,
+    points: &[[f32; 3]],
+    indices: impl ExactSizeIterator<Item = usize>,
+    per_ray: usize,
+    device: &Device,
+) -> Tensor<2> {
+    let rows = indices.len();
+    let mut columns = Vec::with_capacity(6 * rows);
+    for i in indices {
+        columns.extend(points[i]);
+        columns.extend(rays.directions[i / per_ray]);
     }
-    heavy
+    Tensor::from_data(TensorData::new(columns, [rows, 6]), device)
 }
 
 /// The values of a tensor on the host, row-major, as float32.

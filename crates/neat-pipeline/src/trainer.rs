@@ -3,7 +3,7 @@
 use crate::config::{Config, TrainConfig};
 pub use crate::field::TrainedField;
 use crate::losses::{Losses, StepInput, StepLoss, step_loss};
-use crate::model::{NeatModel, host_vec, point_tensor};
+use crate::model::{NeatModel, host_vec};
 use crate::training_data::{Batch, TrainingData};
 use burn::module::Module;
 use burn::optim::GradientsParams;
@@ -276,9 +276,7 @@ impl Trainer {
     }
 
     fn sample(&mut self, batch: &Batch) -> RaySamples {
-        let network = self.model.implicit_network.valid();
-        let device = self.device.clone().inner();
-        let mut query = |points: &[[f32; 3]]| host_vec(network.sdf(point_tensor(points, &device)));
+        let mut query = self.model.implicit_network.distances(&self.device);
         self.sampler.refresh(self.iteration, &mut query);
         let mut noise = Seeded(stream(self.seed, Purpose::Samples, self.iteration));
         self.sampler

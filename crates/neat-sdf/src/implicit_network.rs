@@ -1,9 +1,11 @@
 //! The signed distance network (VolSDF; paper Appendix C.1).
 
+use crate::ray_sampler::DistanceQuery;
 use burn::module::Module;
-use burn::tensor::{Device, Int, Tensor};
+use burn::tensor::{Device, Tensor, TensorData};
+use neat_tensor::kernels::softplus_network::SoftplusNetwork;
 use neat_tensor::linear::{Linear, LinearInit};
-use neat_tensor::{CoordinateMlp, PositionalEncoding, Recorded};
+use neat_tensor::{CoordinateMlp, FieldQuery, PositionalEncoding};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -167,80 +169,94 @@ impl ImplicitNetworkConfig {
     }
 }
 
-/// A forward pass, to be asked for gradients at some of its rows.
-#[derive(Clone, Debug)]
-pub struct RecordedDistances {
-    pass: Recorded,
-    /// Capped distance `[N, 1]`.
-    sdf: Tensor<2>,
-}
-
-impl RecordedDistances {
-    /// Capped distance `[N, 1]`.
-    pub fn sdf(&self) -> Tensor<2> {
-        self.sdf.clone()
-    }
-
-    /// Distance, features and gradient at `rows` `[M]`; `network` made the pass.
-    pub fn at_rows(&self, network: &ImplicitNetwork, rows: Tensor<1, Int>) -> ImplicitOutput {
-        network.with_gradient(self.pass.select(rows))
-    }
-}
-
 impl ImplicitNetwork {
     /// Distance capped by the bounding sphere, features, and the gradient of the
     /// capped distance, at every point. This is what is rendered.
     pub fn evaluate(&self, points: Tensor<2>) -> ImplicitOutput {
-        self.with_gradient(self.mlp.record(points))
+        self.evaluate_rows(points, Vec::new()).1
     }
 
-    /// The same forward pass, leaving open at which rows the gradient is wanted.
-    pub fn record(&self, points: Tensor<2>) -> RecordedDistances {
-        let pass = self.mlp.record(points);
-        let raw = pass.outputs.clone().narrow(1, 0, 1);
-        let sdf = match self.cap(&pass.points) {
+    /// The capped distance `[N, 1]` at all points, and all of [`Self::evaluate`] at
+    /// those that come first: `known_distances` are the uncapped distances of the
+    /// remaining ones, from [`Distances::uncapped`] with the same parameters.
+    pub fn evaluate_rows(
+        &self,
+        points: Tensor<2>,
+        known_distances: Vec<f32>,
+    ) -> (Tensor<2>, ImplicitOutput) {
+        let full_rows = points.dims()[0] - known_distances.len();
+        let query = FieldQuery {
+            known_first: known_distances,
+            others: true,
+        };
+        let field = self.mlp.field(points.clone(), query);
+        let features = field.others.expect("features were asked for");
+        let head = |t: Tensor<2>| t.narrow(0, 0, full_rows);
+        let Some(cap) = self.cap(&points) else {
+            let output = ImplicitOutput {
+                sdf: head(field.first.clone()),
+                features,
+                gradient: field.gradient,
+            };
+            return (field.first, output);
+        };
+        let capped = field.first.clone().greater(cap.value.clone());
+        let sdf = field.first.mask_where(capped.clone(), cap.value);
+        let gradient_capped = capped.narrow(0, 0, full_rows).expand([full_rows, 3]);
+        let output = ImplicitOutput {
+            sdf: head(sdf.clone()),
+            features,
+            gradient: field
+                .gradient
+                .mask_where(gradient_capped, head(cap.gradient)),
+        };
+        (sdf, output)
+    }
+
+    /// Distance, features and gradient without the bounding sphere.
+    pub fn evaluate_uncapped(&self, points: Tensor<2>) -> ImplicitOutput {
+        let query = FieldQuery {
+            others: true,
+            ..FieldQuery::default()
+        };
+        let field = self.mlp.field(points, query);
+        ImplicitOutput {
+            sdf: field.first,
+            features: field.others.expect("features were asked for"),
+            gradient: field.gradient,
+        }
+    }
+
+    /// The gradient of the distance without the bounding sphere, `[N, 3]`: what
+    /// the eikonal term looks at.
+    pub fn gradient_uncapped(&self, points: Tensor<2>) -> Tensor<2> {
+        self.mlp.field(points, FieldQuery::default()).gradient
+    }
+
+    /// The capped distance alone, `[N, 1]`.
+    pub fn sdf(&self, points: Tensor<2>) -> Tensor<2> {
+        let raw = self.mlp.forward(points.clone()).narrow(1, 0, 1);
+        match self.cap(&points) {
             None => raw,
             Some(Cap { value, .. }) => {
                 let capped = raw.clone().greater(value.clone());
                 raw.mask_where(capped, value)
             }
-        };
-        RecordedDistances { pass, sdf }
-    }
-
-    /// Distance, features and gradient without the bounding sphere: what the
-    /// eikonal term looks at.
-    pub fn evaluate_uncapped(&self, points: Tensor<2>) -> ImplicitOutput {
-        let pass = self.mlp.record(points);
-        ImplicitOutput {
-            gradient: pass.gradient(&self.mlp),
-            sdf: pass.outputs.clone().narrow(1, 0, 1),
-            features: features(pass.outputs),
         }
     }
 
-    /// The capped distance alone, `[N, 1]`.
-    pub fn sdf(&self, points: Tensor<2>) -> Tensor<2> {
-        self.record(points).sdf
-    }
-
-    fn with_gradient(&self, pass: Recorded) -> ImplicitOutput {
-        let gradient = pass.gradient(&self.mlp);
-        let raw = pass.outputs.clone().narrow(1, 0, 1);
-        let features = features(pass.outputs);
-        let Some(cap) = self.cap(&pass.points) else {
-            return ImplicitOutput {
-                sdf: raw,
-                features,
-                gradient,
-            };
+    /// A query for distances at points on the host, with the parameters as they
+    /// are now and without gradients: computed there too where `device`, which
+    /// holds the network, is the CPU.
+    pub fn distances(&self, device: &Device) -> Distances {
+        let network = match self.mlp.on_host() {
+            Some(network) => QueriedNetwork::OnHost(network),
+            None => QueriedNetwork::OnDevice(Box::new(self.valid()), device.clone().inner()),
         };
-        let capped = raw.clone().greater(cap.value.clone());
-        let shape = gradient.dims();
-        ImplicitOutput {
-            sdf: raw.mask_where(capped.clone(), cap.value),
-            features,
-            gradient: gradient.mask_where(capped.expand(shape), cap.gradient),
+        Distances {
+            network,
+            bounding_sphere_slope: self.bounding_sphere_slope.map(|s| s as f32),
+            scene_radius: self.scene_radius as f32,
         }
     }
 
@@ -264,8 +280,66 @@ struct Cap {
     gradient: Tensor<2>,
 }
 
-/// Everything but the distance.
-fn features(outputs: Tensor<2>) -> Tensor<2> {
-    let width = outputs.dims()[1] - 1;
-    outputs.narrow(1, 1, width)
+/// A network that answers for distances at points on the host.
+#[derive(Debug)]
+pub struct Distances {
+    network: QueriedNetwork,
+    bounding_sphere_slope: Option<f32>,
+    scene_radius: f32,
+}
+
+#[derive(Debug)]
+enum QueriedNetwork {
+    OnHost(SoftplusNetwork),
+    OnDevice(Box<ImplicitNetwork>, Device),
+}
+
+/// Points per call of a device: bounds the memory of a query.
+const POINT_CHUNK: usize = 16_384;
+
+impl Distances {
+    /// The network's distance at each point, without the bounding sphere.
+    pub fn uncapped(&self, points: &[[f32; 3]]) -> Vec<f32> {
+        match &self.network {
+            QueriedNetwork::OnHost(network) => network.first(points.as_flattened()),
+            QueriedNetwork::OnDevice(network, device) => points
+                .chunks(POINT_CHUNK)
+                .flat_map(|chunk| {
+                    let flat = chunk.as_flattened().to_vec();
+                    let points = TensorData::new(flat, [chunk.len(), 3]);
+                    let outputs = network.mlp.forward(Tensor::from_data(points, device));
+                    let data = outputs.narrow(1, 0, 1).into_data().convert::<f32>();
+                    data.try_into_vec_as::<f32>()
+                        .expect("Distances: just converted to float32")
+                })
+                .collect(),
+        }
+    }
+
+    /// The capped distance at each point.
+    pub fn capped(&self, points: &[[f32; 3]]) -> Vec<f32> {
+        let mut distances = self.uncapped(points);
+        self.cap(points, &mut distances);
+        distances
+    }
+
+    /// Caps distances at `points` by the bounding sphere.
+    pub fn cap(&self, points: &[[f32; 3]], distances: &mut [f32]) {
+        let Some(slope) = self.bounding_sphere_slope else {
+            return;
+        };
+        for (distance, [x, y, z]) in distances.iter_mut().zip(points) {
+            let cap = slope * (self.scene_radius - (x * x + y * y + z * z).sqrt());
+            // Not `min`, which would hide a distance that is no number.
+            if *distance > cap {
+                *distance = cap;
+            }
+        }
+    }
+}
+
+impl DistanceQuery for Distances {
+    fn distances(&mut self, points: &[[f32; 3]]) -> Vec<f32> {
+        self.capped(points)
+    }
 }

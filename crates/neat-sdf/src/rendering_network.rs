@@ -2,7 +2,7 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation};
-use neat_tensor::{PositionalEncoding, ReluMlp};
+use neat_tensor::{PositionalEncoding, ReluMlp, SampleInputs};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -59,20 +59,17 @@ impl RenderingNetworkConfig {
 }
 
 impl RenderingNetwork {
-    /// `points`, `view_directions` (unit), `gradients` (raw, of the distance)
-    /// `[N, 3]` and `features` `[N, F]` → colours `[N, 3]`.
-    pub fn forward(
-        &self,
-        points: Tensor<2>,
-        view_directions: Tensor<2>,
-        gradients: Tensor<2>,
-        features: Tensor<2>,
-    ) -> Tensor<2> {
+    /// `rays` `[N, 6]` (point, unit viewing direction), `gradients` (raw, of the
+    /// distance) `[N, 3]` and `features` `[N, F]` → colours `[N, 3]`.
+    pub fn forward(&self, rays: Tensor<2>, gradients: Tensor<2>, features: Tensor<2>) -> Tensor<2> {
         let view = PositionalEncoding {
             octaves: self.view_octaves,
-        }
-        .encode(view_directions);
-        let input = Tensor::cat(vec![points, view, gradients, features], 1);
-        activation::sigmoid(self.mlp.forward(input))
+        };
+        activation::sigmoid(self.mlp.forward_samples(SampleInputs {
+            rays,
+            ray_parts: vec![(0, 3, PositionalEncoding { octaves: 0 }), (3, 3, view)],
+            gradients,
+            features,
+        }))
     }
 }

@@ -139,7 +139,7 @@ fn vulkan_device() -> Result<Device, BackendError> {
     use burn::tensor::DeviceType;
     let software = std::env::var_os(SOFTWARE_VULKAN).is_some_and(|value| value != "0");
     // Enumeration lists discrete GPUs first and software devices last.
-    let device = Device::enumerate(DeviceType::Vulkan)
+    let device = Device::enumerate(DeviceType::Wgpu)
         .into_vec()
         .into_iter()
         .next()

@@ -6,12 +6,18 @@
 //! as a reverse sweep in plain tensor operations: a function of the weights and
 //! of the recorded pre-activations like any other, which reverse mode then
 //! differentiates for the eikonal, colour and segment terms.
+//!
+//! On the CPU in float32, [`CoordinateMlp::field`] is one fused operation instead
+//! ([`crate::fused`]), which these tensor operations explain and check.
 
 use crate::encoding::PositionalEncoding;
-use crate::linear::{Linear, affine};
+use crate::fused::{self, SoftplusRequest};
+use crate::kernels::softplus_network::{SoftplusNetwork, SoftplusShape};
+use crate::linear::{Linear, affine, flat_parameters, layer_shapes};
 use crate::softplus::{softplus, softplus_derivative};
 use burn::module::Module;
-use burn::tensor::{Int, Tensor};
+use burn::tensor::{DType, Tensor};
+use pulp::Arch;
 
 /// A softplus perceptron over the positional encoding of points.
 #[derive(Module, Debug)]
@@ -70,6 +76,103 @@ impl CoordinateMlp {
     }
 }
 
+/// Which rows of a query want what.
+#[derive(Clone, Debug, Default)]
+pub struct FieldQuery {
+    /// First outputs that are known from an earlier evaluation with the same
+    /// parameters, of the last rows. Of those rows only the first output is
+    /// wanted; the others are full rows.
+    pub known_first: Vec<f32>,
+    /// Whether full rows want the outputs beyond the first.
+    pub others: bool,
+}
+
+/// What a network says of `N` points, the first `H` of them full rows.
+#[derive(Clone, Debug)]
+pub struct Field {
+    /// First output `[N, 1]`.
+    pub first: Tensor<2>,
+    /// Its gradient with respect to the point `[H, 3]`.
+    pub gradient: Tensor<2>,
+    /// The other outputs `[H, out − 1]`, if asked for.
+    pub others: Option<Tensor<2>>,
+}
+
+impl CoordinateMlp {
+    /// First output, its gradient and the other outputs at `points` `[N, 3]`, as
+    /// far as `query` wants them.
+    pub fn field(&self, points: Tensor<2>, query: FieldQuery) -> Field {
+        if fused::takes_fused(&points) {
+            self.fused_field(points, query)
+        } else {
+            self.plain_field(points, query)
+        }
+    }
+
+    /// [`Self::field`] in plain tensor operations, on any device: the readable
+    /// twin of the fused operation.
+    pub fn plain_field(&self, points: Tensor<2>, query: FieldQuery) -> Field {
+        let full_rows = points.dims()[0] - query.known_first.len();
+        let pass = self.record(points);
+        let outputs = pass.outputs.dims()[1];
+        Field {
+            first: pass.outputs.clone().narrow(1, 0, 1),
+            gradient: pass.head(full_rows).gradient(self),
+            others: query.others.then(|| {
+                let full = pass.outputs.narrow(0, 0, full_rows);
+                full.narrow(1, 1, outputs - 1)
+            }),
+        }
+    }
+
+    fn fused_field(&self, points: Tensor<2>, query: FieldQuery) -> Field {
+        let rows = points.dims()[0];
+        let full_rows = rows - query.known_first.len();
+        let shape = self.shape();
+        let others = shape.layers[shape.layers.len() - 1].outputs - 1;
+        let request = SoftplusRequest {
+            shape,
+            full_rows,
+            others: query.others,
+            known_first: query.known_first,
+        };
+        let flat = fused::softplus_network(points, flat_parameters(&self.layers), request);
+        let part = |start: usize, columns: usize, rows: usize| {
+            flat.clone()
+                .narrow(0, start, rows * columns)
+                .reshape([rows, columns])
+        };
+        Field {
+            first: part(0, 1, rows),
+            gradient: part(rows, 3, full_rows),
+            others: query
+                .others
+                .then(|| part(rows + 3 * full_rows, others, full_rows)),
+        }
+    }
+
+    /// The network on the host, for queries without gradients: where it computes
+    /// on the CPU in float32.
+    pub fn on_host(&self) -> Option<SoftplusNetwork> {
+        let parameters = flat_parameters(&self.layers).detach();
+        if parameters.dtype() != DType::F32 || !fused::is_fused(&parameters.device()) {
+            return None;
+        }
+        let parameters = parameters.into_data();
+        let parameters = parameters.as_slice().ok()?;
+        Some(SoftplusNetwork::new(Arch::new(), &self.shape(), parameters))
+    }
+
+    fn shape(&self) -> SoftplusShape {
+        SoftplusShape {
+            layers: layer_shapes(&self.layers),
+            octaves: self.octaves,
+            skip: self.skip,
+            sharpness: self.sharpness as f32,
+        }
+    }
+}
+
 /// A forward pass with everything its gradient needs.
 #[derive(Clone, Debug)]
 pub struct Recorded {
@@ -84,13 +187,13 @@ pub struct Recorded {
 }
 
 impl Recorded {
-    /// The same pass at some of its rows only.
-    pub fn select(&self, rows: Tensor<1, Int>) -> Self {
-        let at_rows = |t: &Tensor<2>| t.clone().select(0, rows.clone());
+    /// The same pass at its first `rows` rows only.
+    fn head(&self, rows: usize) -> Self {
+        let head = |t: &Tensor<2>| t.clone().narrow(0, 0, rows);
         Self {
-            points: at_rows(&self.points),
-            outputs: at_rows(&self.outputs),
-            pre_activations: self.pre_activations.iter().map(at_rows).collect(),
+            points: head(&self.points),
+            outputs: head(&self.outputs),
+            pre_activations: self.pre_activations.iter().map(head).collect(),
             weights: self.weights.clone(),
         }
     }

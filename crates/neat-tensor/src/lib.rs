@@ -5,19 +5,26 @@
 //! encoding's Jacobian, softplus with its derivative, a multilayer perceptron
 //! that also returns the gradient of its output with respect to its input — is
 //! written in plain tensor operations, so that first-order reverse mode
-//! differentiates the input gradient once more.
+//! differentiates the input gradient once more; and, for the CPU, as fused
+//! operations ([`fused`]) over hand-written [`kernels`] that compute the same.
 
 pub mod adam;
 pub mod backend;
 pub mod checkpoint;
 pub mod coordinate_mlp;
 pub mod encoding;
+pub mod fused;
+#[allow(
+    unsafe_code,
+    reason = "register tiles over raw pointers, each with its bounds checked"
+)]
+pub mod kernels;
 pub mod linear;
 pub mod parameters;
 pub mod random;
 pub mod softplus;
 
 pub use backend::{Backend, BackendError};
-pub use coordinate_mlp::{CoordinateMlp, Recorded};
+pub use coordinate_mlp::{CoordinateMlp, Field, FieldQuery, Recorded};
 pub use encoding::PositionalEncoding;
-pub use linear::{Linear, ReluMlp};
+pub use linear::{Linear, ReluMlp, SampleInputs};

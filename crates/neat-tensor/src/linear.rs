@@ -1,5 +1,9 @@
 //! Affine layers, plain or with weight normalisation, and the ReLU perceptron.
 
+use crate::encoding::PositionalEncoding;
+use crate::fused;
+use crate::kernels::relu_network::{PartShape, ReluShape};
+use crate::kernels::weight_gradient::LayerShape;
 use crate::random::standard_normal;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData, activation};
@@ -143,6 +147,43 @@ pub(crate) fn affine(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<1>) -> Tensor
     x.matmul(weight.transpose()) + bias.unsqueeze()
 }
 
+/// Inputs and outputs of each layer.
+pub(crate) fn layer_shapes(layers: &[Linear]) -> Vec<LayerShape> {
+    layers
+        .iter()
+        .map(|layer| {
+            let [outputs, inputs] = match (&layer.weight, &layer.weight_v) {
+                (Some(weight), _) | (None, Some(weight)) => weight.dims(),
+                _ => unreachable!("Linear::new sets `weight` or `weight_v`"),
+            };
+            LayerShape { inputs, outputs }
+        })
+        .collect()
+}
+
+/// Effective weight and bias of each layer, one after the other.
+pub(crate) fn flat_parameters(layers: &[Linear]) -> Tensor<1> {
+    let flat = layers.iter().flat_map(|layer| {
+        let weight = layer.effective_weight();
+        let count = weight.shape().num_elements();
+        [weight.reshape([count]), layer.bias.val()]
+    });
+    Tensor::cat(flat.collect(), 0)
+}
+
+/// Per row: what a perceptron over samples of a signed distance field sees.
+#[derive(Clone, Debug)]
+pub struct SampleInputs {
+    /// Columns that carry no gradient in training, `[N, C]`: points, directions.
+    pub rays: Tensor<2>,
+    /// How they are read, in order: first column, columns, octaves.
+    pub ray_parts: Vec<(usize, usize, PositionalEncoding)>,
+    /// Gradients of the distance `[N, 3]`.
+    pub gradients: Tensor<2>,
+    /// Features `[N, F]`.
+    pub features: Tensor<2>,
+}
+
 /// A perceptron with ReLU between its layers and a linear last layer.
 #[derive(Module, Debug)]
 pub struct ReluMlp {
@@ -174,5 +215,62 @@ impl ReluMlp {
             .iter()
             .fold(x, |x, layer| activation::relu(layer.forward(x)));
         last.forward(x)
+    }
+
+    /// [`Self::forward`] of encoded ray columns, gradients and features side by
+    /// side.
+    pub fn forward_samples(&self, inputs: SampleInputs) -> Tensor<2> {
+        if fused::takes_fused(&inputs.rays) {
+            self.fused_samples(inputs)
+        } else {
+            self.plain_samples(inputs)
+        }
+    }
+
+    /// [`Self::forward_samples`] in plain tensor operations, on any device: the
+    /// readable twin of the fused operation.
+    pub fn plain_samples(&self, inputs: SampleInputs) -> Tensor<2> {
+        let mut columns: Vec<Tensor<2>> = inputs
+            .ray_parts
+            .iter()
+            .map(|(first, width, encoding)| {
+                encoding.encode(inputs.rays.clone().narrow(1, *first, *width))
+            })
+            .collect();
+        columns.extend([inputs.gradients, inputs.features]);
+        self.forward(Tensor::cat(columns, 1))
+    }
+
+    fn fused_samples(&self, inputs: SampleInputs) -> Tensor<2> {
+        let sources = [&inputs.rays, &inputs.gradients, &inputs.features].map(|t| t.dims()[1]);
+        let whole = |source: usize| PartShape {
+            source,
+            column: 0,
+            width: sources[source],
+            octaves: 0,
+        };
+        let mut parts: Vec<PartShape> = inputs
+            .ray_parts
+            .iter()
+            .map(|(column, width, encoding)| PartShape {
+                source: 0,
+                column: *column,
+                width: *width,
+                octaves: encoding.octaves,
+            })
+            .collect();
+        parts.extend([whole(1), whole(2)]);
+        let shape = ReluShape {
+            layers: layer_shapes(&self.layers),
+            sources: sources.to_vec(),
+            parts,
+        };
+        fused::relu_network(
+            inputs.rays,
+            inputs.gradients,
+            inputs.features,
+            flat_parameters(&self.layers),
+            shape,
+        )
     }
 }

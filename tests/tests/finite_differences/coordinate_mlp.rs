@@ -1,12 +1,11 @@
 //! The network's gradient with respect to the point, and the gradients of losses
 //! of it with respect to every parameter.
 
-use burn::tensor::{DType, Int, Tensor, TensorData};
-use neat_tensor::coordinate_mlp::Recorded;
+use burn::tensor::{DType, Tensor, TensorData};
 use neat_tensor::linear::LinearInit;
 use neat_tensor::parameters::{load_parameters, named_parameters};
 use neat_tensor::random::{Purpose, stream};
-use neat_tensor::{CoordinateMlp, Linear, PositionalEncoding};
+use neat_tensor::{CoordinateMlp, FieldQuery, Linear, PositionalEncoding};
 use neat_tests::backends::flex;
 use neat_tests::comparison::assert_relatively_close;
 use neat_tests::finite_differences::{STEP, constant, normal};
@@ -76,11 +75,6 @@ fn points() -> Vec<f64> {
     normal(POINTS * 3, 11)
 }
 
-/// Rows out of order, one of them twice.
-fn selection() -> Tensor<1, Int> {
-    Tensor::from_data(TensorData::from([4i64, 0, 2, 4]), &flex())
-}
-
 #[test]
 fn the_gradient_is_that_of_the_first_output() {
     for settings in Settings::all() {
@@ -106,47 +100,58 @@ fn the_gradient_is_that_of_the_first_output() {
 }
 
 #[test]
-fn selected_rows_are_rows_of_all() {
+fn a_field_is_what_its_rows_say() {
     for settings in Settings::all() {
         let network = settings.network();
         let recorded = network.record(constant(points(), [POINTS, 3]));
-        let selected = recorded.select(selection());
-        let of_all = |t: Tensor<2>| numbers(t.select(0, selection()));
+        let field = network.field(constant(points(), [POINTS, 3]), query());
+        let head = |t: Tensor<2>| numbers(t.narrow(0, 0, FULL_ROWS));
         assert_eq!(
-            numbers(selected.gradient(&network)),
-            of_all(recorded.gradient(&network)),
+            numbers(field.gradient),
+            head(recorded.gradient(&network)),
             "{settings:?}"
         );
-        assert_eq!(numbers(selected.outputs), of_all(recorded.outputs));
-        assert_eq!(numbers(selected.points), of_all(recorded.points));
+        assert_eq!(
+            numbers(field.first),
+            numbers(recorded.outputs.clone().narrow(1, 0, 1))
+        );
+        assert_eq!(
+            numbers(field.others.expect("asked for")),
+            head(recorded.outputs.narrow(1, 1, OUTPUTS - 1))
+        );
     }
 }
 
-/// A loss of outputs and gradient, linear in neither.
-fn loss(network: &CoordinateMlp, rows: Option<Tensor<1, Int>>) -> Tensor<1> {
-    let recorded = network.record(constant(points(), [POINTS, 3]));
-    let of = |pass: &Recorded| {
-        let [rows, outputs] = pass.outputs.dims();
-        let weights = |count: usize, seed: u64| normal(count, seed);
-        let of_outputs =
-            pass.outputs.clone().square() * constant(weights(rows * outputs, 21), [rows, outputs]);
-        let of_gradient =
-            pass.gradient(network).square() * constant(weights(rows * 3, 22), [rows, 3]);
-        of_outputs.sum() + of_gradient.sum()
-    };
-    match rows {
-        None => of(&recorded),
-        // All outputs count, the gradient at some rows only: as in training.
-        Some(rows) => of(&recorded.select(rows)) + recorded.outputs.sum(),
+/// Rows that are evaluated in full.
+const FULL_ROWS: usize = 4;
+
+/// Plain tensor operations compute known distances again.
+fn query() -> FieldQuery {
+    FieldQuery {
+        known_first: vec![0.0; POINTS - FULL_ROWS],
+        others: true,
     }
+}
+
+/// A loss of outputs and gradient, linear in neither: of full rows everything
+/// counts, of the others the first output.
+fn loss(network: &CoordinateMlp) -> Tensor<1> {
+    let field = network.field(constant(points(), [POINTS, 3]), query());
+    let weighted = |t: Tensor<2>, seed: u64| {
+        let [rows, columns] = t.dims();
+        (t.square() * constant(normal(rows * columns, seed), [rows, columns])).sum()
+    };
+    weighted(field.first, 21)
+        + weighted(field.others.expect("asked for"), 22)
+        + weighted(field.gradient, 23)
 }
 
 /// Compares each parameter's gradient with the difference along one random
 /// direction: two evaluations per parameter instead of two per number.
-fn check(settings: Settings, rows: Option<Tensor<1, Int>>) {
+fn check(settings: Settings) {
     let network = settings.network();
     let parameters = named_parameters(&network);
-    let gradients = named_gradients(&network, loss(&network, rows.clone()).backward());
+    let gradients = named_gradients(&network, loss(&network).backward());
     let names: Vec<&String> = gradients.keys().collect();
     let moved = |name: &String, direction: &[f64], by: f64| {
         let mut parameters: BTreeMap<String, TensorData> = parameters.clone();
@@ -157,7 +162,7 @@ fn check(settings: Settings, rows: Option<Tensor<1, Int>>) {
         let values = values.iter().zip(direction).map(|(v, d)| v + by * d);
         *data = TensorData::new(values.collect::<Vec<f64>>(), data.shape().to_vec());
         let moved = load_parameters(network.clone(), parameters, None).expect("the same shapes");
-        numbers(loss(&moved, rows.clone()))[0]
+        numbers(loss(&moved))[0]
     };
     for (seed, name) in names.into_iter().enumerate() {
         let gradient = &gradients[name];
@@ -173,13 +178,6 @@ fn check(settings: Settings, rows: Option<Tensor<1, Int>>) {
 #[test]
 fn losses_of_outputs_and_gradient_train_all_parameters() {
     for settings in Settings::all() {
-        check(settings, None);
-    }
-}
-
-#[test]
-fn so_do_losses_at_selected_rows() {
-    for settings in Settings::all() {
-        check(settings, Some(selection()));
+        check(settings);
     }
 }

@@ -101,7 +101,9 @@ fn radiance() {
             &golden,
             &device,
             untrained,
-            |network, [x, view, gradient, features]| network.forward(x, view, gradient, features),
+            |network, [x, view, gradient, features]| {
+                network.forward(Tensor::cat(vec![x, view], 1), gradient, features)
+            },
         );
     });
 }
@@ -123,7 +125,9 @@ fn attraction() {
             &golden,
             &device,
             untrained,
-            |network, [x, view, gradient, features]| network.forward(x, view, gradient, features),
+            |network, [x, view, gradient, features]| {
+                network.forward(Tensor::cat(vec![x, view], 1), gradient, features)
+            },
         );
     });
 }

@@ -1,0 +1,433 @@
+//! Coordinate networks as single operations: burn's extension trait, its
+//! derivatives, and what decides where it is used.
+//!
+//! On the CPU backends a whole network, with the gradient of its first output, is
+//! one operation over [`crate::kernels`]. Elsewhere, and in float64, the plain
+//! tensor operations of [`crate::coordinate_mlp`] and [`crate::linear`] do the
+//! same; they are also the oracle of the tests.
+
+#![allow(deprecated)] // ndarray is still one of the backends that neat promises
+
+use crate::kernels::relu_network::{self, ReluNetwork, ReluShape};
+use crate::kernels::softplus_network::{
+    self, SoftplusAdjoint, SoftplusNetwork, SoftplusOutput, SoftplusShape,
+};
+use burn::backend::tensor::{Device as BackendDevice, FloatTensor};
+use burn::backend::{Backend, TensorMetadata, backend_extension};
+use burn::tensor::{DType, Device, Tensor, TensorData};
+use burn_autodiff::Autodiff;
+use burn_autodiff::checkpoint::base::Checkpointer;
+use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
+use burn_autodiff::grads::Gradients;
+use burn_autodiff::ops::{Backward, Ops, OpsKind};
+use pulp::Arch;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Whether networks on `device` run as fused operations (in float32).
+pub fn is_fused(device: &Device) -> bool {
+    use burn::backend::DispatchDevice;
+    match device.clone().inner().as_dispatch() {
+        #[cfg(feature = "flex")]
+        DispatchDevice::Flex(_) => true,
+        #[cfg(feature = "ndarray")]
+        DispatchDevice::NdArray(_) => true,
+        _ => false,
+    }
+}
+
+/// What is asked of a signed distance network.
+#[derive(Clone, Debug)]
+pub struct SoftplusRequest {
+    /// The network.
+    pub shape: SoftplusShape,
+    /// So many first rows are evaluated in full: distance, gradient and, where
+    /// asked for, the other outputs. Of the rest only the distance matters.
+    pub full_rows: usize,
+    /// Whether outputs other than the first are wanted.
+    pub others: bool,
+    /// The first output of the remaining rows, known from an earlier evaluation
+    /// with the same parameters.
+    pub known_first: Vec<f32>,
+}
+
+/// Networks as operations of a backend.
+///
+/// Tensors are float32. `parameters` `[P]` holds of each layer the weight
+/// `[outputs, inputs]`, row-major, then the bias.
+#[backend_extension(
+    Flex: cfg(feature = "flex"),
+    NdArray: cfg(feature = "ndarray"),
+    Autodiff,
+)]
+pub trait FusedNetworks: Backend {
+    /// Evaluates a softplus network at `points` `[N, 3]`. The result is flat: the
+    /// first output of all rows `[N]`, then of the `H` full rows the gradient
+    /// `[H, 3]` and the other outputs `[H, outputs − 1]`.
+    fn softplus_network(
+        points: FloatTensor<Self>,
+        parameters: FloatTensor<Self>,
+        request: SoftplusRequest,
+    ) -> FloatTensor<Self>;
+
+    /// Evaluates a ReLU perceptron at rows `[inputs, gradients, features]`
+    /// `[N, ·]`; `inputs` may consist of several parts of the shape.
+    fn relu_network(
+        inputs: FloatTensor<Self>,
+        gradients: FloatTensor<Self>,
+        features: FloatTensor<Self>,
+        parameters: FloatTensor<Self>,
+        shape: ReluShape,
+    ) -> FloatTensor<Self>;
+}
+
+/// The host's copy of a tensor of a CPU backend.
+fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
+    use std::task::{Context, Poll, Waker};
+    let future = std::pin::pin!(B::float_into_data(tensor));
+    match future.poll(&mut Context::from_waker(Waker::noop())) {
+        Poll::Ready(data) => data.expect("fused: the memory of a CPU backend can be read"),
+        Poll::Pending => unreachable!("fused: CPU backends compute before they return"),
+    }
+}
+
+fn slice(data: &TensorData) -> &[f32] {
+    data.as_slice().expect("fused: networks are float32 here")
+}
+
+fn write<B: Backend>(
+    values: Vec<f32>,
+    shape: impl Into<Vec<usize>>,
+    device: &BackendDevice<B>,
+) -> FloatTensor<B> {
+    B::float_from_data(TensorData::new(values, shape.into()), device)
+}
+
+/// Bytes of all tapes that wait for their backward pass.
+static TAPE_BYTES: AtomicUsize = AtomicUsize::new(0);
+/// Most of them: beyond, activations are computed again.
+const MAX_TAPE_BYTES: usize = 2 << 30;
+
+/// The activations of a forward pass, taken by its backward pass.
+#[derive(Debug)]
+struct Tape<T>(Arc<TapeSlot<T>>);
+
+impl<T> Clone for Tape<T> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+#[derive(Debug)]
+struct TapeSlot<T> {
+    tape: Mutex<Option<T>>,
+    bytes: usize,
+}
+
+impl<T> Drop for TapeSlot<T> {
+    fn drop(&mut self) {
+        TAPE_BYTES.fetch_sub(self.bytes, Ordering::Relaxed);
+    }
+}
+
+/// Whether `bytes` more fit; then they are booked.
+fn book(bytes: usize) -> bool {
+    let fits = |used: usize| used.checked_add(bytes).filter(|sum| *sum <= MAX_TAPE_BYTES);
+    TAPE_BYTES
+        .fetch_update(Ordering::Relaxed, Ordering::Relaxed, fits)
+        .is_ok()
+}
+
+impl<T> Tape<T> {
+    /// `bytes` were booked if there is a tape.
+    fn new(tape: Option<T>, bytes: usize) -> Self {
+        let bytes = if tape.is_some() { bytes } else { 0 };
+        Self(Arc::new(TapeSlot {
+            tape: Mutex::new(tape),
+            bytes,
+        }))
+    }
+
+    fn take(&self) -> Option<T> {
+        let mut tape = self.0.tape.lock().unwrap_or_else(PoisonError::into_inner);
+        tape.take()
+    }
+}
+
+fn softplus_forward<B: Backend>(
+    points: FloatTensor<B>,
+    parameters: FloatTensor<B>,
+    request: &SoftplusRequest,
+    keep: bool,
+) -> (FloatTensor<B>, Option<softplus_network::Tape>) {
+    let device = points.device();
+    let (points, parameters) = (read::<B>(points), read::<B>(parameters));
+    let full = request.full_rows;
+    let network = SoftplusNetwork::new(Arch::new(), &request.shape, slice(&parameters));
+    let (full_points, rest) = slice(&points).split_at(3 * full);
+    assert_eq!(
+        3 * request.known_first.len(),
+        rest.len(),
+        "softplus_network: a known distance for each row beyond the full ones"
+    );
+    let (output, tape) = network.forward(full_points, request.others, keep);
+    let SoftplusOutput {
+        first: mut flat,
+        gradient,
+        others,
+    } = output;
+    flat.reserve_exact(request.known_first.len() + gradient.len() + others.len());
+    flat.extend_from_slice(&request.known_first);
+    flat.extend_from_slice(&gradient);
+    flat.extend_from_slice(&others);
+    let len = flat.len();
+    (write::<B>(flat, [len], &device), tape)
+}
+
+fn relu_forward<B: Backend>(
+    [inputs, gradients, features, parameters]: [FloatTensor<B>; 4],
+    shape: &ReluShape,
+    keep: bool,
+) -> (FloatTensor<B>, Option<relu_network::Tape>) {
+    let device = inputs.device();
+    let rows = inputs.shape()[0];
+    let [inputs, gradients, features, parameters] =
+        [inputs, gradients, features, parameters].map(read::<B>);
+    let network = ReluNetwork::new(Arch::new(), shape, slice(&parameters));
+    let inputs = [slice(&inputs), slice(&gradients), slice(&features)];
+    let (out, tape) = network.forward(rows, &inputs, keep);
+    (write::<B>(out, [rows, shape.outputs()], &device), tape)
+}
+
+macro_rules! on_the_host {
+    ($backend:ty) => {
+        impl FusedNetworks for $backend {
+            fn softplus_network(
+                points: FloatTensor<Self>,
+                parameters: FloatTensor<Self>,
+                request: SoftplusRequest,
+            ) -> FloatTensor<Self> {
+                softplus_forward::<Self>(points, parameters, &request, false).0
+            }
+
+            fn relu_network(
+                inputs: FloatTensor<Self>,
+                gradients: FloatTensor<Self>,
+                features: FloatTensor<Self>,
+                parameters: FloatTensor<Self>,
+                shape: ReluShape,
+            ) -> FloatTensor<Self> {
+                let tensors = [inputs, gradients, features, parameters];
+                relu_forward::<Self>(tensors, &shape, false).0
+            }
+        }
+    };
+}
+
+#[cfg(feature = "flex")]
+on_the_host!(burn::backend::Flex);
+#[cfg(feature = "ndarray")]
+on_the_host!(burn::backend::NdArray);
+
+/// Derivative of [`FusedNetworks::softplus_network`].
+#[derive(Debug)]
+struct SoftplusOp;
+
+#[derive(Clone, Debug)]
+struct SoftplusState<B: Backend> {
+    points: FloatTensor<B>,
+    parameters: FloatTensor<B>,
+    request: SoftplusRequest,
+    tape: Tape<softplus_network::Tape>,
+}
+
+impl<B: Backend> Backward<B, 2> for SoftplusOp {
+    type State = SoftplusState<B>;
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 2>,
+        gradients: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let SoftplusState {
+            points,
+            parameters,
+            request,
+            tape,
+        } = ops.state;
+        let device = points.device();
+        let adjoint = read::<B>(gradients.consume::<B>(&ops.node));
+        let (points, parameters) = (read::<B>(points), read::<B>(parameters));
+        let points = slice(&points);
+        let rows = points.len() / 3;
+        let (first, adjoint) = slice(&adjoint).split_at(rows);
+        let (gradient, others) = adjoint.split_at(3 * request.full_rows);
+        let network = SoftplusNetwork::new(Arch::new(), &request.shape, slice(&parameters));
+        let [of_points, of_parameters] = ops.parents;
+        let adjoint = SoftplusAdjoint {
+            first,
+            gradient,
+            others,
+        };
+        let (to_parameters, to_points) =
+            network.backward(points, adjoint, tape.take(), of_points.is_some());
+        if let Some(node) = of_parameters {
+            let len = to_parameters.len();
+            gradients.register::<B>(node.id, write::<B>(to_parameters, [len], &device));
+        }
+        if let (Some(node), Some(to_points)) = (of_points, to_points) {
+            gradients.register::<B>(node.id, write::<B>(to_points, [rows, 3], &device));
+        }
+    }
+}
+
+/// Derivative of [`FusedNetworks::relu_network`].
+#[derive(Debug)]
+struct ReluOp;
+
+#[derive(Clone, Debug)]
+struct ReluState<B: Backend> {
+    /// Inputs, gradients, features and parameters.
+    tensors: [FloatTensor<B>; 4],
+    shape: ReluShape,
+    tape: Tape<relu_network::Tape>,
+}
+
+impl<B: Backend> Backward<B, 4> for ReluOp {
+    type State = ReluState<B>;
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 4>,
+        gradients: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let ReluState {
+            tensors,
+            shape,
+            tape,
+        } = ops.state;
+        let device = tensors[0].device();
+        let rows = tensors[0].shape()[0];
+        let adjoint = read::<B>(gradients.consume::<B>(&ops.node));
+        let [inputs, of_gradients, features, parameters] = tensors.map(read::<B>);
+        let network = ReluNetwork::new(Arch::new(), &shape, slice(&parameters));
+        let [input_node, gradient_node, feature_node, parameter_node] = ops.parents;
+        let nodes = [input_node, gradient_node, feature_node];
+        let (to_parameters, to_inputs) = network.backward(
+            rows,
+            &[slice(&inputs), slice(&of_gradients), slice(&features)],
+            slice(&adjoint),
+            tape.take(),
+            &nodes.each_ref().map(Option::is_some),
+        );
+        if let Some(node) = parameter_node {
+            let len = to_parameters.len();
+            gradients.register::<B>(node.id, write::<B>(to_parameters, [len], &device));
+        }
+        for (node, to_input) in nodes.into_iter().zip(to_inputs) {
+            if let (Some(node), Some(to_input)) = (node, to_input) {
+                let width = to_input.len().checked_div(rows).unwrap_or(0);
+                gradients.register::<B>(node.id, write::<B>(to_input, [rows, width], &device));
+            }
+        }
+    }
+}
+
+impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodiff<B, C> {
+    fn softplus_network(
+        points: FloatTensor<Self>,
+        parameters: FloatTensor<Self>,
+        request: SoftplusRequest,
+    ) -> FloatTensor<Self> {
+        let nodes = [points.node(), parameters.node()];
+        let (points, parameters) = (points.into_primitive(), parameters.into_primitive());
+        match SoftplusOp.prepare::<C>(nodes).compute_bound().stateful() {
+            OpsKind::Tracked(prepared) => {
+                let bytes = request.shape.tape_bytes(request.full_rows);
+                let keep = book(bytes);
+                let (out, tape) =
+                    softplus_forward::<B>(points.clone(), parameters.clone(), &request, keep);
+                let state = SoftplusState {
+                    points,
+                    parameters,
+                    request,
+                    tape: Tape::new(tape, bytes),
+                };
+                prepared.finish(state, out)
+            }
+            OpsKind::UnTracked(prepared) => {
+                prepared.finish(B::softplus_network(points, parameters, request))
+            }
+        }
+    }
+
+    fn relu_network(
+        inputs: FloatTensor<Self>,
+        gradients: FloatTensor<Self>,
+        features: FloatTensor<Self>,
+        parameters: FloatTensor<Self>,
+        shape: ReluShape,
+    ) -> FloatTensor<Self> {
+        let tensors = [inputs, gradients, features, parameters];
+        let nodes = tensors.each_ref().map(|tensor| tensor.node());
+        let tensors = tensors.map(|tensor| tensor.into_primitive());
+        match ReluOp.prepare::<C>(nodes).compute_bound().stateful() {
+            OpsKind::Tracked(prepared) => {
+                let bytes = shape.tape_bytes(tensors[0].shape()[0]);
+                let keep = book(bytes);
+                let (out, tape) = relu_forward::<B>(tensors.clone(), &shape, keep);
+                let state = ReluState {
+                    tensors,
+                    shape,
+                    tape: Tape::new(tape, bytes),
+                };
+                prepared.finish(state, out)
+            }
+            OpsKind::UnTracked(prepared) => {
+                let [inputs, gradients, features, parameters] = tensors;
+                prepared.finish(B::relu_network(
+                    inputs, gradients, features, parameters, shape,
+                ))
+            }
+        }
+    }
+}
+
+/// [`FusedNetworks::softplus_network`] for tensors of a fused device.
+pub(crate) fn softplus_network(
+    points: Tensor<2>,
+    parameters: Tensor<1>,
+    request: SoftplusRequest,
+) -> Tensor<1> {
+    use burn::backend::Dispatch;
+    Tensor::from_dispatch(<Dispatch as FusedNetworks>::softplus_network(
+        points.into_dispatch(),
+        parameters.into_dispatch(),
+        request,
+    ))
+}
+
+/// [`FusedNetworks::relu_network`] for tensors of a fused device.
+pub(crate) fn relu_network(
+    inputs: Tensor<2>,
+    gradients: Tensor<2>,
+    features: Tensor<2>,
+    parameters: Tensor<1>,
+    shape: ReluShape,
+) -> Tensor<2> {
+    use burn::backend::Dispatch;
+    Tensor::from_dispatch(<Dispatch as FusedNetworks>::relu_network(
+        inputs.into_dispatch(),
+        gradients.into_dispatch(),
+        features.into_dispatch(),
+        parameters.into_dispatch(),
+        shape,
+    ))
+}
+
+/// Whether `tensor` can go through a fused operation.
+pub(crate) fn takes_fused(tensor: &Tensor<2>) -> bool {
+    tensor.dtype() == DType::F32 && is_fused(&tensor.device())
+}
