@@ -98,6 +98,7 @@ impl TrainedField {
         let request = RenderRequest {
             rays,
             samples,
+            distances: &self.distances,
             beta: Tensor::from_data([self.beta], &self.device),
             min_sample_weight: self.min_sample_weight,
             segment_rays: rays.len(),

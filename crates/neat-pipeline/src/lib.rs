@@ -2,6 +2,8 @@
 //!
 //! Everything here reports through events and results; nothing draws.
 
+mod awake;
+pub mod benchmark;
 pub mod compare_backends;
 pub mod config;
 pub mod demo;
@@ -9,6 +11,7 @@ pub mod distill;
 pub mod error;
 pub mod event;
 pub mod field;
+pub mod flops;
 pub mod image_io;
 pub mod losses;
 pub mod manifest;

@@ -1,19 +1,23 @@
 //! The total loss of one iteration (paper eq. 8).
 
 use crate::config::TrainConfig;
+use crate::flops::StepRows;
 use crate::model::{NeatModel, RenderRequest, host_points, host_vec, point_tensor};
 use crate::training_data::Batch;
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::Vector2;
 use neat_core::assignment::{AssignmentError, assign};
 use neat_core::{Camera, LineSegment2};
+use neat_field::host_segment_loss::{ObservedSegment, host_segment_loss};
 use neat_field::segment_loss::{SegmentLossConfig, segment_loss};
 use neat_field::segment_rendering::{RayCameras, project_calibrated};
 use neat_gjp::candidates::{JunctionView, RenderedSegment, matching_cost};
 use neat_gjp::junction_loss::{JunctionLoss, MatchedJunctions, junction_loss};
-use neat_sdf::RaySamples;
 use neat_sdf::losses::{eikonal_loss, mask_loss, rgb_loss};
+use neat_sdf::{Distances, RaySamples};
+use neat_tensor::fused::is_fused;
 use serde::{Deserialize, Serialize};
+use std::time::{Duration, Instant};
 
 /// The loss terms of an iteration, before weighting, and their weighted sum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -42,6 +46,8 @@ pub struct StepInput<'a> {
     pub batch: &'a Batch,
     /// Where the rays are sampled.
     pub samples: &'a RaySamples,
+    /// Distances of the model as it is now.
+    pub distances: &'a Distances,
     /// Points of the eikonal term besides rendered samples.
     pub eikonal_points: &'a [[f32; 3]],
     /// The views that [`Batch::view_of_ray`] speaks of: camera and 2D junctions.
@@ -61,10 +67,12 @@ pub struct StepLoss {
     pub color: Tensor<2>,
     /// Mean pixel error of each rendered segment `[R']`.
     pub segment_errors: Vec<f32>,
-    /// Samples at which all networks were evaluated.
-    pub rendered_samples: usize,
+    /// Rows that went through the networks, but for the sampler's.
+    pub rows: StepRows,
     /// Matched pairs of local and global junctions.
     pub targets: usize,
+    /// Time spent on local junctions and their assignment.
+    pub assignment: Duration,
 }
 
 /// Renders the batch and adds up the terms.
@@ -85,6 +93,7 @@ pub fn step_loss(
         &RenderRequest {
             rays: &batch.rays,
             samples: input.samples,
+            distances: input.distances,
             beta,
             min_sample_weight: config.min_sample_weight,
             segment_rays,
@@ -94,6 +103,14 @@ pub fn step_loss(
     );
     let zero = || Tensor::<1>::zeros([1], device);
     let rays = batch.rays.len();
+    let samples = rays * input.samples.per_ray;
+    let rows = StepRows {
+        sampler: 0,
+        samples,
+        full: rendering.evaluated.as_ref().map_or(samples, Vec::len),
+        segment: rendering.segment_samples,
+        eikonal: input.eikonal_points.len(),
+    };
 
     let color = rendering.color.expect("colour was asked for");
     let rgb = rgb_loss(color.clone(), point_tensor(&batch.colors, device));
@@ -121,31 +138,18 @@ pub fn step_loss(
 
     let (mut segment, mut segment_errors) = (zero(), Vec::new());
     let (mut junction_3d, mut junction_2d, mut targets) = (zero(), zero(), 0);
+    let mut assignment = Duration::ZERO;
     if let Some(ends) = rendering.segments {
-        let cameras = ray_cameras(input, device);
-        let (observed, score) = observed_segments(input, device);
-        let projected = project_calibrated(ends.clone(), &cameras);
-        let loss = segment_loss(
-            projected,
-            observed,
-            score,
-            rendering.opacity.narrow(0, 0, segment_rays),
-            &cameras,
-            SegmentLossConfig {
-                cutoff_in_pixels: weights.segment_cutoff_in_pixels,
-                min_opacity: weights.segment_min_opacity,
-                mean_over_all_rays: weights.segment_mean_over_all_rays,
-            },
-        );
-        segment = loss.loss;
-        // The one gathered transfer of an iteration: ends, error, counted or not.
-        let gathered = host_vec(Tensor::cat(
-            vec![ends.detach(), loss.error_in_pixels, loss.counted],
-            1,
-        ));
-        segment_errors = gathered.chunks_exact(8).map(|row| row[6]).collect();
+        let opacity = rendering.opacity.narrow(0, 0, segment_rays);
+        let compared = match is_fused(device) && ends.dtype() == DType::F32 {
+            true => compare_on_host(ends, opacity, input, config),
+            false => compare_on_device(ends, opacity, input, config, device),
+        };
+        segment = compared.loss;
         if input.junctions_due {
-            let matched = junction_terms(model, input, config, &gathered, device)?;
+            let start = Instant::now();
+            let matched = junction_terms(model, input, config, &compared.rays, device)?;
+            assignment = start.elapsed();
             targets = matched.0;
             if let Some(JunctionLoss {
                 in_world,
@@ -156,6 +160,11 @@ pub fn step_loss(
                 junction_2d = calibrated.unwrap_or_else(zero);
             }
         }
+        segment_errors = compared
+            .rays
+            .iter()
+            .map(|ray| ray.error_in_pixels)
+            .collect();
     }
 
     let total = rgb.clone().mul_scalar(weights.rgb)
@@ -178,11 +187,122 @@ pub fn step_loss(
         terms: Tensor::cat(terms.map(Tensor::detach).into(), 0),
         color: color.detach(),
         segment_errors,
-        rendered_samples: rendering
-            .evaluated
-            .map_or(rays * input.samples.per_ray, |e| e.len()),
+        rows,
         targets,
+        assignment,
     })
+}
+
+/// Rendered segments beside observed ones.
+struct Compared {
+    /// The segment loss, `[1]`.
+    loss: Tensor<1>,
+    /// One entry per ray that carries a segment.
+    rays: Vec<ComparedRay>,
+}
+
+struct ComparedRay {
+    /// Both rendered ends in the world.
+    ends: [f32; 6],
+    error_in_pixels: f32,
+    counted: bool,
+}
+
+fn segment_loss_config(config: &TrainConfig) -> SegmentLossConfig {
+    SegmentLossConfig {
+        cutoff_in_pixels: config.loss.segment_cutoff_in_pixels,
+        min_opacity: config.loss.segment_min_opacity,
+        mean_over_all_rays: config.loss.segment_mean_over_all_rays,
+    }
+}
+
+/// In tensor operations, for any device.
+fn compare_on_device(
+    ends: Tensor<2>,
+    opacity: Tensor<2>,
+    input: &StepInput<'_>,
+    config: &TrainConfig,
+    device: &Device,
+) -> Compared {
+    let cameras = ray_cameras(input, device);
+    let (observed, score) = observed_segments(input, device);
+    let projected = project_calibrated(ends.clone(), &cameras);
+    let loss = segment_loss(
+        projected,
+        observed,
+        score,
+        opacity,
+        &cameras,
+        segment_loss_config(config),
+    );
+    // The one gathered transfer of an iteration: ends, error, counted or not.
+    let gathered = host_vec(Tensor::cat(
+        vec![ends.detach(), loss.error_in_pixels, loss.counted],
+        1,
+    ));
+    let rays = gathered.chunks_exact(8).map(|row| ComparedRay {
+        ends: std::array::from_fn(|i| row[i]),
+        error_in_pixels: row[6],
+        counted: row[7] > 0.0,
+    });
+    Compared {
+        loss: loss.loss,
+        rays: rays.collect(),
+    }
+}
+
+/// In one pass on the host, where the tensors are there anyway.
+fn compare_on_host(
+    ends: Tensor<2>,
+    opacity: Tensor<2>,
+    input: &StepInput<'_>,
+    config: &TrainConfig,
+) -> Compared {
+    let batch = input.batch;
+    let observed: Vec<ObservedSegment<'_>> = batch
+        .segment_of_ray
+        .iter()
+        .zip(&batch.view_of_ray)
+        .map(|(segment, view)| {
+            let camera = input.views[*view].camera;
+            let LineSegment2 { start, end } =
+                segment.segment.map(|p| camera.intrinsics.calibrate(p));
+            ObservedSegment {
+                camera,
+                ends_calibrated: [start.x, start.y, end.x, end.y].map(|c| c as f32),
+                score: segment.score as f32,
+            }
+        })
+        .collect();
+    let values = host_vec(ends.clone());
+    let compared = host_segment_loss(
+        &values,
+        &host_vec(opacity),
+        &observed,
+        segment_loss_config(config),
+    );
+    let rays = values
+        .chunks_exact(6)
+        .zip(compared.error_in_pixels.iter().zip(&compared.counted));
+    Compared {
+        rays: rays
+            .map(|(ends, (error, counted))| ComparedRay {
+                ends: std::array::from_fn(|i| ends[i]),
+                error_in_pixels: *error,
+                counted: *counted,
+            })
+            .collect(),
+        loss: with_gradient(ends, compared.loss, compared.gradient),
+    }
+}
+
+/// A tensor `[1]` of the given value, whose gradient with respect to `x` is the
+/// given one.
+fn with_gradient(x: Tensor<2>, value: f32, gradient: Vec<f32>) -> Tensor<1> {
+    let (shape, device) = (x.dims(), x.device());
+    let linear = (x * Tensor::from_data(TensorData::new(gradient, shape), &device)).sum();
+    let offset = value - host_vec(linear.clone())[0];
+    linear.add_scalar(offset)
 }
 
 impl StepLoss {
@@ -203,26 +323,25 @@ impl StepLoss {
 }
 
 /// Local junctions from the rendered ends, matched with the global ones.
-///
-/// `gathered` holds 8 numbers per ray: six coordinates of the ends, the error in
-/// pixels, and whether the ray counts.
 fn junction_terms(
     model: &NeatModel,
     input: &StepInput<'_>,
     config: &TrainConfig,
-    gathered: &[f32],
+    rays: &[ComparedRay],
     device: &Device,
 ) -> Result<(usize, Option<JunctionLoss>), AssignmentError> {
     let batch = input.batch;
-    let segments: Vec<RenderedSegment> = gathered
-        .chunks_exact(8)
+    let segments: Vec<RenderedSegment> = rays
+        .iter()
         .zip(batch.view_of_ray.iter().zip(&batch.segment_of_ray))
-        .filter(|(row, _)| !config.only_counted_ends || row[7] > 0.0)
-        .map(|(row, (view, detected))| RenderedSegment {
-            view: *view,
-            ends_in_world: [[row[0], row[1], row[2]], [row[3], row[4], row[5]]],
-            detected: detected.segment,
-        })
+        .filter(|(ray, _)| !config.only_counted_ends || ray.counted)
+        .map(
+            |(ComparedRay { ends: e, .. }, (view, detected))| RenderedSegment {
+                view: *view,
+                ends_in_world: [[e[0], e[1], e[2]], [e[3], e[4], e[5]]],
+                detected: detected.segment,
+            },
+        )
         .collect();
     let local = config.candidates.local_junctions(&segments, input.views)?;
     if local.is_empty() {

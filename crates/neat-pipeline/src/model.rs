@@ -9,8 +9,12 @@ use neat_sdf::density::laplace_density;
 use neat_sdf::volume_rendering::{
     integrate, integrate_selected, rendering_weights, rendering_weights_on_host,
 };
-use neat_sdf::{ImplicitNetwork, LaplaceDensity, RayBundle, RaySamples, RenderingNetwork};
+use neat_sdf::{
+    Distances, ImplicitNetwork, LaplaceDensity, RayBundle, RaySamples, RenderingNetwork,
+};
+use neat_tensor::fused::KnownRows;
 use neat_tensor::random::{Purpose, stream};
+use std::sync::Arc;
 
 /// Signed distance, radiance, attraction field, density scale and junctions.
 #[derive(Module, Debug)]
@@ -49,6 +53,8 @@ pub struct RenderRequest<'a> {
     pub rays: &'a RayBundle,
     /// Where they are sampled.
     pub samples: &'a RaySamples,
+    /// Distances of the model that renders, to tell which samples matter.
+    pub distances: &'a Distances,
     /// Scale of the density, `[1]`.
     pub beta: Tensor<1>,
     /// Networks other than the distance are evaluated only at samples with a
@@ -76,6 +82,8 @@ pub struct Rendering {
     pub gradients: Tensor<2>,
     /// Index `ray · S + sample` of those samples; `None` where it is all.
     pub evaluated: Option<Vec<u32>>,
+    /// How many samples the segments were rendered from.
+    pub segment_samples: usize,
 }
 
 /// Points as a tensor `[N, 3]`.
@@ -105,24 +113,21 @@ impl NeatModel {
         // distances that tell it are not computed again for the others.
         let selection = request
             .min_sample_weight
-            .map(|min_weight| self.select(request, &points, min_weight, device));
+            .map(|min_weight| select(request, &points, min_weight));
         let (sdf, output) = match &selection {
             None => self
                 .implicit_network
-                .evaluate_rows(point_tensor(&points, device), Vec::new()),
-            Some(Selection {
-                full,
-                order,
-                light_distances,
-            }) => {
-                let ordered: Vec<[f32; 3]> = order.iter().map(|i| points[*i]).collect();
-                let (sdf, output) = self
-                    .implicit_network
-                    .evaluate_rows(point_tensor(&ordered, device), light_distances.clone());
-                debug_assert_eq!(output.sdf.dims()[0], full.len());
+                .evaluate_rows(point_tensor(&points, device), 0, None),
+            Some(Selection { full, order, known }) => {
+                let ordered: Vec<[f32; 3]> = order.iter().map(|i| points[*i as usize]).collect();
+                let (sdf, output) = self.implicit_network.evaluate_rows(
+                    point_tensor(&ordered, device),
+                    total - full.len(),
+                    known.clone(),
+                );
                 let mut place = vec![0; total];
                 for (position, i) in order.iter().enumerate() {
-                    place[*i] = position;
+                    place[*i as usize] = position;
                 }
                 (
                     sdf.select(0, index_tensor(place.into_iter(), device)),
@@ -192,42 +197,36 @@ impl NeatModel {
             segments,
             gradients,
             evaluated: full,
+            segment_samples: rows,
         }
     }
+}
 
-    /// Samples heavier than `min_weight`; never none (the heaviest stays), so that
-    /// no tensor is empty.
-    fn select(
-        &self,
-        request: &RenderRequest<'_>,
-        points: &[[f32; 3]],
-        min_weight: f64,
-        device: &Device,
-    ) -> Selection {
-        let query = self.implicit_network.distances(device);
-        let distances = query.uncapped(points);
-        let mut capped = distances.clone();
-        query.cap(points, &mut capped);
-        let beta = host_vec(request.beta.clone())[0];
-        let weights = rendering_weights_on_host(&capped, request.samples, beta);
-        let is_full = |i: &usize| weights[*i] > min_weight as f32;
-        let (mut order, mut light): (Vec<usize>, Vec<usize>) =
-            (0..weights.len()).partition(is_full);
-        if order.is_empty() {
-            let heaviest = (0..weights.len())
-                .max_by(|a, b| weights[*a].total_cmp(&weights[*b]))
-                .unwrap_or(0);
-            order.push(heaviest);
-            light.remove(heaviest);
-        }
-        let full = order.iter().map(|i| *i as u32).collect();
-        let light_distances = light.iter().map(|i| distances[*i]).collect();
-        order.extend(light);
-        Selection {
-            full,
-            order,
-            light_distances,
-        }
+/// Samples heavier than `min_weight`; never none (the heaviest stays), so that no
+/// tensor is empty.
+fn select(request: &RenderRequest<'_>, points: &[[f32; 3]], min_weight: f64) -> Selection {
+    let (mut distances, pass) = request.distances.pass(points);
+    request.distances.cap(points, &mut distances);
+    let beta = host_vec(request.beta.clone())[0];
+    let weights = rendering_weights_on_host(&distances, request.samples, beta);
+    let samples = 0..weights.len() as u32;
+    let weight = |i: u32| weights[i as usize];
+    let (mut full, mut light): (Vec<u32>, Vec<u32>) = samples
+        .clone()
+        .partition(|i| weight(*i) > min_weight as f32);
+    if full.is_empty() {
+        let heaviest = samples.max_by(|a, b| weight(*a).total_cmp(&weight(*b)));
+        full = heaviest.into_iter().collect();
+        light.retain(|i| Some(*i) != heaviest);
+    }
+    let order: Arc<[u32]> = full.iter().chain(&light).copied().collect();
+    Selection {
+        full,
+        known: pass.map(|pass| KnownRows {
+            pass,
+            rows: Arc::clone(&order),
+        }),
+        order,
     }
 }
 
@@ -236,9 +235,9 @@ struct Selection {
     /// Their indices, ascending.
     full: Vec<u32>,
     /// All indices: those of `full`, then the others.
-    order: Vec<usize>,
-    /// Uncapped distances of the others.
-    light_distances: Vec<f32>,
+    order: Arc<[u32]>,
+    /// What the pass that told the weights knows of the samples in that order.
+    known: Option<KnownRows>,
 }
 
 /// Point and viewing direction `[N, 6]` of the samples `indices`.

@@ -1,7 +1,9 @@
 //! The optimisation of one scene.
 
+use crate::awake::with_awake_worker;
 use crate::config::{Config, TrainConfig};
 pub use crate::field::TrainedField;
+use crate::flops::StepRows;
 use crate::losses::{Losses, StepInput, StepLoss, step_loss};
 use crate::model::{NeatModel, host_vec};
 use crate::training_data::{Batch, TrainingData};
@@ -13,13 +15,16 @@ use neat_core::assignment::AssignmentError;
 use neat_gjp::candidates::JunctionView;
 use neat_sdf::density::BetaSchedule;
 use neat_sdf::ray_sampler::{RaySampler, RaySamples, Seeded};
+use neat_sdf::{Distances, ImplicitNetwork};
 use neat_tensor::adam::Adam;
 use neat_tensor::checkpoint::Checkpoint;
+use neat_tensor::fused::is_fused;
 use neat_tensor::parameters::{ParameterError, load_parameters, named_parameters};
 use neat_tensor::random::{Purpose, stream};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
 
 /// Why training cannot start or go on.
 #[derive(Debug, thiserror::Error)]
@@ -77,6 +82,42 @@ pub struct StepReport {
     pub beta: f64,
 }
 
+/// Where the time of one iteration went, on the host's clock: a device that
+/// computes later shows it where its results are read.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepTimings {
+    /// Rays and what was observed along them.
+    pub batch: Duration,
+    /// Where rays are sampled, with the network evaluations for it.
+    pub sampler: Duration,
+    /// Rendering and losses, without the assignment.
+    pub forward: Duration,
+    /// Local junctions and their assignment.
+    pub assignment: Duration,
+    /// Gradients.
+    pub backward: Duration,
+    /// The parameters' move.
+    pub optimiser: Duration,
+}
+
+impl StepTimings {
+    /// All parts together.
+    pub fn total(&self) -> Duration {
+        self.batch + self.sampler + self.forward + self.assignment + self.backward + self.optimiser
+    }
+}
+
+impl std::ops::AddAssign for StepTimings {
+    fn add_assign(&mut self, other: Self) {
+        self.batch += other.batch;
+        self.sampler += other.sampler;
+        self.forward += other.forward;
+        self.assignment += other.assignment;
+        self.backward += other.backward;
+        self.optimiser += other.optimiser;
+    }
+}
+
 /// The state of an optimisation.
 pub struct Trainer {
     data: TrainingData,
@@ -90,6 +131,8 @@ pub struct Trainer {
     iteration: u64,
     /// β of the last iteration.
     beta: f64,
+    timings: StepTimings,
+    rows: StepRows,
 }
 
 /// Loss and gradients of an iteration, before the parameters move.
@@ -134,6 +177,8 @@ impl Trainer {
             scene_radius,
             model,
             iteration: 0,
+            timings: StepTimings::default(),
+            rows: StepRows::default(),
         })
     }
 
@@ -190,6 +235,14 @@ impl Trainer {
     /// # Errors
     /// If the loss is no number; the parameters are then as before.
     pub fn step(&mut self, schedule: f64) -> Result<StepReport, TrainError> {
+        // A device of its own has nothing to hand out.
+        if !is_fused(&self.device) {
+            return self.step_here(schedule);
+        }
+        with_awake_worker(|| self.step_here(schedule))
+    }
+
+    fn step_here(&mut self, schedule: f64) -> Result<StepReport, TrainError> {
         let loss = self.loss(schedule)?;
         let losses = loss.losses();
         if !losses.total.is_finite() {
@@ -198,7 +251,10 @@ impl Trainer {
                 value: losses.total,
             });
         }
+        let start = Instant::now();
         let mut gradients = GradientsParams::from_grads(loss.total.backward(), &self.model);
+        self.timings.backward = start.elapsed();
+        let start = Instant::now();
         let train = &self.config.train;
         let factor = learning_rate_factor(train, self.iteration, schedule);
         let networks = train.learning_rate * factor;
@@ -209,12 +265,13 @@ impl Trainer {
         };
         let model = self.model.clone();
         self.model = self.adam.step(model, &mut gradients, rate);
+        self.timings.optimiser = start.elapsed();
         self.iteration += 1;
         Ok(StepReport {
             iteration: self.iteration,
             losses,
             segment_error_in_pixels: median(loss.segment_errors),
-            rendered_samples: loss.rendered_samples,
+            rendered_samples: loss.rows.full,
             targets: loss.targets,
             learning_rate: networks,
             beta: self.beta,
@@ -247,8 +304,14 @@ impl Trainer {
             }
         };
         self.beta = f64::from(host_vec(beta.clone())[0]);
+        let start = Instant::now();
         let batch = self.data.batch(&self.config, self.seed, self.iteration);
-        let samples = self.sample(&batch);
+        self.timings.batch = start.elapsed();
+        let start = Instant::now();
+        let distances = self.model.implicit_network.distances(&self.device);
+        let (samples, asked) = self.sample(&batch, &distances);
+        self.timings.sampler = start.elapsed();
+        let start = Instant::now();
         let train = &self.config.train;
         let eikonal_points = self.eikonal_points(&batch, &samples);
         let views: Vec<JunctionView<'_>> = self
@@ -263,24 +326,54 @@ impl Trainer {
         let input = StepInput {
             batch: &batch,
             samples: &samples,
+            distances: &distances,
             eikonal_points: &eikonal_points,
             views: &views,
             junctions_due: (self.iteration + 1).is_multiple_of(train.junction_interval.max(1)),
         };
-        step_loss(&self.model, &input, beta, train, &self.device).map_err(|source| {
+        let loss = step_loss(&self.model, &input, beta, train, &self.device).map_err(|source| {
             TrainError::Assignment {
                 iteration: self.iteration + 1,
                 source,
             }
-        })
+        })?;
+        self.rows = StepRows {
+            sampler: asked,
+            ..loss.rows
+        };
+        self.timings.assignment = loss.assignment;
+        self.timings.forward = start.elapsed() - loss.assignment;
+        Ok(loss)
     }
 
-    fn sample(&mut self, batch: &Batch) -> RaySamples {
-        let mut query = self.model.implicit_network.distances(&self.device);
+    /// The signed distance network as it is now.
+    pub fn implicit_network(&self) -> &ImplicitNetwork {
+        &self.model.implicit_network
+    }
+
+    /// Where the time of the last iteration went.
+    pub fn timings(&self) -> StepTimings {
+        self.timings
+    }
+
+    /// What went through the networks in the last iteration.
+    pub fn rows(&self) -> StepRows {
+        self.rows
+    }
+
+    /// Samples along the rays of a batch, and how many distances that took.
+    fn sample(&mut self, batch: &Batch, distances: &Distances) -> (RaySamples, usize) {
+        let mut asked = 0;
+        let mut query = |points: &[[f32; 3]]| {
+            asked += points.len();
+            distances.capped(points)
+        };
         self.sampler.refresh(self.iteration, &mut query);
         let mut noise = Seeded(stream(self.seed, Purpose::Samples, self.iteration));
-        self.sampler
-            .sample(&batch.rays, self.beta as f32, &mut query, &mut noise)
+        let samples = self
+            .sampler
+            .sample(&batch.rays, self.beta as f32, &mut query, &mut noise);
+        (samples, asked)
     }
 
     /// The points of the eikonal term besides rendered samples.

@@ -3,11 +3,13 @@
 use crate::ray_sampler::DistanceQuery;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
+use neat_tensor::fused::{KnownPass, KnownRows};
 use neat_tensor::kernels::softplus_network::SoftplusNetwork;
 use neat_tensor::linear::{Linear, LinearInit};
 use neat_tensor::{CoordinateMlp, FieldQuery, PositionalEncoding};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
+use std::sync::{Arc, OnceLock};
 
 /// Sharpness of the softplus, as in VolSDF.
 const SOFTPLUS_SHARPNESS: f64 = 100.0;
@@ -173,20 +175,22 @@ impl ImplicitNetwork {
     /// Distance capped by the bounding sphere, features, and the gradient of the
     /// capped distance, at every point. This is what is rendered.
     pub fn evaluate(&self, points: Tensor<2>) -> ImplicitOutput {
-        self.evaluate_rows(points, Vec::new()).1
+        self.evaluate_rows(points, 0, None).1
     }
 
     /// The capped distance `[N, 1]` at all points, and all of [`Self::evaluate`] at
-    /// those that come first: `known_distances` are the uncapped distances of the
-    /// remaining ones, from [`Distances::uncapped`] with the same parameters.
+    /// all but the last `light_rows`; `known` is what [`Distances::pass`] said of
+    /// the points, with the same parameters.
     pub fn evaluate_rows(
         &self,
         points: Tensor<2>,
-        known_distances: Vec<f32>,
+        light_rows: usize,
+        known: Option<KnownRows>,
     ) -> (Tensor<2>, ImplicitOutput) {
-        let full_rows = points.dims()[0] - known_distances.len();
+        let full_rows = points.dims()[0] - light_rows;
         let query = FieldQuery {
-            known_first: known_distances,
+            light_rows,
+            known,
             others: true,
         };
         let field = self.mlp.field(points.clone(), query);
@@ -249,14 +253,10 @@ impl ImplicitNetwork {
     /// are now and without gradients: computed there too where `device`, which
     /// holds the network, is the CPU.
     pub fn distances(&self, device: &Device) -> Distances {
-        let network = match self.mlp.on_host() {
-            Some(network) => QueriedNetwork::OnHost(network),
-            None => QueriedNetwork::OnDevice(Box::new(self.valid()), device.clone().inner()),
-        };
         Distances {
-            network,
-            bounding_sphere_slope: self.bounding_sphere_slope.map(|s| s as f32),
-            scene_radius: self.scene_radius as f32,
+            network: self.valid(),
+            device: device.clone().inner(),
+            prepared: OnceLock::new(),
         }
     }
 
@@ -280,18 +280,13 @@ struct Cap {
     gradient: Tensor<2>,
 }
 
-/// A network that answers for distances at points on the host.
+/// A network that answers for distances at points on the host. It is prepared
+/// when it is first asked.
 #[derive(Debug)]
 pub struct Distances {
-    network: QueriedNetwork,
-    bounding_sphere_slope: Option<f32>,
-    scene_radius: f32,
-}
-
-#[derive(Debug)]
-enum QueriedNetwork {
-    OnHost(SoftplusNetwork),
-    OnDevice(Box<ImplicitNetwork>, Device),
+    network: ImplicitNetwork,
+    device: Device,
+    prepared: OnceLock<Option<SoftplusNetwork>>,
 }
 
 /// Points per call of a device: bounds the memory of a query.
@@ -300,19 +295,37 @@ const POINT_CHUNK: usize = 16_384;
 impl Distances {
     /// The network's distance at each point, without the bounding sphere.
     pub fn uncapped(&self, points: &[[f32; 3]]) -> Vec<f32> {
-        match &self.network {
-            QueriedNetwork::OnHost(network) => network.first(points.as_flattened()),
-            QueriedNetwork::OnDevice(network, device) => points
-                .chunks(POINT_CHUNK)
-                .flat_map(|chunk| {
-                    let flat = chunk.as_flattened().to_vec();
-                    let points = TensorData::new(flat, [chunk.len(), 3]);
-                    let outputs = network.mlp.forward(Tensor::from_data(points, device));
-                    let data = outputs.narrow(1, 0, 1).into_data().convert::<f32>();
-                    data.try_into_vec_as::<f32>()
-                        .expect("Distances: just converted to float32")
-                })
-                .collect(),
+        if let Some(network) = self.on_host() {
+            return network.first(points.as_flattened());
+        }
+        points
+            .chunks(POINT_CHUNK)
+            .flat_map(|chunk| {
+                let flat = chunk.as_flattened().to_vec();
+                let points = TensorData::new(flat, [chunk.len(), 3]);
+                let points = Tensor::from_data(points, &self.device);
+                let outputs = self.network.mlp.forward(points);
+                let data = outputs.narrow(1, 0, 1).into_data().convert::<f32>();
+                data.try_into_vec_as::<f32>()
+                    .expect("Distances: just converted to float32")
+            })
+            .collect()
+    }
+
+    fn on_host(&self) -> Option<&SoftplusNetwork> {
+        let prepared = self.prepared.get_or_init(|| self.network.mlp.on_host());
+        prepared.as_ref()
+    }
+
+    /// [`Self::uncapped`], and where there is room the pass itself, for
+    /// [`ImplicitNetwork::evaluate_rows`].
+    pub fn pass(&self, points: &[[f32; 3]]) -> (Vec<f32>, Option<Arc<KnownPass>>) {
+        let pass = self
+            .on_host()
+            .and_then(|network| KnownPass::run(network, points.as_flattened()));
+        match pass {
+            Some(pass) => (pass.pass.first.clone(), Some(Arc::new(pass))),
+            None => (self.uncapped(points), None),
         }
     }
 
@@ -325,11 +338,12 @@ impl Distances {
 
     /// Caps distances at `points` by the bounding sphere.
     pub fn cap(&self, points: &[[f32; 3]], distances: &mut [f32]) {
-        let Some(slope) = self.bounding_sphere_slope else {
+        let Some(slope) = self.network.bounding_sphere_slope else {
             return;
         };
+        let (slope, radius) = (slope as f32, self.network.scene_radius as f32);
         for (distance, [x, y, z]) in distances.iter_mut().zip(points) {
-            let cap = slope * (self.scene_radius - (x * x + y * y + z * z).sqrt());
+            let cap = slope * (radius - (x * x + y * y + z * z).sqrt());
             // Not `min`, which would hide a distance that is no number.
             if *distance > cap {
                 *distance = cap;

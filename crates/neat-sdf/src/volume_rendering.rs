@@ -1,8 +1,8 @@
 //! The rendering integral and its quadrature (paper eq. 1 and 4).
 
-use crate::density::laplace_density_scalar;
 use crate::ray_sampler::RaySamples;
 use burn::tensor::{IndexingUpdateOp, Int, Tensor, TensorData};
+use neat_tensor::kernels::density::passed_shares;
 
 /// Weight of every sample: `w_i = (1 − exp(−δ_i σ_i)) · exp(−Σ_{j<i} δ_j σ_j)`.
 ///
@@ -23,14 +23,14 @@ pub fn rendering_weights(density: Tensor<2>, deltas: Tensor<2>) -> Tensor<2> {
 /// [`rendering_weights`] of capped distances `[R · S]` with a Laplace density, on
 /// the host: to decide which samples matter.
 pub fn rendering_weights_on_host(sdf: &[f32], samples: &RaySamples, beta: f32) -> Vec<f32> {
-    let mut weights = Vec::with_capacity(sdf.len());
-    let rays = sdf.chunks(samples.per_ray);
-    for (sdf, deltas) in rays.zip(samples.deltas.chunks(samples.per_ray)) {
-        let mut passed = 0.0f32;
-        for (sdf, delta) in sdf.iter().zip(deltas) {
-            let free_energy = delta * laplace_density_scalar(*sdf, beta);
-            weights.push((1.0 - (-free_energy).exp()) * (-passed).exp());
-            passed += free_energy;
+    let mut weights = vec![0.0; sdf.len()];
+    passed_shares(sdf, &samples.deltas, beta, &mut weights);
+    for ray in weights.chunks_mut(samples.per_ray) {
+        let mut transmittance = 1.0;
+        for weight in ray {
+            let passed = *weight;
+            *weight = transmittance * (1.0 - passed);
+            transmittance *= passed;
         }
     }
     weights

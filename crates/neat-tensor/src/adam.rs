@@ -4,11 +4,11 @@
 //! them on the default device. A checkpoint that must resume to the same bytes
 //! on any device wants names and plain tensors.
 
+use crate::fused;
 use crate::parameters::PathStack;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::optim::GradientsParams;
-use burn::tensor::Tensor;
-use burn::tensor::TensorData;
+use burn::tensor::{DType, Tensor, TensorData};
 use std::any::Any;
 use std::collections::BTreeMap;
 
@@ -113,6 +113,36 @@ impl Adam {
     }
 }
 
+/// One parameter's step on the host: one pass instead of a dozen operations.
+struct HostStep {
+    value: Vec<f32>,
+    first: Vec<f32>,
+    second: Vec<f32>,
+    gradient: Vec<f32>,
+}
+
+impl HostStep {
+    fn advance(&mut self, config: AdamConfig, rate: f64, epsilon: f64) {
+        let (beta1, beta2) = (config.beta1 as f32, config.beta2 as f32);
+        let (rest1, rest2) = ((1.0 - config.beta1) as f32, (1.0 - config.beta2) as f32);
+        let (rate, epsilon) = (rate as f32, epsilon as f32);
+        let moments = self.first.iter_mut().zip(&mut self.second);
+        for ((value, g), (m, v)) in self.value.iter_mut().zip(&self.gradient).zip(moments) {
+            *m = g * rest1 + *m * beta1;
+            *v = g * g * rest2 + *v * beta2;
+            *value -= *m / (v.sqrt() + epsilon) * rate;
+        }
+    }
+}
+
+/// The values of a float32 tensor of a CPU backend.
+fn host<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    tensor
+        .into_data()
+        .try_into_vec()
+        .expect("Adam: float32 was asked for")
+}
+
 struct AdamStep<'a, F> {
     path: PathStack,
     adam: &'a mut Adam,
@@ -151,15 +181,35 @@ impl<F: Fn(&str) -> f64> ModuleMapper for AdamStep<'_, F> {
                 pair.map(|data| Tensor::from_data(data, options.clone()))
             }),
         };
+        let t = self.adam.step as f64;
+        let root_correction = (1.0 - beta2.powf(t)).sqrt();
+        let rate = (self.learning_rate)(&name) * root_correction / (1.0 - beta1.powf(t));
+        if gradient.dtype() == DType::F32 && fused::is_fused(&gradient.device()) {
+            let [first, second] =
+                previous.unwrap_or_else(|| [gradient.zeros_like(), gradient.zeros_like()]);
+            return param.map(|value| {
+                let tracked = value.is_require_grad();
+                let mut row = HostStep {
+                    value: host(value.inner()),
+                    first: host(first),
+                    second: host(second),
+                    gradient: host(gradient.clone()),
+                };
+                row.advance(self.adam.config, rate, epsilon * root_correction);
+                let shape = gradient.dims();
+                let device = gradient.device();
+                let tensor = |values| Tensor::from_data(TensorData::new(values, shape), &device);
+                let moments: [Tensor<D>; 2] = [tensor(row.first), tensor(row.second)];
+                self.adam.moments.insert(name, Box::new(moments));
+                Tensor::from_inner(tensor(row.value)).set_require_grad(tracked)
+            });
+        }
         let first = gradient.clone().mul_scalar(1.0 - beta1);
         let second = gradient.square().mul_scalar(1.0 - beta2);
         let (first, second) = match previous {
             Some([m, v]) => (first + m.mul_scalar(beta1), second + v.mul_scalar(beta2)),
             None => (first, second),
         };
-        let t = self.adam.step as f64;
-        let root_correction = (1.0 - beta2.powf(t)).sqrt();
-        let rate = (self.learning_rate)(&name) * root_correction / (1.0 - beta1.powf(t));
         let change = first
             .clone()
             .div(second.clone().sqrt().add_scalar(epsilon * root_correction))

@@ -11,7 +11,7 @@
 //! ([`crate::fused`]), which these tensor operations explain and check.
 
 use crate::encoding::PositionalEncoding;
-use crate::fused::{self, SoftplusRequest};
+use crate::fused::{self, KnownRows, SoftplusRequest};
 use crate::kernels::softplus_network::{SoftplusNetwork, SoftplusShape};
 use crate::linear::{Linear, affine, flat_parameters, layer_shapes};
 use crate::softplus::{softplus, softplus_derivative};
@@ -79,10 +79,12 @@ impl CoordinateMlp {
 /// Which rows of a query want what.
 #[derive(Clone, Debug, Default)]
 pub struct FieldQuery {
-    /// First outputs that are known from an earlier evaluation with the same
-    /// parameters, of the last rows. Of those rows only the first output is
-    /// wanted; the others are full rows.
-    pub known_first: Vec<f32>,
+    /// Of so many last rows only the first output is wanted; the others are full
+    /// rows.
+    pub light_rows: usize,
+    /// What an earlier pass with the same parameters says of the rows: a fused
+    /// operation does not compute it again.
+    pub known: Option<KnownRows>,
     /// Whether full rows want the outputs beyond the first.
     pub others: bool,
 }
@@ -112,7 +114,7 @@ impl CoordinateMlp {
     /// [`Self::field`] in plain tensor operations, on any device: the readable
     /// twin of the fused operation.
     pub fn plain_field(&self, points: Tensor<2>, query: FieldQuery) -> Field {
-        let full_rows = points.dims()[0] - query.known_first.len();
+        let full_rows = points.dims()[0] - query.light_rows;
         let pass = self.record(points);
         let outputs = pass.outputs.dims()[1];
         Field {
@@ -127,14 +129,14 @@ impl CoordinateMlp {
 
     fn fused_field(&self, points: Tensor<2>, query: FieldQuery) -> Field {
         let rows = points.dims()[0];
-        let full_rows = rows - query.known_first.len();
+        let full_rows = rows - query.light_rows;
         let shape = self.shape();
         let others = shape.layers[shape.layers.len() - 1].outputs - 1;
         let request = SoftplusRequest {
             shape,
             full_rows,
             others: query.others,
-            known_first: query.known_first,
+            known: query.known,
         };
         let flat = fused::softplus_network(points, flat_parameters(&self.layers), request);
         let part = |start: usize, columns: usize, rows: usize| {

@@ -10,7 +10,7 @@
 
 use crate::kernels::relu_network::{self, ReluNetwork, ReluShape};
 use crate::kernels::softplus_network::{
-    self, SoftplusAdjoint, SoftplusNetwork, SoftplusOutput, SoftplusShape,
+    self, FirstPass, Known, SoftplusAdjoint, SoftplusNetwork, SoftplusOutput, SoftplusShape,
 };
 use burn::backend::tensor::{Device as BackendDevice, FloatTensor};
 use burn::backend::{Backend, TensorMetadata, backend_extension};
@@ -46,14 +46,51 @@ pub struct SoftplusRequest {
     pub full_rows: usize,
     /// Whether outputs other than the first are wanted.
     pub others: bool,
-    /// The first output of the remaining rows, known from an earlier evaluation
-    /// with the same parameters.
-    pub known_first: Vec<f32>,
+    /// What is known of all rows.
+    pub known: Option<KnownRows>,
+}
+
+/// Rows that an earlier pass with the same parameters has seen.
+#[derive(Clone, Debug)]
+pub struct KnownRows {
+    /// That pass.
+    pub pass: Arc<KnownPass>,
+    /// Of each row at hand its number there.
+    pub rows: Arc<[u32]>,
+}
+
+/// A pass that stays in memory for later ones.
+#[derive(Debug)]
+pub struct KnownPass {
+    /// First outputs and activations.
+    pub pass: FirstPass,
+    _booking: Booking,
+}
+
+impl KnownPass {
+    /// Runs the pass, unless there is no room to keep it.
+    pub fn run(network: &SoftplusNetwork, points: &[f32]) -> Option<Self> {
+        let bytes = network.shape().first_pass_bytes(points.len() / 3);
+        let booking = Booking::of(bytes)?;
+        Some(Self {
+            pass: network.first_pass(points),
+            _booking: booking,
+        })
+    }
+}
+
+impl KnownRows {
+    fn as_known(&self) -> Known<'_> {
+        Known {
+            pass: &self.pass.pass,
+            rows: &self.rows,
+        }
+    }
 }
 
 /// Networks as operations of a backend.
 ///
-/// Tensors are float32. `parameters` `[P]` holds of each layer the weight
+/// Tensors are float32. `parameters` `[P]` hold of each layer the weight
 /// `[outputs, inputs]`, row-major, then the bias.
 #[backend_extension(
     Flex: cfg(feature = "flex"),
@@ -103,14 +140,35 @@ fn write<B: Backend>(
     B::float_from_data(TensorData::new(values, shape.into()), device)
 }
 
-/// Bytes of all tapes that wait for their backward pass.
-static TAPE_BYTES: AtomicUsize = AtomicUsize::new(0);
+/// Bytes of all activations that wait for a later pass.
+static KEPT_BYTES: AtomicUsize = AtomicUsize::new(0);
 /// Most of them: beyond, activations are computed again.
-const MAX_TAPE_BYTES: usize = 2 << 30;
+const MAX_KEPT_BYTES: usize = 2 << 30;
+
+/// A share of the memory for activations, given back when it is dropped.
+#[derive(Debug)]
+struct Booking(usize);
+
+impl Booking {
+    /// `bytes` more, if they fit.
+    fn of(bytes: usize) -> Option<Self> {
+        let fits = |used: usize| used.checked_add(bytes).filter(|sum| *sum <= MAX_KEPT_BYTES);
+        KEPT_BYTES
+            .fetch_update(Ordering::Relaxed, Ordering::Relaxed, fits)
+            .ok()
+            .map(|_| Self(bytes))
+    }
+}
+
+impl Drop for Booking {
+    fn drop(&mut self) {
+        KEPT_BYTES.fetch_sub(self.0, Ordering::Relaxed);
+    }
+}
 
 /// The activations of a forward pass, taken by its backward pass.
 #[derive(Debug)]
-struct Tape<T>(Arc<TapeSlot<T>>);
+struct Tape<T>(Arc<Mutex<Option<(T, Booking)>>>);
 
 impl<T> Clone for Tape<T> {
     fn clone(&self) -> Self {
@@ -118,39 +176,14 @@ impl<T> Clone for Tape<T> {
     }
 }
 
-#[derive(Debug)]
-struct TapeSlot<T> {
-    tape: Mutex<Option<T>>,
-    bytes: usize,
-}
-
-impl<T> Drop for TapeSlot<T> {
-    fn drop(&mut self) {
-        TAPE_BYTES.fetch_sub(self.bytes, Ordering::Relaxed);
-    }
-}
-
-/// Whether `bytes` more fit; then they are booked.
-fn book(bytes: usize) -> bool {
-    let fits = |used: usize| used.checked_add(bytes).filter(|sum| *sum <= MAX_TAPE_BYTES);
-    TAPE_BYTES
-        .fetch_update(Ordering::Relaxed, Ordering::Relaxed, fits)
-        .is_ok()
-}
-
 impl<T> Tape<T> {
-    /// `bytes` were booked if there is a tape.
-    fn new(tape: Option<T>, bytes: usize) -> Self {
-        let bytes = if tape.is_some() { bytes } else { 0 };
-        Self(Arc::new(TapeSlot {
-            tape: Mutex::new(tape),
-            bytes,
-        }))
+    fn new(tape: Option<T>, booking: Option<Booking>) -> Self {
+        Self(Arc::new(Mutex::new(tape.zip(booking))))
     }
 
     fn take(&self) -> Option<T> {
-        let mut tape = self.0.tape.lock().unwrap_or_else(PoisonError::into_inner);
-        tape.take()
+        let mut tape = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        tape.take().map(|(tape, _)| tape)
     }
 }
 
@@ -162,22 +195,23 @@ fn softplus_forward<B: Backend>(
 ) -> (FloatTensor<B>, Option<softplus_network::Tape>) {
     let device = points.device();
     let (points, parameters) = (read::<B>(points), read::<B>(parameters));
-    let full = request.full_rows;
     let network = SoftplusNetwork::new(Arch::new(), &request.shape, slice(&parameters));
-    let (full_points, rest) = slice(&points).split_at(3 * full);
-    assert_eq!(
-        3 * request.known_first.len(),
-        rest.len(),
-        "softplus_network: a known distance for each row beyond the full ones"
-    );
-    let (output, tape) = network.forward(full_points, request.others, keep);
+    let (full, light) = slice(&points).split_at(3 * request.full_rows);
+    let known = request.known.as_ref().map(KnownRows::as_known);
+    let (output, tape) = network.forward(full, known, request.others, keep);
     let SoftplusOutput {
         first: mut flat,
         gradient,
         others,
     } = output;
-    flat.reserve_exact(request.known_first.len() + gradient.len() + others.len());
-    flat.extend_from_slice(&request.known_first);
+    flat.reserve_exact(light.len() / 3 + gradient.len() + others.len());
+    match known {
+        Some(Known { pass, rows }) => {
+            let light = &rows[request.full_rows..];
+            flat.extend(light.iter().map(|row| pass.first[*row as usize]));
+        }
+        None => flat.extend(network.first(light)),
+    }
     flat.extend_from_slice(&gradient);
     flat.extend_from_slice(&others);
     let len = flat.len();
@@ -185,16 +219,17 @@ fn softplus_forward<B: Backend>(
 }
 
 fn relu_forward<B: Backend>(
-    [inputs, gradients, features, parameters]: [FloatTensor<B>; 4],
+    inputs: [FloatTensor<B>; 3],
+    parameters: FloatTensor<B>,
     shape: &ReluShape,
     keep: bool,
 ) -> (FloatTensor<B>, Option<relu_network::Tape>) {
-    let device = inputs.device();
-    let rows = inputs.shape()[0];
-    let [inputs, gradients, features, parameters] =
-        [inputs, gradients, features, parameters].map(read::<B>);
+    let device = inputs[0].device();
+    let rows = inputs[0].shape()[0];
+    let inputs = inputs.map(read::<B>);
+    let parameters = read::<B>(parameters);
     let network = ReluNetwork::new(Arch::new(), shape, slice(&parameters));
-    let inputs = [slice(&inputs), slice(&gradients), slice(&features)];
+    let inputs = inputs.each_ref().map(slice);
     let (out, tape) = network.forward(rows, &inputs, keep);
     (write::<B>(out, [rows, shape.outputs()], &device), tape)
 }
@@ -217,8 +252,8 @@ macro_rules! on_the_host {
                 parameters: FloatTensor<Self>,
                 shape: ReluShape,
             ) -> FloatTensor<Self> {
-                let tensors = [inputs, gradients, features, parameters];
-                relu_forward::<Self>(tensors, &shape, false).0
+                let inputs = [inputs, gradients, features];
+                relu_forward::<Self>(inputs, parameters, &shape, false).0
             }
         }
     };
@@ -264,20 +299,24 @@ impl<B: Backend> Backward<B, 2> for SoftplusOp {
         let (first, adjoint) = slice(&adjoint).split_at(rows);
         let (gradient, others) = adjoint.split_at(3 * request.full_rows);
         let network = SoftplusNetwork::new(Arch::new(), &request.shape, slice(&parameters));
-        let [of_points, of_parameters] = ops.parents;
-        let adjoint = SoftplusAdjoint {
-            first,
-            gradient,
-            others,
-        };
-        let (to_parameters, to_points) =
-            network.backward(points, adjoint, tape.take(), of_points.is_some());
+        let [of_points, of_parameters] = ops.parents.map(|node| Some(node?.id));
+        let (to_parameters, to_points) = network.backward(
+            points,
+            request.known.as_ref().map(KnownRows::as_known),
+            SoftplusAdjoint {
+                first,
+                gradient,
+                others,
+            },
+            tape.take(),
+            of_points.is_some(),
+        );
         if let Some(node) = of_parameters {
             let len = to_parameters.len();
-            gradients.register::<B>(node.id, write::<B>(to_parameters, [len], &device));
+            gradients.register::<B>(node, write::<B>(to_parameters, [len], &device));
         }
         if let (Some(node), Some(to_points)) = (of_points, to_points) {
-            gradients.register::<B>(node.id, write::<B>(to_points, [rows, 3], &device));
+            gradients.register::<B>(node, write::<B>(to_points, [rows, 3], &device));
         }
     }
 }
@@ -288,8 +327,9 @@ struct ReluOp;
 
 #[derive(Clone, Debug)]
 struct ReluState<B: Backend> {
-    /// Inputs, gradients, features and parameters.
-    tensors: [FloatTensor<B>; 4],
+    /// Inputs, gradients and features.
+    inputs: [FloatTensor<B>; 3],
+    parameters: FloatTensor<B>,
     shape: ReluShape,
     tape: Tape<relu_network::Tape>,
 }
@@ -304,32 +344,34 @@ impl<B: Backend> Backward<B, 4> for ReluOp {
         _checkpointer: &mut Checkpointer,
     ) {
         let ReluState {
-            tensors,
+            inputs,
+            parameters,
             shape,
             tape,
         } = ops.state;
-        let device = tensors[0].device();
-        let rows = tensors[0].shape()[0];
+        let device = inputs[0].device();
+        let rows = inputs[0].shape()[0];
         let adjoint = read::<B>(gradients.consume::<B>(&ops.node));
-        let [inputs, of_gradients, features, parameters] = tensors.map(read::<B>);
+        let (inputs, parameters) = (inputs.map(read::<B>), read::<B>(parameters));
         let network = ReluNetwork::new(Arch::new(), &shape, slice(&parameters));
-        let [input_node, gradient_node, feature_node, parameter_node] = ops.parents;
-        let nodes = [input_node, gradient_node, feature_node];
+        let [inputs_node, gradients_node, features_node, of_parameters] =
+            ops.parents.map(|node| Some(node?.id));
+        let nodes = [inputs_node, gradients_node, features_node];
         let (to_parameters, to_inputs) = network.backward(
             rows,
-            &[slice(&inputs), slice(&of_gradients), slice(&features)],
+            &inputs.each_ref().map(slice),
             slice(&adjoint),
             tape.take(),
             &nodes.each_ref().map(Option::is_some),
         );
-        if let Some(node) = parameter_node {
+        if let Some(node) = of_parameters {
             let len = to_parameters.len();
-            gradients.register::<B>(node.id, write::<B>(to_parameters, [len], &device));
+            gradients.register::<B>(node, write::<B>(to_parameters, [len], &device));
         }
         for (node, to_input) in nodes.into_iter().zip(to_inputs) {
             if let (Some(node), Some(to_input)) = (node, to_input) {
                 let width = to_input.len().checked_div(rows).unwrap_or(0);
-                gradients.register::<B>(node.id, write::<B>(to_input, [rows, width], &device));
+                gradients.register::<B>(node, write::<B>(to_input, [rows, width], &device));
             }
         }
     }
@@ -345,15 +387,18 @@ impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodi
         let (points, parameters) = (points.into_primitive(), parameters.into_primitive());
         match SoftplusOp.prepare::<C>(nodes).compute_bound().stateful() {
             OpsKind::Tracked(prepared) => {
-                let bytes = request.shape.tape_bytes(request.full_rows);
-                let keep = book(bytes);
-                let (out, tape) =
-                    softplus_forward::<B>(points.clone(), parameters.clone(), &request, keep);
+                let booking = Booking::of(request.shape.tape_bytes(request.full_rows));
+                let (out, tape) = softplus_forward::<B>(
+                    points.clone(),
+                    parameters.clone(),
+                    &request,
+                    booking.is_some(),
+                );
                 let state = SoftplusState {
                     points,
                     parameters,
                     request,
-                    tape: Tape::new(tape, bytes),
+                    tape: Tape::new(tape, booking),
                 };
                 prepared.finish(state, out)
             }
@@ -372,25 +417,26 @@ impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodi
     ) -> FloatTensor<Self> {
         let tensors = [inputs, gradients, features, parameters];
         let nodes = tensors.each_ref().map(|tensor| tensor.node());
-        let tensors = tensors.map(|tensor| tensor.into_primitive());
+        let [inputs, gradients, features, parameters] =
+            tensors.map(|tensor| tensor.into_primitive());
         match ReluOp.prepare::<C>(nodes).compute_bound().stateful() {
             OpsKind::Tracked(prepared) => {
-                let bytes = shape.tape_bytes(tensors[0].shape()[0]);
-                let keep = book(bytes);
-                let (out, tape) = relu_forward::<B>(tensors.clone(), &shape, keep);
+                let inputs = [inputs, gradients, features];
+                let booking = Booking::of(shape.tape_bytes(inputs[0].shape()[0]));
+                let keep = booking.is_some();
+                let (out, tape) =
+                    relu_forward::<B>(inputs.clone(), parameters.clone(), &shape, keep);
                 let state = ReluState {
-                    tensors,
+                    inputs,
+                    parameters,
                     shape,
-                    tape: Tape::new(tape, bytes),
+                    tape: Tape::new(tape, booking),
                 };
                 prepared.finish(state, out)
             }
-            OpsKind::UnTracked(prepared) => {
-                let [inputs, gradients, features, parameters] = tensors;
-                prepared.finish(B::relu_network(
-                    inputs, gradients, features, parameters, shape,
-                ))
-            }
+            OpsKind::UnTracked(prepared) => prepared.finish(B::relu_network(
+                inputs, gradients, features, parameters, shape,
+            )),
         }
     }
 }

@@ -18,7 +18,7 @@ use neat_pipeline::training_data::{Batch, push_ray_through};
 use neat_sdf::{RayBundle, RaySamples};
 use neat_tensor::adam::{Adam, AdamConfig};
 use neat_tensor::parameters::{load_parameters, named_parameters};
-use neat_tests::backends::on_each_cpu_backend;
+use neat_tests::backends::on_each_backend;
 use neat_tests::comparison::{assert_close, assert_relatively_close, count_beyond};
 use neat_tests::golden::Golden;
 use neat_tests::named_gradients::{assert_gradients_close, named_gradients};
@@ -121,6 +121,7 @@ impl RecordedStep {
         let input = StepInput {
             batch: &self.batch,
             samples: &self.samples,
+            distances: &model.implicit_network.distances(device),
             eikonal_points: &self.eikonal_points,
             views: &views,
             junctions_due: true,
@@ -134,12 +135,13 @@ impl RecordedStep {
 fn rendering() {
     let golden = Golden::open("06_training_step");
     let step = RecordedStep::read(&golden, "in");
-    on_each_cpu_backend(|device| {
+    on_each_backend(|device| {
         let model = model(&golden, "param/", &config("dbscan"), &device);
         let rendering = model.render(
             &RenderRequest {
                 rays: &step.batch.rays,
                 samples: &step.samples,
+                distances: &model.implicit_network.distances(&device),
                 beta: model.density.beta(),
                 min_sample_weight: None,
                 segment_rays: step.batch.rays.len(),
@@ -185,7 +187,7 @@ fn losses_and_gradients() {
         &golden.numbers("common/eik_points"),
         1e-6,
     );
-    on_each_cpu_backend(|device| {
+    on_each_backend(|device| {
         for mode in MODES {
             let config = config(mode);
             let model = model(&golden, "param/", &config, &device);
@@ -227,7 +229,7 @@ fn five_steps() {
     let golden = Golden::open("13_optimiser");
     let config = config("median");
     let rates = golden.numbers("f64.learning_rates");
-    on_each_cpu_backend(|device| {
+    on_each_backend(|device| {
         let mut model = model(&golden, "param0/", &config, &device);
         let mut adam = Adam::new(AdamConfig::default());
         for (i, rate) in rates.iter().enumerate() {

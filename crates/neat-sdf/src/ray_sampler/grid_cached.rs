@@ -6,7 +6,7 @@
 
 use super::inverse_cdf::inverse_cdf;
 use super::{DistanceQuery, RayBundle, RaySamples, SamplingNoise};
-use crate::density::laplace_density_scalar;
+use neat_tensor::kernels::density::passed_shares;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -128,16 +128,25 @@ impl DistanceGrid {
             base[axis] = (x as usize).min(n.saturating_sub(2));
             fraction[axis] = x - base[axis] as f32;
         }
-        let at = |dx: usize, dy: usize, dz: usize| {
-            let index = |axis: usize, d: usize| (base[axis] + d).min(n - 1);
-            self.values[(index(0, dx) * n + index(1, dy)) * n + index(2, dz)]
+        // One row of two neighbours along z for each corner in x and y.
+        let [bx, by, bz] = base;
+        let (right, back) = if n > 1 { (n * n, n) } else { (0, 0) };
+        let along_z = |offset: usize| {
+            let start = (bx * n + by) * n + bz + offset;
+            let next = if n > 1 {
+                self.values[start + 1]
+            } else {
+                self.values[start]
+            };
+            mix(self.values[start], next, fraction[2])
         };
-        let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
-        let [fx, fy, fz] = fraction;
-        let along_z = |dx, dy| mix(at(dx, dy, 0), at(dx, dy, 1), fz);
-        let along_y = |dx| mix(along_z(dx, 0), along_z(dx, 1), fy);
-        mix(along_y(0), along_y(1), fx)
+        let along_y = |offset: usize| mix(along_z(offset), along_z(offset + back), fraction[1]);
+        mix(along_y(0), along_y(right), fraction[0])
     }
+}
+
+fn mix(a: f32, b: f32, t: f32) -> f32 {
+    a + (b - a) * t
 }
 
 /// Points per query while a grid is refreshed: bounds the memory of the network.
@@ -147,6 +156,17 @@ const QUERY_CHUNK: usize = 16_384;
 const MIN_HALF_CHORD_SQUARED: f32 = 1e-4;
 /// Sampling starts at least this far from the camera.
 const MIN_NEAR: f32 = 0.01;
+
+/// Working memory of one ray after the other.
+#[derive(Default)]
+struct Scratch {
+    edges: Vec<f32>,
+    sdf: Vec<f32>,
+    lengths: Vec<f32>,
+    masses: Vec<f32>,
+    positions: Vec<f32>,
+    cdf: Vec<f32>,
+}
 
 impl GridCachedConfig {
     /// Refreshes the share of the grid that is due at `iteration`; everything at
@@ -183,40 +203,52 @@ impl GridCachedConfig {
         z.par_chunks_mut(per_ray)
             .zip(far.par_iter_mut())
             .enumerate()
-            .for_each(|(ray, (z, far))| {
+            .for_each_init(Scratch::default, |scratch, (ray, (z, far))| {
                 let jitter = |i: usize| noise.as_ref().map_or(0.5, |u| u[ray * stratum + i]);
                 let (near, end) = chord(rays, ray, grid.radius);
                 *far = end;
                 let at = |t: f32| near + (end - near) * t;
-                let mut edges: Vec<f32> = (0..lookups)
-                    .map(|i| at((i as f32 + jitter(i)) / lookups as f32))
-                    .collect();
+                let Scratch {
+                    edges,
+                    sdf,
+                    lengths,
+                    masses,
+                    positions,
+                    cdf,
+                } = scratch;
+                edges.clear();
+                edges.extend((0..lookups).map(|i| at((i as f32 + jitter(i)) / lookups as f32)));
                 edges.push(end);
-                let mut passed = 0.0f32;
-                let masses: Vec<f32> = edges
-                    .windows(2)
-                    .map(|e| {
-                        let sdf = grid.lookup(rays.point(ray, e[0]));
-                        let here = (e[1] - e[0]).max(0.0) * laplace_density_scalar(sdf, beta);
-                        let weight = (-passed).exp() * (1.0 - (-here).exp());
-                        passed += here;
-                        weight + self.weight_floor as f32
-                    })
-                    .collect();
-                let mut positions = Vec::with_capacity(per_ray);
+                sdf.clear();
+                sdf.extend(
+                    edges[..lookups]
+                        .iter()
+                        .map(|t| grid.lookup(rays.point(ray, *t))),
+                );
+                lengths.clear();
+                lengths.extend(edges.windows(2).map(|e| (e[1] - e[0]).max(0.0)));
+                masses.resize(lookups, 0.0);
+                passed_shares(sdf, lengths, beta, masses);
+                let mut transmittance = 1.0f32;
+                for mass in masses.iter_mut() {
+                    let passed = *mass;
+                    *mass = transmittance * (1.0 - passed) + self.weight_floor as f32;
+                    transmittance *= passed;
+                }
+                positions.clear();
                 inverse_cdf(
-                    &edges,
+                    edges,
                     masses.iter().copied(),
                     1e-8,
                     (0..drawn).map(|i| (i as f32 + jitter(lookups + i)) / drawn as f32),
-                    &mut positions,
-                    &mut Vec::with_capacity(lookups + 1),
+                    positions,
+                    cdf,
                 );
                 positions.extend(
                     (0..even).map(|i| at((i as f32 + jitter(lookups + drawn + i)) / even as f32)),
                 );
                 positions.sort_unstable_by(f32::total_cmp);
-                z.copy_from_slice(&positions);
+                z.copy_from_slice(positions);
             });
         RaySamples::new(z, per_ray, |ray, last| (far[ray] - last).max(0.0))
     }

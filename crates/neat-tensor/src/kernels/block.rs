@@ -1,7 +1,8 @@
 //! Element-wise passes over the matrices of one block.
 
-use super::simd_math::{MAX_ANGLE, exp_of_negative, log1p_of_fraction, sin_cos};
+use super::simd_math::{MAX_ANGLE, exp2_of_negative, log1p_of_fraction, sin_cos};
 use pulp::{Arch, Simd, WithSimd};
+use std::f32::consts::LOG2_E;
 
 /// Softplus of `z` in place: `max(z, 0) + ln(1 + exp(−β|z|)) / β`; where `slope`
 /// is given, it receives the derivative `1 / (1 + exp(−βz))`.
@@ -24,7 +25,7 @@ impl WithSimd for Softplus<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let sharpness = simd.splat_f32s(self.sharpness);
+        let steepness = simd.splat_f32s(self.sharpness * LOG2_E);
         let inverse = simd.splat_f32s(1.0 / self.sharpness);
         let zero = simd.splat_f32s(0.0);
         let one = simd.splat_f32s(1.0);
@@ -32,13 +33,13 @@ impl WithSimd for Softplus<'_> {
         match self.slope {
             None => {
                 for z in z {
-                    let e = exp_of_minus_magnitude(simd, *z, sharpness);
+                    let e = exp_of_minus_magnitude(simd, *z, steepness);
                     *z = value_from_exp(simd, *z, e, inverse);
                 }
             }
             Some(slope) => {
                 for (z, slope) in z.iter_mut().zip(S::as_mut_simd_f32s(slope).0) {
-                    let e = exp_of_minus_magnitude(simd, *z, sharpness);
+                    let e = exp_of_minus_magnitude(simd, *z, steepness);
                     let share = simd.div_f32s(one, simd.add_f32s(one, e));
                     let positive = simd.greater_than_or_equal_f32s(*z, zero);
                     *slope = simd.select_f32s(positive, share, simd.mul_f32s(e, share));
@@ -52,11 +53,12 @@ impl WithSimd for Softplus<'_> {
 // Closures would not inherit the vector instructions of their surroundings;
 // functions that are always inlined do.
 
-/// `exp(−β|z|)`.
+/// `exp(−β|z|)`; `steepness` is `β log₂ e`.
 #[inline(always)]
-fn exp_of_minus_magnitude<S: Simd>(simd: S, z: S::f32s, sharpness: S::f32s) -> S::f32s {
-    let steep = simd.mul_f32s(simd.abs_f32s(z), sharpness);
-    exp_of_negative(simd, simd.sub_f32s(simd.splat_f32s(0.0), steep))
+fn exp_of_minus_magnitude<S: Simd>(simd: S, z: S::f32s, steepness: S::f32s) -> S::f32s {
+    // The sign bit set: −|z|.
+    let negative = simd.or_f32s(z, simd.splat_f32s(-0.0));
+    exp2_of_negative(simd, simd.mul_f32s(negative, steepness))
 }
 
 /// Softplus of `z` from `e = exp(−β|z|)`.
@@ -66,11 +68,11 @@ fn value_from_exp<S: Simd>(simd: S, z: S::f32s, e: S::f32s, inverse: S::f32s) ->
     simd.mul_add_f32s(log1p_of_fraction(simd, e), inverse, above)
 }
 
-/// The derivative of softplus from its value `h`: `1 − exp(−βh)`.
+/// The derivative of softplus from its value `h`: `1 − exp(−βh)`; `fall` is
+/// `−β log₂ e`.
 #[inline(always)]
-fn slope_from_value<S: Simd>(simd: S, h: S::f32s, sharpness: S::f32s) -> S::f32s {
-    let steep = simd.mul_f32s(h, sharpness);
-    let e = exp_of_negative(simd, simd.sub_f32s(simd.splat_f32s(0.0), steep));
+fn slope_from_value<S: Simd>(simd: S, h: S::f32s, fall: S::f32s) -> S::f32s {
+    let e = exp2_of_negative(simd, simd.mul_f32s(h, fall));
     simd.sub_f32s(simd.splat_f32s(1.0), e)
 }
 
@@ -94,10 +96,10 @@ impl WithSimd for Slope<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let sharpness = simd.splat_f32s(self.sharpness);
+        let fall = simd.splat_f32s(-self.sharpness * LOG2_E);
         let h = S::as_simd_f32s(self.h).0;
         for (slope, h) in S::as_mut_simd_f32s(self.slope).0.iter_mut().zip(h) {
-            *slope = slope_from_value(simd, *h, sharpness);
+            *slope = slope_from_value(simd, *h, fall);
         }
     }
 }
@@ -134,13 +136,14 @@ impl WithSimd for SweepAdjoint<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let sharpness = simd.splat_f32s(self.sharpness);
+        let fall = simd.splat_f32s(-self.sharpness * LOG2_E);
         let h = S::as_simd_f32s(self.h).0;
         let g = S::as_mut_simd_f32s(self.g).0;
         let up = S::as_mut_simd_f32s(self.up).0;
         let slopes = S::as_mut_simd_f32s(self.slope).0;
         let through = S::as_mut_simd_f32s(self.through_slope).0;
         for ((((h, g), up), slope), through) in h.iter().zip(g).zip(up).zip(slopes).zip(through) {
-            let s = slope_from_value(simd, *h, sharpness);
+            let s = slope_from_value(simd, *h, fall);
             let u = simd.mul_f32s(*g, s);
             // β u (1 − s) = β (u − u s)
             let curvature = simd.mul_f32s(sharpness, simd.sub_f32s(u, simd.mul_f32s(u, s)));

@@ -11,6 +11,7 @@
 
 pub mod arena;
 pub mod block;
+pub mod density;
 pub mod gemm;
 pub mod relu_network;
 pub mod simd_math;

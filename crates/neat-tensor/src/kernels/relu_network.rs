@@ -4,7 +4,7 @@
 use super::arena::{Arena, Pooled, with_arena};
 use super::block;
 use super::gemm::{Panels, add_outer_products, multiply};
-use super::weight_gradient::{LayerShape, WeightGradient, sum_over_blocks};
+use super::weight_gradient::{LayerShape, WeightGradient, split_parameters, sum_over_blocks};
 use super::{BLOCK_ROWS, padded};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -82,11 +82,6 @@ impl ReluShape {
         rows.div_ceil(BLOCK_ROWS) * self.block_tape() * size_of::<f32>()
     }
 
-    /// Number of parameters: weights and biases of all layers.
-    pub fn parameters(&self) -> usize {
-        self.layers.iter().map(LayerShape::parameters).sum()
-    }
-
     fn cut_tape<'a>(&self, arena: &mut Arena<'a>) -> Vec<&'a mut [f32]> {
         self.layers[..self.hidden()]
             .iter()
@@ -109,22 +104,16 @@ impl ReluNetwork {
     /// then the bias.
     ///
     /// # Panics
-    /// If their number, or the parts' widths, do not fit the shape.
+    /// If they do not fit the shape.
     pub fn new(arch: Arch, shape: &ReluShape, parameters: &[f32]) -> Self {
-        assert_eq!(
-            parameters.len(),
-            shape.parameters(),
-            "ReluNetwork::new: parameters do not fit"
-        );
+        let parameters = split_parameters(&shape.layers, parameters);
         assert_eq!(
             shape.layers[0].inputs,
             shape.parts.iter().map(PartShape::encoded).sum::<usize>(),
             "ReluNetwork::new: parts do not fit the first layer"
         );
         let (mut forward, mut backward, mut biases) = (Vec::new(), Vec::new(), Vec::new());
-        let mut rest = parameters;
-        for layer in &shape.layers {
-            let (weight, bias) = layer.split(&mut rest);
+        for (layer, (weight, bias)) in shape.layers.iter().zip(parameters) {
             let n = layer.inputs;
             forward.push(Panels::new(arch, n, layer.outputs, |k, c| {
                 weight[c * n + k]

@@ -18,7 +18,7 @@
 use super::arena::{Arena, Pooled, with_arena};
 use super::block::{self, SweepAdjoint};
 use super::gemm::{Panels, add_outer_products, multiply};
-use super::weight_gradient::{LayerShape, WeightGradient, sum_over_blocks};
+use super::weight_gradient::{LayerShape, WeightGradient, split_parameters, sum_over_blocks};
 use super::{BLOCK_ROWS, padded};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -70,6 +70,24 @@ pub struct SoftplusOutput {
     pub others: Vec<f32>,
 }
 
+/// First outputs of some rows, and the activations on the way to them.
+#[derive(Debug)]
+pub struct FirstPass {
+    /// First output of every row, `[N]`.
+    pub first: Vec<f32>,
+    /// `h_l` of every layer, block after block.
+    values: Pooled,
+}
+
+/// Rows that an earlier [`FirstPass`] with the same parameters has seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a> {
+    /// That pass.
+    pub pass: &'a FirstPass,
+    /// Of each row at hand its number there.
+    pub rows: &'a [u32],
+}
+
 /// Adjoints of [`SoftplusOutput`], of the same shapes.
 #[derive(Clone, Copy, Debug)]
 pub struct SoftplusAdjoint<'a> {
@@ -84,6 +102,16 @@ pub struct SoftplusAdjoint<'a> {
 /// Activations of a forward pass, block after block.
 #[derive(Debug)]
 pub struct Tape(Pooled);
+
+impl<'a> Known<'a> {
+    /// The rows of one block.
+    fn block(self, first_row: usize, rows: usize) -> Self {
+        Self {
+            rows: &self.rows[first_row..first_row + rows],
+            ..self
+        }
+    }
+}
 
 /// Matrices of one block that the backward pass reads.
 struct BlockTape<'a> {
@@ -109,14 +137,17 @@ impl SoftplusShape {
         padded(widths.max().unwrap_or(0))
     }
 
-    /// Numbers of a block's tape.
+    /// Numbers of a block's activations.
+    fn block_values(&self) -> usize {
+        let hidden = &self.layers[..self.hidden()];
+        BLOCK_ROWS * hidden.iter().map(|l| padded(l.outputs)).sum::<usize>()
+    }
+
+    /// Numbers of a block's tape: activations, and what the sweep leaves.
     fn block_tape(&self) -> usize {
-        let hidden = self.hidden();
-        let outputs =
-            |layers: &[LayerShape]| -> usize { layers.iter().map(|l| padded(l.outputs)).sum() };
-        let values = outputs(&self.layers[..hidden]);
-        let sweep = outputs(&self.layers[..hidden - 1]);
-        BLOCK_ROWS * (values + sweep + padded(self.encoded()))
+        let swept = &self.layers[..self.hidden() - 1];
+        let sweep: usize = swept.iter().map(|l| padded(l.outputs)).sum();
+        self.block_values() + BLOCK_ROWS * (sweep + padded(self.encoded()))
     }
 
     /// Numbers of working memory that any pass over a block needs.
@@ -133,22 +164,25 @@ impl SoftplusShape {
         rows.div_ceil(BLOCK_ROWS) * self.block_tape() * size_of::<f32>()
     }
 
-    /// Number of parameters: weights and biases of all layers.
-    pub fn parameters(&self) -> usize {
-        self.layers.iter().map(LayerShape::parameters).sum()
+    /// Bytes that a [`FirstPass`] over `rows` rows takes.
+    pub fn first_pass_bytes(&self, rows: usize) -> usize {
+        rows.div_ceil(BLOCK_ROWS) * self.block_values() * size_of::<f32>()
+    }
+
+    fn cut_values<'a>(&self, arena: &mut Arena<'a>) -> Vec<&'a mut [f32]> {
+        self.layers[..self.hidden()]
+            .iter()
+            .map(|l| arena.take(BLOCK_ROWS * padded(l.outputs)))
+            .collect()
     }
 
     fn cut_tape<'a>(&self, arena: &mut Arena<'a>) -> BlockTape<'a> {
-        let hidden = self.hidden();
-        let mut matrices = |layers: &[LayerShape]| {
-            layers
+        BlockTape {
+            h: self.cut_values(arena),
+            g: self.layers[..self.hidden() - 1]
                 .iter()
                 .map(|l| arena.take(BLOCK_ROWS * padded(l.outputs)))
-                .collect()
-        };
-        BlockTape {
-            h: matrices(&self.layers[..hidden]),
-            g: matrices(&self.layers[..hidden - 1]),
+                .collect(),
             g_encoding: arena.take(BLOCK_ROWS * padded(self.encoded())),
         }
     }
@@ -157,6 +191,7 @@ impl SoftplusShape {
 /// One block of a backward pass.
 struct BlockJob<'a> {
     points: &'a [f32],
+    known: Option<Known<'a>>,
     /// Adjoint of the first output.
     first: &'a [f32],
     /// … of the gradient, where it has one.
@@ -180,18 +215,12 @@ impl SoftplusNetwork {
     /// then the bias.
     ///
     /// # Panics
-    /// If their number does not fit the shape.
+    /// If they do not fit the shape.
     pub fn new(arch: Arch, shape: &SoftplusShape, parameters: &[f32]) -> Self {
-        assert_eq!(
-            parameters.len(),
-            shape.parameters(),
-            "SoftplusNetwork::new: parameters do not fit"
-        );
+        let parameters = split_parameters(&shape.layers, parameters);
         let (mut forward, mut backward, mut biases) = (Vec::new(), Vec::new(), Vec::new());
         let mut first = None;
-        let mut rest = parameters;
-        for (l, layer) in shape.layers.iter().enumerate() {
-            let (weight, bias) = layer.split(&mut rest);
+        for (l, (layer, (weight, bias))) in shape.layers.iter().zip(parameters).enumerate() {
             let n = layer.inputs;
             forward.push(Panels::new(arch, n, layer.outputs, |k, c| {
                 weight[c * n + k]
@@ -232,16 +261,48 @@ impl SoftplusNetwork {
             .zip(points.par_chunks(BLOCK_ROWS * POINT))
             .for_each(|(first, points)| {
                 with_arena(self.shape.scratch(), |arena| {
-                    let mut tape = self.shape.cut_tape(arena);
-                    let wanted = Wanted {
-                        first,
-                        gradient: None,
-                        others: None,
-                    };
-                    self.block_forward(points, &mut tape, wanted, arena);
+                    let tape = self.shape.cut_tape(arena);
+                    self.block_first(points, first, tape, arena);
                 });
             });
         first
+    }
+
+    /// [`Self::first`], with the activations for later passes over the same rows.
+    pub fn first_pass(&self, points: &[f32]) -> FirstPass {
+        let rows = points.len() / POINT;
+        let of_block = self.shape.block_values();
+        let mut first = vec![0.0; rows];
+        let mut values = Pooled::take(rows.div_ceil(BLOCK_ROWS) * of_block);
+        first
+            .par_chunks_mut(BLOCK_ROWS)
+            .zip(points.par_chunks(BLOCK_ROWS * POINT))
+            .zip(values.as_mut_slice().par_chunks_mut(of_block))
+            .for_each(|((first, points), values)| {
+                with_arena(self.shape.scratch(), |arena| {
+                    let tape = BlockTape {
+                        h: self.shape.cut_values(&mut Arena::new(values)),
+                        ..self.shape.cut_tape(arena)
+                    };
+                    self.block_first(points, first, tape, arena);
+                });
+            });
+        FirstPass { first, values }
+    }
+
+    fn block_first(
+        &self,
+        points: &[f32],
+        first: &mut [f32],
+        mut tape: BlockTape<'_>,
+        arena: &mut Arena<'_>,
+    ) {
+        let wanted = Wanted {
+            first,
+            gradient: None,
+            others: None,
+        };
+        self.block_forward(points, None, &mut tape, wanted, arena);
     }
 
     /// First output, its gradient and, where asked for, the other outputs at
@@ -249,6 +310,7 @@ impl SoftplusNetwork {
     pub fn forward(
         &self,
         points: &[f32],
+        known: Option<Known<'_>>,
         others: bool,
         keep: bool,
     ) -> (SoftplusOutput, Option<Tape>) {
@@ -282,7 +344,9 @@ impl SoftplusNetwork {
             .zip(output.gradient.par_chunks_mut(BLOCK_ROWS * POINT))
             .zip(points.par_chunks(BLOCK_ROWS * POINT))
             .zip(tapes.par_iter_mut().zip(others.par_iter_mut()))
-            .for_each(|(((first, gradient), points), (tape, others))| {
+            .enumerate()
+            .for_each(|(block, (((first, gradient), points), (tape, others)))| {
+                let known = known.map(|known| known.block(block * BLOCK_ROWS, first.len()));
                 with_arena(self.shape.scratch(), |arena| {
                     let mut tape = match tape {
                         Some(tape) => self.shape.cut_tape(&mut Arena::new(tape)),
@@ -293,11 +357,16 @@ impl SoftplusNetwork {
                         gradient: Some(gradient),
                         others: others.as_deref_mut(),
                     };
-                    self.block_forward(points, &mut tape, wanted, arena);
+                    self.block_forward(points, known, &mut tape, wanted, arena);
                 });
             });
         drop((tapes, others));
         (output, keep.then_some(Tape(tape)))
+    }
+
+    /// Its shape.
+    pub fn shape(&self) -> &SoftplusShape {
+        &self.shape
     }
 
     fn others(&self) -> usize {
@@ -393,6 +462,7 @@ impl SoftplusNetwork {
     fn block_forward(
         &self,
         points: &[f32],
+        known: Option<Known<'_>>,
         tape: &mut BlockTape<'_>,
         wanted: Wanted<'_>,
         arena: &mut Arena<'_>,
@@ -403,7 +473,13 @@ impl SoftplusNetwork {
         let encoding = arena.take(BLOCK_ROWS * padded(shape.encoded()));
         let joined = arena.take(BLOCK_ROWS * shape.widest());
         self.encode(points, encoding);
-        let slopes = self.activations(tape, encoding, joined, wanted.gradient.is_some(), arena);
+        let slopes = match known {
+            None => self.activations(tape, encoding, joined, wanted.gradient.is_some(), arena),
+            Some(known) => {
+                self.recall(known, &mut tape.h);
+                self.slopes(&tape.h, arena)
+            }
+        };
         let last = &*tape.h[hidden - 1];
         let stride = padded(shape.layers[hidden].inputs);
         let bias = &self.biases[hidden];
@@ -481,6 +557,35 @@ impl SoftplusNetwork {
         all
     }
 
+    /// Fills `h` of a block with the activations of known rows.
+    fn recall(&self, known: Known<'_>, h: &mut [&mut [f32]]) {
+        let of_block = self.shape.block_values();
+        let values = known.pass.values.as_slice();
+        for (place, row) in known.rows.iter().map(|row| *row as usize).enumerate() {
+            let mut block = &values[row / BLOCK_ROWS * of_block..];
+            for (h, layer) in h.iter_mut().zip(&self.shape.layers) {
+                let width = padded(layer.outputs);
+                h[place * width..][..width]
+                    .copy_from_slice(&block[row % BLOCK_ROWS * width..][..width]);
+                block = &block[BLOCK_ROWS * width..];
+            }
+        }
+        for (h, layer) in h.iter_mut().zip(&self.shape.layers) {
+            h[known.rows.len() * padded(layer.outputs)..].fill(0.0);
+        }
+    }
+
+    /// The slopes of all layers, from their values.
+    fn slopes<'b>(&self, h: &[&mut [f32]], arena: &mut Arena<'b>) -> Vec<&'b mut [f32]> {
+        h.iter()
+            .map(|h| {
+                let slope = arena.take(h.len());
+                block::softplus_slope(self.arch, h, self.shape.sharpness, slope);
+                slope
+            })
+            .collect()
+    }
+
     /// The reverse sweep: fills `g` and `g_encoding` of the tape.
     fn sweep(
         &self,
@@ -530,10 +635,12 @@ impl SoftplusNetwork {
 
     /// The gradient of `Σ output · adjoint` with respect to the parameters, in the
     /// order of [`Self::new`], and with respect to the points `[N, 3]` where
-    /// `to_points`. The tape of the first `H` rows spares computing them again.
+    /// `to_points`. The tape of the first `H` rows, and known rows, spare computing
+    /// them again.
     pub fn backward(
         &self,
         points: &[f32],
+        known: Option<Known<'_>>,
         adjoint: SoftplusAdjoint<'_>,
         tape: Option<Tape>,
         to_points: bool,
@@ -562,6 +669,7 @@ impl SoftplusNetwork {
             .chain(blocks_of(heavy, rows))
             .map(|range| BlockJob {
                 points: &points[range.start * POINT..range.end * POINT],
+                known: known.map(|known| known.block(range.start, range.len())),
                 first: &adjoint.first[range.clone()],
                 gradient: (range.start < heavy)
                     .then(|| &adjoint.gradient[range.start * POINT..range.end * POINT]),
@@ -605,7 +713,13 @@ impl SoftplusNetwork {
         let joined = arena.take(BLOCK_ROWS * shape.widest());
         self.encode(job.points, encoding);
         if recompute {
-            slopes = self.activations(&mut tape, encoding, joined, true, arena);
+            slopes = match job.known {
+                None => self.activations(&mut tape, encoding, joined, true, arena),
+                Some(known) => {
+                    self.recall(known, &mut tape.h);
+                    self.slopes(&tape.h, arena)
+                }
+            };
             if swept {
                 self.sweep(&mut tape, &slopes, joined, arena);
             }
@@ -688,11 +802,7 @@ impl SoftplusNetwork {
             let first_row = &mut sum.weight(hidden)[..width];
             block::add_column_sums(arch, &p[..BLOCK_ROWS * width], width, first_row);
         } else if slopes.is_empty() {
-            for l in 0..hidden {
-                let slope = arena.take(tape.h[l].len());
-                block::softplus_slope(arch, tape.h[l], shape.sharpness, slope);
-                slopes.push(slope);
-            }
+            slopes = self.slopes(&tape.h, arena);
         }
 
         // Down: the adjoint of the forward pass.

@@ -19,14 +19,6 @@ impl LayerShape {
         (self.inputs + 1) * self.outputs
     }
 
-    /// Cuts this layer's weight `[outputs, inputs]` and bias off `parameters`.
-    pub(super) fn split<'a>(&self, parameters: &mut &'a [f32]) -> (&'a [f32], &'a [f32]) {
-        let (weight, rest) = parameters.split_at(self.inputs * self.outputs);
-        let (bias, rest) = rest.split_at(self.outputs);
-        *parameters = rest;
-        (weight, bias)
-    }
-
     pub(super) fn padded_bias(&self, bias: &[f32]) -> Vec<f32> {
         let mut padded_bias = vec![0.0; padded(self.outputs)];
         padded_bias[..self.outputs].copy_from_slice(bias);
@@ -37,6 +29,28 @@ impl LayerShape {
     fn padded_parameters(&self) -> usize {
         self.outputs * padded(self.inputs) + padded(self.outputs)
     }
+}
+
+/// Weight `[outputs, inputs]` and bias of each layer, cut from `parameters`.
+///
+/// # Panics
+/// If their number is another.
+pub(super) fn split_parameters<'a>(
+    layers: &[LayerShape],
+    parameters: &'a [f32],
+) -> Vec<(&'a [f32], &'a [f32])> {
+    let wanted: usize = layers.iter().map(LayerShape::parameters).sum();
+    assert_eq!(parameters.len(), wanted, "parameters do not fit the layers");
+    let mut rest = parameters;
+    layers
+        .iter()
+        .map(|layer| {
+            let (weight, tail) = rest.split_at(layer.inputs * layer.outputs);
+            let (bias, tail) = tail.split_at(layer.outputs);
+            rest = tail;
+            (weight, bias)
+        })
+        .collect()
 }
 
 /// The gradient of all layers that some blocks contribute to.
@@ -70,11 +84,13 @@ impl WeightGradient<'_> {
 
 /// Most partial sums, and so most threads that work at once.
 const MAX_GROUPS: usize = 64;
+/// Rows of weights whose partial sums one task adds.
+const ROWS_PER_TASK: usize = 64;
 /// Fewest blocks that share a partial sum, where there are enough.
 const BLOCKS_PER_GROUP: usize = 4;
 
-/// Runs `add` for every job, in parallel, and sums what they contribute: per
-/// layer the weight `[outputs, inputs]`, then the bias.
+/// Runs `add` for every job, in parallel, and sums what they contribute: of each
+/// layer the weight `[outputs, inputs]` and the bias.
 ///
 /// Jobs are dealt to groups by their number, each group adds up in order, and the
 /// groups' sums are added in order: the result does not depend on the threads.
@@ -105,26 +121,27 @@ pub(super) fn sum_over_blocks<J: Send>(
         .collect();
 
     let mut total = vec![0.0; layers.iter().map(LayerShape::parameters).sum()];
+    // Rows of the result, with where they begin in each padded sum.
+    let mut rows: Vec<(&mut [f32], usize)> = Vec::new();
     let (mut rest, mut start) = (&mut total[..], 0);
-    let add_row = |row: &mut [f32], at: usize| {
-        for partial in &partial {
-            for (sum, x) in row.iter_mut().zip(&partial.as_slice()[at..]) {
-                *sum += x;
-            }
-        }
-    };
     for layer in layers {
         let stride = padded(layer.inputs);
         let (weight, tail) = rest.split_at_mut(layer.inputs * layer.outputs);
         let (bias, tail) = tail.split_at_mut(layer.outputs);
-        weight
-            .par_chunks_mut(layer.inputs)
-            .with_min_len(64)
-            .enumerate()
-            .for_each(|(r, row)| add_row(row, start + r * stride));
-        add_row(bias, start + layer.outputs * stride);
+        let weight_rows = weight.chunks_mut(layer.inputs).enumerate();
+        rows.extend(weight_rows.map(|(r, row)| (row, start + r * stride)));
+        rows.push((bias, start + layer.outputs * stride));
         start += layer.padded_parameters();
         rest = tail;
     }
+    rows.into_par_iter()
+        .with_min_len(ROWS_PER_TASK)
+        .for_each(|(row, start)| {
+            for partial in &partial {
+                for (sum, x) in row.iter_mut().zip(&partial.as_slice()[start..]) {
+                    *sum += x;
+                }
+            }
+        });
     total
 }

@@ -1,0 +1,156 @@
+//! Arithmetic that an iteration cannot avoid: what a time is measured against.
+//!
+//! One multiplication with its addition counts 2; matrix products alone are
+//! counted, for each number once: activations that are computed again for the
+//! backward pass, and distances that tell which samples matter, do not count
+//! twice.
+
+use crate::config::ModelConfig;
+use neat_tensor::PositionalEncoding;
+use serde::Serialize;
+
+/// Rows that went through the networks in one iteration.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct StepRows {
+    /// Points at which the sampler asked for a distance.
+    pub sampler: usize,
+    /// Samples whose distance was rendered.
+    pub samples: usize,
+    /// Samples at which all networks were evaluated.
+    pub full: usize,
+    /// … of rays that carry a segment.
+    pub segment: usize,
+    /// Points of the eikonal term besides rendered samples.
+    pub eikonal: usize,
+}
+
+impl std::ops::AddAssign for StepRows {
+    fn add_assign(&mut self, other: Self) {
+        self.sampler += other.sampler;
+        self.samples += other.samples;
+        self.full += other.full;
+        self.segment += other.segment;
+        self.eikonal += other.eikonal;
+    }
+}
+
+impl StepRows {
+    /// The mean of `steps` iterations that were added up.
+    pub fn divided_by(self, steps: usize) -> Self {
+        Self {
+            sampler: self.sampler / steps,
+            samples: self.samples / steps,
+            full: self.full / steps,
+            segment: self.segment / steps,
+            eikonal: self.eikonal / steps,
+        }
+    }
+}
+
+/// Floating-point operations of one iteration.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct StepFlops {
+    /// Distances for the sampler.
+    pub sampler: f64,
+    /// Distances, gradients, colours and segments.
+    pub forward: f64,
+    /// Gradients of the parameters.
+    pub backward: f64,
+}
+
+impl std::ops::AddAssign for StepFlops {
+    fn add_assign(&mut self, other: Self) {
+        self.sampler += other.sampler;
+        self.forward += other.forward;
+        self.backward += other.backward;
+    }
+}
+
+impl StepFlops {
+    /// All of them.
+    pub fn total(&self) -> f64 {
+        self.sampler + self.forward + self.backward
+    }
+
+    /// Counts an iteration over `rows`.
+    pub fn count(model: &ModelConfig, rows: &StepRows) -> Self {
+        let implicit = &model.implicit;
+        let encoded = |octaves: usize| PositionalEncoding { octaves }.output_width(3);
+        let point = encoded(implicit.octaves);
+        let hidden: usize = (0..implicit.hidden_layers)
+            .map(|l| {
+                let inputs = if l == 0 { point } else { implicit.width };
+                let narrowed = implicit.skip_layer > 0 && implicit.skip_layer == l + 1;
+                let outputs = implicit.width - if narrowed { point } else { 0 };
+                inputs * outputs
+            })
+            .sum();
+        let product = |size: usize| 2.0 * size as f64;
+        let distance = product(hidden + implicit.width);
+        let features = product(implicit.width * implicit.features);
+        let sweep = product(hidden);
+        // First layers alone pass a gradient to part of their inputs.
+        let perceptron =
+            |inputs: usize, trained: usize, width: usize, layers: usize, out: usize| {
+                let deep = (layers - 1) * width * width + width * out;
+                let forward = product(inputs * width + deep);
+                (forward, 2.0 * forward - product((inputs - trained) * width))
+            };
+        let trained = 3 + implicit.features;
+        let radiance = perceptron(
+            3 + encoded(model.rendering.view_octaves) + trained,
+            trained,
+            model.rendering.width,
+            model.rendering.hidden_layers,
+            3,
+        );
+        let view = if model.attraction.view_direction {
+            3
+        } else {
+            0
+        };
+        let attraction = perceptron(
+            encoded(model.attraction.octaves) + view + trained,
+            trained,
+            model.attraction.width,
+            model.attraction.hidden_layers,
+            6,
+        );
+        // The first layer passes no gradient to the points.
+        let to_points = product(point * implicit.width);
+        let of = |rows: usize, flops: f64| rows as f64 * flops;
+        Self {
+            sampler: of(rows.sampler, distance),
+            forward: of(rows.samples, distance)
+                + of(rows.full, features + sweep + radiance.0)
+                + of(rows.segment, attraction.0)
+                + of(rows.eikonal, distance + sweep),
+            backward: of(rows.samples, 2.0 * distance - to_points)
+                + of(rows.full, 2.0 * features + 2.0 * sweep + radiance.1)
+                + of(rows.segment, attraction.1)
+                + of(rows.eikonal, 2.0 * sweep + 2.0 * distance - to_points),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::preset::Preset;
+
+    #[test]
+    fn a_paper_size_sample_takes_what_the_design_says() {
+        let rows = StepRows {
+            sampler: 1,
+            samples: 1,
+            full: 1,
+            segment: 1,
+            eikonal: 0,
+        };
+        let flops = StepFlops::count(&Preset::PaperAbc.config().model, &rows);
+        // About 1 MFLOP a distance, 9.5 MFLOP for everything else of a sample.
+        assert!((flops.sampler - 0.92e6).abs() < 0.05e6, "{flops:?}");
+        let sample = flops.forward + flops.backward;
+        assert!((sample - 9.5e6).abs() < 0.7e6, "{flops:?}");
+    }
+}
