@@ -1,5 +1,6 @@
 //! Positional encoding of coordinates.
 
+use crate::sine::{cosine, sine};
 use burn::tensor::Tensor;
 
 /// `[x, sin(x), cos(x), sin(2x), cos(2x), …, sin(2ᴸ⁻¹x), cos(2ᴸ⁻¹x)]` with
@@ -21,11 +22,13 @@ impl PositionalEncoding {
         if self.octaves == 0 {
             return x;
         }
-        let mut blocks = vec![x.clone()];
+        let (sines, cosines) = self.sines_and_cosines(x.clone());
+        let width = x.dims()[1];
+        let mut blocks = vec![x];
         for octave in 0..self.octaves {
-            let scaled = x.clone().mul_scalar((1u64 << octave) as f64);
-            blocks.push(scaled.clone().sin());
-            blocks.push(scaled.cos());
+            for wave in [&sines, &cosines] {
+                blocks.push(wave.clone().narrow(1, width * octave, width));
+            }
         }
         Tensor::cat(blocks, 1)
     }
@@ -37,15 +40,24 @@ impl PositionalEncoding {
             return gradient;
         }
         let width = x.dims()[1];
+        let (sines, cosines) = self.sines_and_cosines(x);
         let mut sum = gradient.clone().narrow(1, 0, width);
         for octave in 0..self.octaves {
-            let frequency = (1u64 << octave) as f64;
-            let scaled = x.clone().mul_scalar(frequency);
+            let [sine, cosine] =
+                [&sines, &cosines].map(|wave| wave.clone().narrow(1, width * octave, width));
             let of_sin = gradient.clone().narrow(1, width * (1 + 2 * octave), width);
             let of_cos = gradient.clone().narrow(1, width * (2 + 2 * octave), width);
-            let term = of_sin * scaled.clone().cos() - of_cos * scaled.sin();
-            sum = sum + term.mul_scalar(frequency);
+            let term = of_sin * cosine - of_cos * sine;
+            sum = sum + term.mul_scalar((1u64 << octave) as f64);
         }
         sum
+    }
+
+    /// Sines and cosines of all octaves, each `[N, d L]`: a GPU likes few large
+    /// operations.
+    fn sines_and_cosines(&self, x: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
+        let angles = (0..self.octaves).map(|octave| x.clone().mul_scalar((1u64 << octave) as f64));
+        let angles = Tensor::cat(angles.collect(), 1);
+        (sine(angles.clone()), cosine(angles))
     }
 }

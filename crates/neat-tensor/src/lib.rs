@@ -22,6 +22,7 @@ pub mod kernels;
 pub mod linear;
 pub mod parameters;
 pub mod random;
+pub mod sine;
 pub mod softplus;
 
 pub use backend::{Backend, BackendError};
