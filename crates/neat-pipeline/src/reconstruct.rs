@@ -5,7 +5,7 @@ mod session;
 mod training;
 
 pub(crate) use session::timed;
-pub use session::{OpenedRun, open_run};
+pub use session::{OpenedRun, open_run, software_warning};
 
 use crate::config::Config;
 use crate::error::PipelineError;

@@ -15,7 +15,7 @@ pub enum Backend {
     Flex,
     /// The CPU, through the ndarray crate.
     Ndarray,
-    /// A GPU through Vulkan.
+    /// A GPU through Vulkan, Metal or DX12.
     Wgpu,
 }
 
@@ -30,20 +30,12 @@ pub enum BackendError {
         "this build of neat has no {0} backend; rebuild with `--features {0}` or choose one of: {1}"
     )]
     NotBuilt(Backend, String),
-    /// There is no Vulkan device.
+    /// There is no device for wgpu.
     #[error(
-        "no Vulkan device found for the wgpu backend; install a Vulkan driver, or use `--backend flex`"
+        "no GPU driver found for the wgpu backend; install one (Vulkan, Metal or DX12), or use `--backend flex`"
     )]
     NoAdapter,
-    /// The only Vulkan device is a software rasteriser.
-    #[error(
-        "the only Vulkan device here is a software driver, on which GPU kernels give wrong numbers or crash; use `--backend flex`, or set {SOFTWARE_VULKAN}=1 to try it all the same"
-    )]
-    SoftwareOnly,
 }
-
-/// Name of the environment variable that lets a software driver be used.
-const SOFTWARE_VULKAN: &str = "NEAT_SOFTWARE_VULKAN";
 
 impl fmt::Display for Backend {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -120,7 +112,7 @@ impl Backend {
             #[allow(deprecated)] // still one of the backends that neat promises
             Self::Ndarray => Ok(Device::ndarray()),
             #[cfg(feature = "wgpu")]
-            Self::Wgpu => vulkan_device(),
+            Self::Wgpu => wgpu_device(),
             #[allow(unreachable_patterns)] // when every backend is built in
             missing => Err(BackendError::NotBuilt(
                 missing,
@@ -134,21 +126,31 @@ impl Backend {
     }
 }
 
+/// The name of the software driver that `device` computes through, if it does:
+/// right, but many times slower than the CPU backends. [`Backend::Auto`] never
+/// picks one.
+pub fn software_driver(device: &Device) -> Option<String> {
+    #[cfg(feature = "wgpu")]
+    {
+        let identity = device.identity()?;
+        identity.physical.is_none().then_some(identity.name)
+    }
+    #[cfg(not(feature = "wgpu"))]
+    {
+        let _ = device;
+        None
+    }
+}
+
 #[cfg(feature = "wgpu")]
-fn vulkan_device() -> Result<Device, BackendError> {
+fn wgpu_device() -> Result<Device, BackendError> {
     use burn::tensor::DeviceType;
-    let software = std::env::var_os(SOFTWARE_VULKAN).is_some_and(|value| value != "0");
     // Enumeration lists discrete GPUs first and software devices last.
-    let device = Device::enumerate(DeviceType::Wgpu)
+    Device::enumerate(DeviceType::Wgpu)
         .into_vec()
         .into_iter()
         .next()
-        .ok_or(BackendError::NoAdapter)?;
-    if has_gpu() || software {
-        Ok(device)
-    } else {
-        Err(BackendError::SoftwareOnly)
-    }
+        .ok_or(BackendError::NoAdapter)
 }
 
 /// Whether a real GPU, not a software rasteriser, is here.

@@ -8,6 +8,7 @@ use clap::Args;
 use neat_core::file;
 use neat_pipeline::compare_backends::compare_backends;
 use neat_pipeline::event::Event;
+use neat_pipeline::reconstruct::software_warning;
 use neat_pipeline::run_dir::RunDir;
 use neat_pipeline::scene::read_scene;
 use neat_tensor::Backend;
@@ -56,10 +57,12 @@ impl CompareBackendsArgs {
         } else {
             self.backends
         };
-        for backend in &backends {
-            backend.device()?;
-        }
         let mut progress = Progress::new(quiet);
+        for backend in &backends {
+            if let Some(warning) = software_warning(&backend.device()?) {
+                progress.show(Event::Warning(warning));
+            }
+        }
         let loaded = read_scene(&self.scene, &config.data)?;
         for warning in &loaded.warnings {
             progress.show(Event::Warning(warning.to_string()));

@@ -11,6 +11,7 @@ use crate::scene::read_scene;
 use burn::tensor::Device;
 use neat_core::{LoadedScene, Scene, SceneError};
 use neat_tensor::Backend;
+use neat_tensor::backend::software_driver;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -39,7 +40,10 @@ impl<'a> Session<'a> {
         };
         let scene_dir = absolute(&options.scene)?;
 
-        let mut warnings = Vec::new();
+        let mut warnings: Vec<String> = software_warning(&device).into_iter().collect();
+        for warning in &warnings {
+            on_event(Event::Warning(warning.clone()));
+        }
         let ((loaded, inputs), seconds) = timed(on_event, Stage::Load, |on_event| {
             let loaded = load(&scene_dir, &options.config, on_event)?;
             Ok((loaded, hash_inputs(&scene_dir)?))
@@ -189,6 +193,9 @@ fn read_run(
     on_event: OnEvent<'_>,
 ) -> Result<OpenedRun, PipelineError> {
     let device = backend.device()?;
+    if let Some(warning) = software_warning(&device) {
+        on_event(Event::Warning(warning));
+    }
     let manifest = dir.manifest()?;
     let scene_dir = scene.unwrap_or(&manifest.scene);
     let (loaded, _) = timed(on_event, Stage::Load, |on_event| {
@@ -231,6 +238,14 @@ pub(crate) fn timed<T>(
     let seconds = start.elapsed().as_secs_f64();
     on_event(Event::StageFinished { stage, seconds });
     Ok((value, seconds))
+}
+
+/// What a person should know who computes through a software driver.
+pub fn software_warning(device: &Device) -> Option<String> {
+    let driver = software_driver(device)?;
+    Some(format!(
+        "{driver} is a software driver, not a GPU: right but slow; `--backend flex` is many times faster"
+    ))
 }
 
 /// The path from the root, so that the manifest leads there from anywhere.
