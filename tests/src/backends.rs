@@ -5,13 +5,9 @@ use neat_tensor::Backend;
 
 /// Environment variable with the backends to test, by name, between commas. A
 /// backend named there must be usable; without the variable all that are built
-/// in and have a device are tested. Vulkan in software counts only by name: the
-/// matrix kernels that burn's autotuning picks give wrong numbers on SwiftShader
-/// and crash Mesa's lavapipe.
+/// in and have a device are tested. A software driver in place of a GPU counts
+/// only by name: it is right, but slow.
 const BACKENDS: &str = "NEAT_TEST_BACKENDS";
-
-/// See [`slack`].
-const GPU_SLACK: f64 = 1000.0;
 
 /// Runs `test` on a device with autodiff of every backend.
 pub fn on_each_backend(test: impl Fn(Device)) {
@@ -29,37 +25,43 @@ pub fn flex() -> Device {
     Device::flex().autodiff()
 }
 
-/// How much wider tolerances are on `device`. A GPU rounds like a CPU, but Vulkan
-/// grants the sine of the encoding an error of 2⁻¹¹ where PyTorch's is below 2⁻²³.
-pub fn slack(device: &Device) -> f64 {
-    if device.identity().is_some() {
-        GPU_SLACK
-    } else {
-        1.0
+fn on_each_of(candidates: &[Backend], test: impl Fn(Device)) {
+    for backend in tested(candidates) {
+        report(&format!("backend: {backend}"));
+        let device = backend
+            .device()
+            .expect("`tested` keeps those with a device");
+        test(device.autodiff());
     }
 }
 
-#[expect(clippy::print_stderr, reason = "a skipped test must be seen")]
-fn on_each_of(candidates: &[Backend], test: impl Fn(Device)) {
+/// Those of `candidates` that are to be tested here.
+pub fn tested(candidates: &[Backend]) -> Vec<Backend> {
     let named = named();
-    for backend in candidates {
+    let is_tested = |backend: &Backend| {
         if named.as_ref().is_some_and(|named| !named.contains(backend)) {
-            eprintln!("skipped: {backend} is not in {BACKENDS}");
-            continue;
+            report(&format!("skipped: {backend} is not in {BACKENDS}"));
+            return false;
         }
         if named.is_none() && *backend == Backend::Wgpu && Backend::Auto.resolve() != *backend {
-            eprintln!("skipped: {backend} has no GPU here");
-            continue;
+            report(&format!("skipped: {backend} has no GPU here"));
+            return false;
         }
         match backend.device() {
-            Ok(device) => {
-                eprintln!("backend: {backend}");
-                test(device.autodiff());
-            }
+            Ok(_) => true,
             Err(error) if named.is_some() => panic!("{BACKENDS} names {backend}: {error}"),
-            Err(error) => eprintln!("skipped: {backend}: {error}"),
+            Err(error) => {
+                report(&format!("skipped: {backend}: {error}"));
+                false
+            }
         }
-    }
+    };
+    candidates.iter().copied().filter(is_tested).collect()
+}
+
+#[expect(clippy::print_stderr, reason = "a skipped test must be seen")]
+fn report(line: &str) {
+    eprintln!("{line}");
 }
 
 fn named() -> Option<Vec<Backend>> {

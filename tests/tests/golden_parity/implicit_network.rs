@@ -7,7 +7,7 @@ use neat_sdf::{ImplicitNetwork, ImplicitNetworkConfig};
 use neat_tensor::PositionalEncoding;
 use neat_tensor::parameters::load_parameters;
 use neat_tensor::random::{Purpose, stream};
-use neat_tests::backends::{on_each_backend, slack};
+use neat_tests::backends::on_each_backend;
 use neat_tests::comparison::{assert_close, assert_relatively_close};
 use neat_tests::golden::Golden;
 use neat_tests::named_gradients::{assert_gradients_close, named_gradients};
@@ -48,12 +48,7 @@ fn weight_normalisation_and_encoding() {
         let truth = golden.numbers("embedding");
         // In float32 the sine of up to 32·4 is known to about the rounding of its
         // argument.
-        assert_close(
-            "embedding",
-            &numbers(encoded),
-            &truth,
-            slack(&device) * 1e-5,
-        );
+        assert_close("embedding", &numbers(encoded), &truth, 1e-5);
     });
 }
 
@@ -66,12 +61,7 @@ fn distance_features_and_gradient() {
         let capped = network.evaluate(points.clone());
         let uncapped = network.evaluate_uncapped(points.clone());
         let check = |name: &str, actual: Vec<f64>, truth: &str| {
-            assert_relatively_close(
-                name,
-                &actual,
-                &golden.numbers(truth),
-                slack(&device) * VALUE_TOLERANCE,
-            );
+            assert_relatively_close(name, &actual, &golden.numbers(truth), VALUE_TOLERANCE);
         };
         check(
             "outputs",
@@ -103,18 +93,13 @@ fn the_eikonal_loss_trains_all_layers() {
         let loss = eikonal_loss(network.evaluate_uncapped(points).gradient);
         let gradients_of_loss = loss.backward();
         let truth = golden.numbers("f64.eikonal");
-        assert_relatively_close(
-            "eikonal",
-            &numbers(loss),
-            &truth,
-            slack(&device) * VALUE_TOLERANCE,
-        );
+        assert_relatively_close("eikonal", &numbers(loss), &truth, VALUE_TOLERANCE);
         assert_gradients_close(
             "d eikonal",
             &named_gradients(&network, gradients_of_loss),
             &gradients(&golden, "f64.deikonal/"),
-            slack(&device) * PER_TENSOR_TOLERANCE,
-            slack(&device) * IN_L2_TOLERANCE,
+            PER_TENSOR_TOLERANCE,
+            IN_L2_TOLERANCE,
         );
     });
 }
@@ -135,14 +120,14 @@ fn a_loss_of_distance_features_and_gradient_trains_all_layers() {
             "objective",
             &numbers(objective),
             &truth,
-            slack(&device) * PER_TENSOR_TOLERANCE,
+            PER_TENSOR_TOLERANCE,
         );
         assert_gradients_close(
             "d objective",
             &named_gradients(&network, gradients_of_objective),
             &gradients(&golden, "f64.dmixed/"),
-            slack(&device) * PER_TENSOR_TOLERANCE,
-            slack(&device) * IN_L2_TOLERANCE,
+            PER_TENSOR_TOLERANCE,
+            IN_L2_TOLERANCE,
         );
     });
 }

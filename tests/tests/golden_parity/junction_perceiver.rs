@@ -8,7 +8,7 @@ use neat_gjp::PerceiverConfig;
 use neat_gjp::junction_loss::{MatchedJunctions, junction_loss};
 use neat_tensor::parameters::load_parameters;
 use neat_tensor::random::{Purpose, stream};
-use neat_tests::backends::on_each_cpu_backend;
+use neat_tests::backends::on_each_backend;
 use neat_tests::comparison::assert_relatively_close;
 use neat_tests::golden::Golden;
 use neat_tests::named_gradients::{assert_gradients_close, named_gradients};
@@ -81,7 +81,7 @@ fn check(golden: &Golden, camera: &Camera, problem: &str, device: &Device) {
 fn junctions_and_the_losses_of_matched_ones() {
     let golden = Golden::open("07_gjp_assignment");
     let camera = camera(&golden, "K", "pose_c2w");
-    on_each_cpu_backend(|device| {
+    on_each_backend(|device| {
         for problem in ["p20x64", "p64x64", "p90x64"] {
             check(&golden, &camera, problem, &device);
         }

@@ -7,7 +7,7 @@ use neat_sdf::RenderingNetworkConfig;
 use neat_tensor::PositionalEncoding;
 use neat_tensor::parameters::load_parameters;
 use neat_tensor::random::{Purpose, stream};
-use neat_tests::backends::{on_each_backend, slack};
+use neat_tests::backends::on_each_backend;
 use neat_tests::comparison::assert_relatively_close;
 use neat_tests::golden::Golden;
 use neat_tests::named_gradients::{assert_gradients_close, named_gradients};
@@ -36,18 +36,12 @@ impl Case {
         forward: impl Fn(&M, [Tensor<2>; 4]) -> Tensor<2>,
     ) {
         let Self { network, output } = self;
-        let gradient_tolerance = slack(device) * GRADIENT_TOLERANCE;
         let values = parameters(golden, &format!("{network}.param/"));
         let module = load_parameters(untrained, values, None).expect("published architecture");
         let inputs = INPUTS.map(|name| golden_tensor::<2>(golden, name, device).require_grad());
         let outputs = forward(&module, inputs.clone());
         let truth = golden.numbers(&format!("f64.{output}"));
-        assert_relatively_close(
-            output,
-            &numbers(outputs.clone()),
-            &truth,
-            slack(device) * OUTPUT_TOLERANCE,
-        );
+        assert_relatively_close(output, &numbers(outputs.clone()), &truth, OUTPUT_TOLERANCE);
 
         // The ends [N, 2, 3] of a segment lie one after the other in [N, 6].
         let fixed = golden.numbers(&format!("fixed_{output}"));
@@ -60,14 +54,14 @@ impl Case {
                 .expect("every input counts");
             let name = format!("f64.{network}.d/{name}");
             let truth = golden.numbers(&name);
-            assert_relatively_close(&name, &numbers(gradient), &truth, gradient_tolerance);
+            assert_relatively_close(&name, &numbers(gradient), &truth, GRADIENT_TOLERANCE);
         }
         assert_gradients_close(
             network,
             &named_gradients(&module, gradients_of_objective),
             &gradients(golden, &format!("f64.{network}.dparam/")),
-            gradient_tolerance,
-            gradient_tolerance,
+            GRADIENT_TOLERANCE,
+            GRADIENT_TOLERANCE,
         );
     }
 }
@@ -85,12 +79,7 @@ fn radiance() {
         };
         let encoded = encoding.encode(golden_tensor(&golden, "view_dirs", &device));
         let truth = golden.numbers("f64.view_embedding");
-        assert_relatively_close(
-            "view encoding",
-            &numbers(encoded),
-            &truth,
-            slack(&device) * OUTPUT_TOLERANCE,
-        );
+        assert_relatively_close("view encoding", &numbers(encoded), &truth, OUTPUT_TOLERANCE);
 
         let untrained = config.init(FEATURES, &mut stream(0, Purpose::Weights, 0), &device);
         let case = Case {

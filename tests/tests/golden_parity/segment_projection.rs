@@ -6,7 +6,7 @@ use neat_core::{Camera, Intrinsics};
 use neat_field::segment_rendering::{
     RayCameras, calibrated_difference_in_pixels, project_calibrated,
 };
-use neat_tests::backends::on_each_cpu_backend;
+use neat_tests::backends::on_each_backend;
 use neat_tests::comparison::{assert_close, assert_relatively_close};
 use neat_tests::golden::Golden;
 use neat_tests::tensors::{golden_tensor, numbers};
@@ -48,7 +48,7 @@ fn points_before_and_behind_the_camera() {
         .flat_map(|&p| camera.project(&Vector3::from(p)).calibrated.data.0[0])
         .collect();
     assert_close("camera", &by_camera, truth.as_flattened(), 3e-6);
-    on_each_cpu_backend(|device| {
+    on_each_backend(|device| {
         let points: Tensor<2> = golden_tensor(&golden, "world_points", &device);
         // The segment from each point to the one before.
         let before = Tensor::cat(
@@ -76,7 +76,7 @@ fn points_at_the_camera_plane_are_pushed_off_it() {
         1,
         1,
     );
-    on_each_cpu_backend(|device| {
+    on_each_backend(|device| {
         let points: Tensor<2> = golden_tensor(&golden, "guard/points", &device);
         let rays = points.dims()[0];
         let segments = Tensor::cat(vec![points.clone(), points], 1);
@@ -102,7 +102,7 @@ fn differences_become_pixels_by_focal_length_and_skew() {
                 .0[0]
         })
         .collect();
-    on_each_cpu_backend(|device| {
+    on_each_backend(|device| {
         let in_pixels = calibrated_difference_in_pixels(
             Tensor::from_data(differences, &device),
             &same_camera(&camera, 2, &device),
