@@ -80,6 +80,13 @@ impl KnownPass {
 }
 
 impl KnownRows {
+    /// A pass over `points` `[N, 3]`, and which of its rows the rows at hand are;
+    /// nothing where there is no room to keep it.
+    pub fn new(network: &SoftplusNetwork, points: &[f32], rows: Arc<[u32]>) -> Option<Self> {
+        let pass = Arc::new(KnownPass::run(network, points)?);
+        Some(Self { pass, rows })
+    }
+
     fn as_known(&self) -> Known<'_> {
         Known {
             pass: &self.pass.pass,

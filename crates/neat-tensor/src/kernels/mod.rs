@@ -18,6 +18,8 @@ pub mod simd_math;
 pub mod softplus_network;
 pub mod weight_gradient;
 
+pub use pulp::Arch;
+
 /// Rows of a block.
 pub const BLOCK_ROWS: usize = 48;
 
@@ -27,4 +29,18 @@ pub const PADDING: usize = 16;
 /// `width` rounded up to a multiple of [`PADDING`].
 pub const fn padded(width: usize) -> usize {
     width.div_ceil(PADDING) * PADDING
+}
+
+/// The instruction sets of this machine that kernels are compiled for, plain
+/// code first.
+pub fn instruction_sets() -> Vec<Arch> {
+    let mut sets = vec![Arch::Scalar];
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        sets.extend(pulp::x86::V3::try_new().map(Arch::V3));
+        sets.extend(pulp::x86::V4::try_new().map(Arch::V4));
+    }
+    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+    sets.push(Arch::new());
+    sets
 }

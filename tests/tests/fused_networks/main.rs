@@ -1,0 +1,6 @@
+//! Fused networks against their twins in tensor operations, which
+//! `finite_differences` checks: values and all gradients.
+
+mod kernels;
+mod segment_loss;
+mod twins;
