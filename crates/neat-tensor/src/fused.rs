@@ -21,11 +21,26 @@ use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn_autodiff::grads::Gradients;
 use burn_autodiff::ops::{Backward, Ops, OpsKind};
 use pulp::Arch;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// See [`set_enabled`].
+static ENABLED: AtomicBool = AtomicBool::new(true);
+
+/// Turns fused operations off, or on again, in the whole process: for
+/// measurements and tests that want the plain tensor operations. Set it before
+/// the first network is evaluated; a pass under way may mix both.
+pub fn set_enabled(enabled: bool) {
+    ENABLED.store(enabled, Ordering::Relaxed);
+}
 
 /// Whether networks on `device` run as fused operations (in float32).
 pub fn is_fused(device: &Device) -> bool {
+    ENABLED.load(Ordering::Relaxed) && is_on_host(device)
+}
+
+/// Whether `device` is the CPU, whose memory is the host's.
+pub(crate) fn is_on_host(device: &Device) -> bool {
     use burn::backend::DispatchDevice;
     match device.clone().inner().as_dispatch() {
         #[cfg(feature = "flex")]
