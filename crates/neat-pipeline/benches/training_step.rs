@@ -26,6 +26,6 @@ fn main() {
         named
     };
     let device = backend.device().expect("a device of the backend");
-    let measured = benchmark(backend, &device, &presets, 5.0, &mut |_| {});
+    let measured = benchmark(backend, &device, &presets, 5.0, &mut |_, _| {});
     print!("{}", measured.expect("a preset trains").to_markdown());
 }

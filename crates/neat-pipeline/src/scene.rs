@@ -1,7 +1,7 @@
 //! Reading a scene as a configuration wants it.
 
 use crate::config::DataConfig;
-use neat_core::{LoadOptions, LoadedScene, SceneError, load_scene};
+use neat_core::{LoadOptions, LoadedScene, Scene, SceneError, load_scene};
 use std::path::Path;
 
 /// Reads the scene in the folder `dir`.
@@ -19,11 +19,17 @@ pub fn read_scene(dir: &Path, config: &DataConfig) -> Result<LoadedScene, SceneE
         ..LoadOptions::default()
     };
     let mut loaded = load_scene(dir, &options)?;
-    let radius = loaded.scene.bounding_ball_radius();
-    if config.scene_radius.is_none() && radius.is_finite() && radius > 0.0 {
-        loaded.scene = loaded.scene.scaled(1.0 / radius);
-    }
+    loaded.scene = scaled_for(config, loaded.scene);
     Ok(loaded)
+}
+
+/// `scene` in the unit that the configuration wants.
+pub(crate) fn scaled_for(config: &DataConfig, scene: Scene) -> Scene {
+    let radius = scene.bounding_ball_radius();
+    match config.scene_radius.is_none() && radius.is_finite() && radius > 0.0 {
+        true => scene.scaled(1.0 / radius),
+        false => scene,
+    }
 }
 
 #[cfg(test)]
