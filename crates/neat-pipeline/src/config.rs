@@ -76,6 +76,10 @@ pub struct TrainConfig {
     pub steps: u64,
     /// Rays per iteration.
     pub rays: usize,
+    /// Rays per pass. A batch of more is taken in several passes, with the same
+    /// gradients in less memory and a third more time; `None` takes all at once.
+    #[serde(default)]
+    pub ray_chunk: Option<usize>,
     /// Share of the rays that go through any pixel, not only attraction regions.
     pub background_share: f64,
     /// Which views the rays of one iteration come from.

@@ -4,6 +4,7 @@
 
 mod awake;
 pub mod benchmark;
+mod chunked_step;
 pub mod compare_backends;
 pub mod config;
 pub mod demo;

@@ -8,7 +8,7 @@ use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::Vector2;
 use neat_core::assignment::{AssignmentError, assign};
 use neat_core::{Camera, LineSegment2};
-use neat_field::host_segment_loss::{ObservedSegment, host_segment_loss};
+use neat_field::host_segment_loss::{HostSegmentLoss, ObservedSegment, host_segment_loss};
 use neat_field::segment_loss::{SegmentLossConfig, segment_loss};
 use neat_field::segment_rendering::{RayCameras, project_calibrated};
 use neat_gjp::candidates::{JunctionView, RenderedSegment, matching_cost};
@@ -40,7 +40,7 @@ pub struct Losses {
 
 /// Everything random or observed of one iteration: with it the loss is a plain
 /// function of the parameters.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct StepInput<'a> {
     /// The rays and what was observed.
     pub batch: &'a Batch,
@@ -75,19 +75,31 @@ pub struct StepLoss {
     pub assignment: Duration,
 }
 
-/// Renders the batch and adds up the terms.
-///
-/// # Errors
-/// If rendered end points are so far out that they cannot be matched.
-pub fn step_loss(
+/// The terms that every ray has, and what the segment term is made of.
+pub(crate) struct RayTerms {
+    pub rgb: Tensor<1>,
+    pub eikonal: Tensor<1>,
+    pub mask: Tensor<1>,
+    /// Rendered colour `[R, 3]`.
+    pub color: Tensor<2>,
+    /// Rendered ends `[R', 6]` of the rays that carry a segment.
+    pub ends: Option<Tensor<2>>,
+    /// Accumulated weight of those rays `[R', 1]`.
+    pub opacity: Tensor<2>,
+    pub rows: StepRows,
+    /// Gradients that the eikonal term is the mean over.
+    pub eikonal_rows: usize,
+}
+
+/// Renders the batch: colour, silhouette, gradients.
+pub(crate) fn ray_terms(
     model: &NeatModel,
     input: &StepInput<'_>,
     beta: Tensor<1>,
     config: &TrainConfig,
     device: &Device,
-) -> Result<StepLoss, AssignmentError> {
+) -> RayTerms {
     let batch = input.batch;
-    let weights = &config.loss;
     let segment_rays = batch.segment_of_ray.len();
     let rendering = model.render(
         &RenderRequest {
@@ -116,31 +128,72 @@ pub fn step_loss(
     let rgb = rgb_loss(color.clone(), point_tensor(&batch.colors, device));
 
     let mut gradients = Vec::new();
+    let mut eikonal_rows = 0;
     if !input.eikonal_points.is_empty() {
         let points = point_tensor(input.eikonal_points, device);
         gradients.push(model.implicit_network.gradient_uncapped(points));
+        eikonal_rows += rows.eikonal;
     }
     if config.eikonal.rendered_samples {
         gradients.push(rendering.gradients.clone());
+        eikonal_rows += rows.full;
     }
     let eikonal = match gradients.is_empty() {
         true => zero(),
         false => eikonal_loss(Tensor::cat(gradients, 0)),
     };
 
-    let mask = match weights.mask > 0.0 {
+    let mask = match config.loss.mask > 0.0 {
         false => zero(),
         true => mask_loss(
             rendering.opacity.clone(),
             Tensor::from_data(TensorData::new(batch.silhouette.clone(), [rays, 1]), device),
         ),
     };
+    RayTerms {
+        rgb,
+        eikonal,
+        mask,
+        color,
+        ends: rendering.segments,
+        // Where no ray carries a segment nobody asks.
+        opacity: match segment_rays == rays || segment_rays == 0 {
+            true => rendering.opacity,
+            false => rendering.opacity.narrow(0, 0, segment_rays),
+        },
+        rows,
+        eikonal_rows,
+    }
+}
+
+/// Renders the batch and adds up the terms.
+///
+/// # Errors
+/// If rendered end points are so far out that they cannot be matched.
+pub fn step_loss(
+    model: &NeatModel,
+    input: &StepInput<'_>,
+    beta: Tensor<1>,
+    config: &TrainConfig,
+    device: &Device,
+) -> Result<StepLoss, AssignmentError> {
+    let weights = &config.loss;
+    let zero = || Tensor::<1>::zeros([1], device);
+    let RayTerms {
+        rgb,
+        eikonal,
+        mask,
+        color,
+        ends,
+        opacity,
+        rows,
+        ..
+    } = ray_terms(model, input, beta, config, device);
 
     let (mut segment, mut segment_errors) = (zero(), Vec::new());
     let (mut junction_3d, mut junction_2d, mut targets) = (zero(), zero(), 0);
     let mut assignment = Duration::ZERO;
-    if let Some(ends) = rendering.segments {
-        let opacity = rendering.opacity.narrow(0, 0, segment_rays);
+    if let Some(ends) = ends {
         let compared = match is_fused(device) && ends.dtype() == DType::F32 {
             true => compare_on_host(ends, opacity, input, config),
             false => compare_on_device(ends, opacity, input, config, device),
@@ -201,7 +254,7 @@ struct Compared {
     rays: Vec<ComparedRay>,
 }
 
-struct ComparedRay {
+pub(crate) struct ComparedRay {
     /// Both rendered ends in the world.
     ends: [f32; 6],
     error_in_pixels: f32,
@@ -258,6 +311,24 @@ fn compare_on_host(
     input: &StepInput<'_>,
     config: &TrainConfig,
 ) -> Compared {
+    let values = host_vec(ends.clone());
+    let compared = compared_with_observed(&values, &host_vec(opacity), input, config);
+    let rays = compared_rays(&values, &compared);
+    let linear = segment_gradient(ends, compared.gradient);
+    let offset = compared.loss - host_vec(linear.clone())[0];
+    Compared {
+        loss: linear.add_scalar(offset),
+        rays,
+    }
+}
+
+/// The segment loss of rendered ends `[R' · 6]`, with its gradient.
+pub(crate) fn compared_with_observed(
+    ends: &[f32],
+    opacity: &[f32],
+    input: &StepInput<'_>,
+    config: &TrainConfig,
+) -> HostSegmentLoss {
     let batch = input.batch;
     let observed: Vec<ObservedSegment<'_>> = batch
         .segment_of_ray
@@ -274,35 +345,26 @@ fn compare_on_host(
             }
         })
         .collect();
-    let values = host_vec(ends.clone());
-    let compared = host_segment_loss(
-        &values,
-        &host_vec(opacity),
-        &observed,
-        segment_loss_config(config),
-    );
-    let rays = values
-        .chunks_exact(6)
-        .zip(compared.error_in_pixels.iter().zip(&compared.counted));
-    Compared {
-        rays: rays
-            .map(|(ends, (error, counted))| ComparedRay {
-                ends: std::array::from_fn(|i| ends[i]),
-                error_in_pixels: *error,
-                counted: *counted,
-            })
-            .collect(),
-        loss: with_gradient(ends, compared.loss, compared.gradient),
-    }
+    host_segment_loss(ends, opacity, &observed, segment_loss_config(config))
 }
 
-/// A tensor `[1]` of the given value, whose gradient with respect to `x` is the
-/// given one.
-fn with_gradient(x: Tensor<2>, value: f32, gradient: Vec<f32>) -> Tensor<1> {
-    let (shape, device) = (x.dims(), x.device());
-    let linear = (x * Tensor::from_data(TensorData::new(gradient, shape), &device)).sum();
-    let offset = value - host_vec(linear.clone())[0];
-    linear.add_scalar(offset)
+/// What junctions are made of.
+pub(crate) fn compared_rays(ends: &[f32], compared: &HostSegmentLoss) -> Vec<ComparedRay> {
+    let of_rays = compared.error_in_pixels.iter().zip(&compared.counted);
+    ends.chunks_exact(6)
+        .zip(of_rays)
+        .map(|(ends, (error, counted))| ComparedRay {
+            ends: std::array::from_fn(|i| ends[i]),
+            error_in_pixels: *error,
+            counted: *counted,
+        })
+        .collect()
+}
+
+/// A tensor `[1]` whose gradient with respect to `ends` is the given one.
+pub(crate) fn segment_gradient(ends: Tensor<2>, gradient: Vec<f32>) -> Tensor<1> {
+    let (shape, device) = (ends.dims(), ends.device());
+    (ends * Tensor::from_data(TensorData::new(gradient, shape), &device)).sum()
 }
 
 impl StepLoss {
@@ -323,7 +385,7 @@ impl StepLoss {
 }
 
 /// Local junctions from the rendered ends, matched with the global ones.
-fn junction_terms(
+pub(crate) fn junction_terms(
     model: &NeatModel,
     input: &StepInput<'_>,
     config: &TrainConfig,

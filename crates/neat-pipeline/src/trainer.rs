@@ -1,6 +1,7 @@
 //! The optimisation of one scene.
 
 use crate::awake::with_awake_worker;
+use crate::chunked_step::{StepGradients, chunked_step};
 use crate::config::{Config, TrainConfig};
 pub use crate::field::TrainedField;
 use crate::flops::StepRows;
@@ -135,6 +136,29 @@ pub struct Trainer {
     rows: StepRows,
 }
 
+/// Everything random or observed of one iteration.
+struct Prepared {
+    batch: Batch,
+    samples: RaySamples,
+    distances: Distances,
+    eikonal_points: Vec<[f32; 3]>,
+    /// Distances that the sampler asked for.
+    asked: usize,
+}
+
+impl Prepared {
+    fn input<'a>(&'a self, views: &'a [JunctionView<'a>], junctions_due: bool) -> StepInput<'a> {
+        StepInput {
+            batch: &self.batch,
+            samples: &self.samples,
+            distances: &self.distances,
+            eikonal_points: &self.eikonal_points,
+            views,
+            junctions_due,
+        }
+    }
+}
+
 /// Loss and gradients of an iteration, before the parameters move.
 #[derive(Clone, Debug)]
 pub struct Probe {
@@ -243,17 +267,19 @@ impl Trainer {
     }
 
     fn step_here(&mut self, schedule: f64) -> Result<StepReport, TrainError> {
-        let loss = self.loss(schedule)?;
-        let losses = loss.losses();
+        let StepGradients {
+            losses,
+            segment_errors,
+            targets,
+            mut gradients,
+            ..
+        } = self.gradients(schedule)?;
         if !losses.total.is_finite() {
             return Err(TrainError::NonFinite {
                 iteration: self.iteration + 1,
                 value: losses.total,
             });
         }
-        let start = Instant::now();
-        let mut gradients = GradientsParams::from_grads(loss.total.backward(), &self.model);
-        self.timings.backward = start.elapsed();
         let start = Instant::now();
         let train = &self.config.train;
         let factor = learning_rate_factor(train, self.iteration, schedule);
@@ -270,9 +296,9 @@ impl Trainer {
         Ok(StepReport {
             iteration: self.iteration,
             losses,
-            segment_error_in_pixels: median(loss.segment_errors),
-            rendered_samples: loss.rows.full,
-            targets: loss.targets,
+            segment_error_in_pixels: median(segment_errors),
+            rendered_samples: self.rows.full,
+            targets,
             learning_rate: networks,
             beta: self.beta,
         })
@@ -284,7 +310,7 @@ impl Trainer {
     /// # Errors
     /// As [`Self::step`].
     pub fn probe(&mut self, schedule: f64) -> Result<Probe, TrainError> {
-        let loss = self.loss(schedule)?;
+        let loss = self.whole_loss(schedule)?;
         let losses = loss.losses();
         let color = host_vec(loss.color.clone());
         let mut gradients = GradientsParams::from_grads(loss.total.backward(), &self.model);
@@ -295,15 +321,103 @@ impl Trainer {
         })
     }
 
-    fn loss(&mut self, schedule: f64) -> Result<StepLoss, TrainError> {
+    /// Losses and gradients of the next iteration.
+    fn gradients(&mut self, schedule: f64) -> Result<StepGradients, TrainError> {
+        let chunk = self.config.train.ray_chunk;
+        let Some(chunk) = chunk.filter(|chunk| *chunk < self.config.train.rays) else {
+            let loss = self.whole_loss(schedule)?;
+            let start = Instant::now();
+            let losses = loss.losses();
+            let gradients = match losses.total.is_finite() {
+                true => GradientsParams::from_grads(loss.total.backward(), &self.model),
+                false => GradientsParams::new(),
+            };
+            self.timings.backward = start.elapsed();
+            return Ok(StepGradients {
+                losses,
+                segment_errors: loss.segment_errors,
+                rows: self.rows,
+                targets: loss.targets,
+                assignment: loss.assignment,
+                backward: self.timings.backward,
+                gradients,
+            });
+        };
+        let (prepared, start) = (self.prepare(schedule), Instant::now());
+        let views = self.junction_views();
+        let input = prepared.input(&views, self.junctions_due());
+        let result = chunked_step(
+            &self.model,
+            &input,
+            || self.beta_tensor(schedule),
+            &self.config.train,
+            &self.device,
+            chunk,
+        );
+        let step = result.map_err(|source| self.unmatched(source))?;
+        self.rows = StepRows {
+            sampler: prepared.asked,
+            ..step.rows
+        };
+        self.timings.assignment = step.assignment;
+        self.timings.backward = step.backward;
+        self.timings.forward = start.elapsed() - step.assignment - step.backward;
+        Ok(step)
+    }
+
+    /// The loss of the next iteration, all rays at once.
+    fn whole_loss(&mut self, schedule: f64) -> Result<StepLoss, TrainError> {
+        let (prepared, start) = (self.prepare(schedule), Instant::now());
+        let views = self.junction_views();
+        let input = prepared.input(&views, self.junctions_due());
+        let beta = self.beta_tensor(schedule);
+        let result = step_loss(&self.model, &input, beta, &self.config.train, &self.device);
+        let loss = result.map_err(|source| self.unmatched(source))?;
+        self.rows = StepRows {
+            sampler: prepared.asked,
+            ..loss.rows
+        };
+        self.timings.assignment = loss.assignment;
+        self.timings.forward = start.elapsed() - loss.assignment;
+        Ok(loss)
+    }
+
+    fn unmatched(&self, source: AssignmentError) -> TrainError {
+        TrainError::Assignment {
+            iteration: self.iteration + 1,
+            source,
+        }
+    }
+
+    fn junctions_due(&self) -> bool {
+        let interval = self.config.train.junction_interval.max(1);
+        (self.iteration + 1).is_multiple_of(interval)
+    }
+
+    fn junction_views(&self) -> Vec<JunctionView<'_>> {
+        let views = self.data.views.iter();
+        views
+            .map(|view| JunctionView {
+                camera: &view.camera,
+                junctions_in_image: &view.junctions,
+            })
+            .collect()
+    }
+
+    /// Scale of the density in the next iteration.
+    fn beta_tensor(&self, schedule: f64) -> Tensor<1> {
         let density = &self.config.model.density;
-        let beta = match density.schedule {
+        match density.schedule {
             BetaSchedule::Learned => self.model.density.beta(),
             BetaSchedule::Annealed => {
                 Tensor::from_data([density.annealed_beta(schedule) as f32], &self.device)
             }
-        };
-        self.beta = f64::from(host_vec(beta.clone())[0]);
+        }
+    }
+
+    /// Draws and places everything random of the next iteration.
+    fn prepare(&mut self, schedule: f64) -> Prepared {
+        self.beta = f64::from(host_vec(self.beta_tensor(schedule))[0]);
         let start = Instant::now();
         let batch = self.data.batch(&self.config, self.seed, self.iteration);
         self.timings.batch = start.elapsed();
@@ -311,39 +425,14 @@ impl Trainer {
         let distances = self.model.implicit_network.distances(&self.device);
         let (samples, asked) = self.sample(&batch, &distances);
         self.timings.sampler = start.elapsed();
-        let start = Instant::now();
-        let train = &self.config.train;
         let eikonal_points = self.eikonal_points(&batch, &samples);
-        let views: Vec<JunctionView<'_>> = self
-            .data
-            .views
-            .iter()
-            .map(|view| JunctionView {
-                camera: &view.camera,
-                junctions_in_image: &view.junctions,
-            })
-            .collect();
-        let input = StepInput {
-            batch: &batch,
-            samples: &samples,
-            distances: &distances,
-            eikonal_points: &eikonal_points,
-            views: &views,
-            junctions_due: (self.iteration + 1).is_multiple_of(train.junction_interval.max(1)),
-        };
-        let loss = step_loss(&self.model, &input, beta, train, &self.device).map_err(|source| {
-            TrainError::Assignment {
-                iteration: self.iteration + 1,
-                source,
-            }
-        })?;
-        self.rows = StepRows {
-            sampler: asked,
-            ..loss.rows
-        };
-        self.timings.assignment = loss.assignment;
-        self.timings.forward = start.elapsed() - loss.assignment;
-        Ok(loss)
+        Prepared {
+            batch,
+            samples,
+            distances,
+            eikonal_points,
+            asked,
+        }
     }
 
     /// The signed distance network as it is now.
@@ -502,6 +591,9 @@ fn validate(config: &Config) -> Result<(), TrainError> {
     }
     if train.rays == 0 || !(0.0..1.0).contains(&train.background_share) {
         return refuse("train.rays must be positive and train.background_share in [0, 1)");
+    }
+    if train.ray_chunk == Some(0) {
+        return refuse("train.ray_chunk must be positive");
     }
     if train.steps == 0 {
         return refuse("train.steps must be positive");
