@@ -244,6 +244,20 @@ mod tests {
         assert_eq!(apply_overrides(&config, &[same]).unwrap(), config);
     }
 
+    #[test]
+    fn rays_can_stop_by_themselves() {
+        use neat_sdf::ray_sampler::StopRule;
+        let stop = |config: &Config| match &config.train.sampler {
+            neat_sdf::RaySamplerConfig::ErrorBound(sampler) => Some(sampler.stop),
+            _ => None,
+        };
+        let config = crate::preset::Preset::PaperAbc.config();
+        assert_eq!(stop(&config), Some(StopRule::Batch));
+        let text = "train.sampler.stop=ray".to_owned();
+        let config = apply_overrides(&config, &[text]).unwrap();
+        assert_eq!(stop(&config), Some(StopRule::Ray));
+    }
+
     fn applied(overrides: &[&str]) -> Result<Tree, OverrideError> {
         let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
         apply_to(&tree(), &overrides)

@@ -1,15 +1,35 @@
 //! VolSDF's Algorithm 1: samples are added until the opacity's error is bounded.
 //!
-//! Yariv et al. 2021, section 3.3 and Theorem 1. As published, convergence is
-//! decided for the whole batch: while any ray has not converged, every ray gets
-//! more samples.
+//! Yariv et al. 2021, section 3.3 and Theorem 1. Each iteration asks for the
+//! distances at the new samples of all rays at once; the rest is done ray by ray,
+//! in memory that is kept between calls.
 
-use super::inverse_cdf::{inverse_cdf, linspace};
+mod opacity_error;
+#[cfg(test)]
+mod plain;
+mod refinement;
+#[cfg(test)]
+mod tests;
+
 use super::uniform::jittered_linspace;
 use super::{DistanceQuery, RayBundle, RaySamples, SamplingNoise};
-use crate::density::laplace_density_scalar;
 use rayon::prelude::*;
+use refinement::{RayState, Refinement};
 use serde::{Deserialize, Serialize};
+use std::cell::Cell;
+
+/// When rays get no more samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopRule {
+    /// All at once, when the bound holds on every one, as published: while any ray
+    /// has not converged, every ray gets more samples.
+    #[default]
+    Batch,
+    /// Each when the bound holds on it: it gets the samples that it would get in a
+    /// batch of its own, and the network is asked about the others only.
+    Ray,
+}
 
 /// Numbers of the error-bounded sampler.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,8 +49,10 @@ pub struct ErrorBoundConfig {
     pub epsilon: f64,
     /// Bisections of β per iteration.
     pub bisections: usize,
-    /// Most iterations.
+    /// Most iterations; the first is always made.
     pub max_iterations: usize,
+    /// Whether rays stop together or one by one.
+    pub stop: StopRule,
 }
 
 impl Default for ErrorBoundConfig {
@@ -44,11 +66,12 @@ impl Default for ErrorBoundConfig {
             epsilon: 0.1,
             bisections: 10,
             max_iterations: 5,
+            stop: StopRule::Batch,
         }
     }
 }
 
-/// The inside of every iteration, for parity tests.
+/// The inside of every iteration, for parity tests; of the rays that took part.
 #[derive(Clone, Debug, Default)]
 pub struct ErrorBoundTrace {
     /// Positions `[R · n]` that entered each iteration.
@@ -61,23 +84,10 @@ pub struct ErrorBoundTrace {
     pub beta: Vec<Vec<f32>>,
 }
 
-/// Largest value of the exponential inside the bound, as published.
-const MAX_ERROR_FACTOR: f32 = 1e6;
-/// Added to every interval's mass before the last draw, as published.
-const FINAL_MASS_FLOOR: f32 = 1e-5;
-/// Cumulative steps below this are flat, as published.
-const FLAT_STEP: f32 = 1e-5;
-
-/// One ray while it is refined.
-struct RayState {
-    z: Vec<f32>,
-    sdf: Vec<f32>,
-    d_star: Vec<f32>,
-    beta: f32,
-    error_at_beta0: f32,
-    /// Positions that still need a distance.
-    new_z: Vec<f32>,
-    cdf: Vec<f32>,
+thread_local! {
+    /// Memory of the last call. Taken out while in use: a thread that waits for
+    /// others may be given another call to make.
+    static KEPT: Cell<Refinement> = Cell::default();
 }
 
 impl ErrorBoundConfig {
@@ -89,247 +99,138 @@ impl ErrorBoundConfig {
         beta0: f32,
         query: &mut impl DistanceQuery,
         noise: &mut impl SamplingNoise,
-        mut trace: Option<&mut ErrorBoundTrace>,
+        trace: Option<&mut ErrorBoundTrace>,
     ) -> RaySamples {
+        let mut refinement = KEPT.take();
+        self.refine(&mut refinement, rays, beta0, query, noise, trace);
+        let samples = self.draw(&mut refinement, noise);
+        KEPT.set(refinement);
+        samples
+    }
+
+    /// Adds samples until the bound holds with `beta0`.
+    fn refine(
+        &self,
+        refinement: &mut Refinement,
+        rays: &RayBundle,
+        beta0: f32,
+        query: &mut impl DistanceQuery,
+        noise: &mut impl SamplingNoise,
+        mut trace: Option<&mut ErrorBoundTrace>,
+    ) {
         let (near, far) = (self.near as f32, self.far as f32);
         let epsilon = self.epsilon as f32;
         let n = self.samples_per_iteration;
+        let most_iterations = self.max_iterations.max(1);
         let first = jittered_linspace(near, far, n, rays.len(), noise);
-        let mut states: Vec<RayState> = first
-            .par_chunks(n)
-            .map(|z| RayState::new(z, epsilon))
-            .collect();
-        let mut iteration = 0;
-        loop {
-            iteration += 1;
-            evaluate_new(rays, &mut states, query);
-            states
-                .par_iter_mut()
-                .for_each(|state| state.search_beta(beta0, epsilon, self.bisections));
-            if let Some(trace) = trace.as_deref_mut() {
-                trace.record(&states);
-            }
-            let converged = states.iter().all(|state| state.beta <= beta0);
-            if converged || iteration == self.max_iterations {
+        refinement.begin(&first, n, most_iterations, epsilon);
+        for iteration in 1..=most_iterations {
+            let wanted = refinement.wanted(rays);
+            if wanted.is_empty() {
                 break;
             }
-            states.par_iter_mut().for_each(|state| state.upsample(n));
+            let distances = query.distances(wanted);
+            refinement.merge_each(&distances, |ray| {
+                ray.search_beta(beta0, epsilon, self.bisections);
+            });
+            if let Some(trace) = trace.as_deref_mut() {
+                trace.record(refinement, beta0);
+            }
+            self.stop.apply(refinement.states(), beta0);
+            if iteration < most_iterations {
+                refinement.upsample_each();
+            }
         }
+    }
 
-        let last_u = noise.uniform(rays.len() * self.samples);
-        let columns = match states.first() {
-            Some(state) => noise.columns(state.z.len(), self.extra_samples),
-            None => Vec::new(),
-        };
-        let per_ray = self.samples + columns.len() + 2;
-        let z: Vec<f32> = states
-            .par_iter_mut()
+    /// The final samples: drawn from the rendering weights, near, far, and some of
+    /// those that the bound was computed with.
+    fn draw(&self, refinement: &mut Refinement, noise: &mut impl SamplingNoise) -> RaySamples {
+        let (near, far) = (self.near as f32, self.far as f32);
+        let last_u = noise.uniform(refinement.states().len() * self.samples);
+        let columns = self.extra_columns(refinement.states(), noise);
+        // Random columns are fewer where fewer are available: as many for all rays.
+        let extras = columns.iter().flatten().map(Vec::len).min().unwrap_or(0);
+        let per_ray = self.samples + 2 + extras;
+        let mut z = vec![0.0; refinement.states().len() * per_ray];
+        z.par_chunks_mut(per_ray)
+            .zip(refinement.each())
             .enumerate()
-            .flat_map_iter(|(ray, state)| {
+            .for_each(|(i, (z, mut ray))| {
                 let u = last_u
                     .as_ref()
-                    .map(|u| &u[ray * self.samples..(ray + 1) * self.samples]);
-                let mut z = state.draw(self.samples, u);
-                z.extend([near, far]);
-                z.extend(columns.iter().map(|c| state.z[*c]));
+                    .map(|u| &u[i * self.samples..(i + 1) * self.samples]);
+                let (drawn, others) = z.split_at_mut(self.samples);
+                ray.draw(u, drawn);
+                let (ends, extra) = others.split_at_mut(2);
+                ends.copy_from_slice(&[near, far]);
+                let columns = columns[ray.state.iterations].iter().flatten();
+                for (z, column) in extra.iter_mut().zip(columns) {
+                    *z = ray.positions()[*column];
+                }
                 z.sort_unstable_by(f32::total_cmp);
-                z
-            })
-            .collect();
+            });
         // Infinitely far, for float32: whatever passes the last sample stops there.
         RaySamples::new(z, per_ray, |_, _| 1e10)
     }
-}
 
-/// One batched query for the new positions of all rays, merged in order.
-fn evaluate_new(rays: &RayBundle, states: &mut [RayState], query: &mut impl DistanceQuery) {
-    if states.is_empty() {
-        return;
-    }
-    let points: Vec<[f32; 3]> = states
-        .iter()
-        .enumerate()
-        .flat_map(|(ray, state)| state.new_z.iter().map(move |z| rays.point(ray, *z)))
-        .collect();
-    let distances = query.distances(&points);
-    let mut offset = 0;
-    for state in states {
-        let count = state.new_z.len();
-        state.merge(&distances[offset..offset + count]);
-        offset += count;
-    }
-}
-
-impl RayState {
-    fn new(z: &[f32], epsilon: f32) -> Self {
-        let squares: f32 = z.windows(2).map(|p| (p[1] - p[0]) * (p[1] - p[0])).sum();
-        Self {
-            z: Vec::new(),
-            sdf: Vec::new(),
-            d_star: Vec::new(),
-            // Large enough for the bound to hold with any distances (Lemma 2).
-            beta: (squares / (4.0 * (epsilon + 1.0).ln())).sqrt(),
-            error_at_beta0: 0.0,
-            new_z: z.to_vec(),
-            cdf: Vec::new(),
-        }
-    }
-
-    /// Sorts the new positions with their distances into the old ones.
-    fn merge(&mut self, new_sdf: &[f32]) {
-        let mut new: Vec<(f32, f32)> = self
-            .new_z
-            .iter()
-            .copied()
-            .zip(new_sdf.iter().copied())
-            .collect();
-        new.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut z = Vec::with_capacity(self.z.len() + new.len());
-        let mut sdf = Vec::with_capacity(z.capacity());
-        let mut old = self
-            .z
-            .iter()
-            .copied()
-            .zip(self.sdf.iter().copied())
-            .peekable();
-        for (new_z, new_sdf) in new {
-            while let Some((old_z, old_sdf)) = old.next_if(|(old_z, _)| *old_z <= new_z) {
-                z.push(old_z);
-                sdf.push(old_sdf);
-            }
-            z.push(new_z);
-            sdf.push(new_sdf);
-        }
-        for (old_z, old_sdf) in old {
-            z.push(old_z);
-            sdf.push(old_sdf);
-        }
-        self.z = z;
-        self.sdf = sdf;
-        self.new_z.clear();
-    }
-
-    fn search_beta(&mut self, beta0: f32, epsilon: f32, bisections: usize) {
-        self.d_star.clear();
-        for i in 0..self.z.len() - 1 {
-            let length = self.z[i + 1] - self.z[i];
-            self.d_star
-                .push(nearest_distance(length, self.sdf[i], self.sdf[i + 1]));
-        }
-        self.error_at_beta0 = self.error_bound(beta0);
-        if self.error_at_beta0 <= epsilon {
-            self.beta = beta0;
-        }
-        let (mut low, mut high) = (beta0, self.beta);
-        for _ in 0..bisections {
-            let middle = (low + high) / 2.0;
-            if self.error_bound(middle) <= epsilon {
-                high = middle;
-            } else {
-                low = middle;
-            }
-        }
-        self.beta = high;
-    }
-
-    /// The largest bound on the opacity's error over all sections.
-    fn error_bound(&self, beta: f32) -> f32 {
-        self.section_bounds(beta).fold(0.0, f32::max)
-    }
-
-    /// The bound on the opacity's error at each section (VolSDF eq. 15).
-    fn section_bounds(&self, beta: f32) -> impl Iterator<Item = f32> {
-        let (mut error_integral, mut free_energy) = (0.0, 0.0);
-        self.d_star.iter().enumerate().map(move |(i, d_star)| {
-            let length = self.z[i + 1] - self.z[i];
-            error_integral += f64::from(section_error(length, *d_star, beta));
-            let error = (error_integral as f32).exp().min(MAX_ERROR_FACTOR) - 1.0;
-            let bound = error * transmittance(free_energy);
-            free_energy += f64::from(length * laplace_density_scalar(self.sdf[i], beta));
-            bound
-        })
-    }
-
-    /// `n` new positions where the bound is large.
-    fn upsample(&mut self, n: usize) {
-        let masses: Vec<f32> = self.section_bounds(self.beta).collect();
-        inverse_cdf(
-            &self.z,
-            masses.iter().copied(),
-            FLAT_STEP,
-            (0..n).map(|i| linspace(i, n)),
-            &mut self.new_z,
-            &mut self.cdf,
-        );
-    }
-
-    /// `n` positions drawn from the rendering weights, at `u` or evenly.
-    fn draw(&mut self, n: usize, u: Option<&[f32]>) -> Vec<f32> {
-        let mut free_energy = 0.0;
-        let masses: Vec<f32> = (0..self.z.len() - 1)
-            .map(|i| {
-                let length = self.z[i + 1] - self.z[i];
-                let here = length * laplace_density_scalar(self.sdf[i], self.beta);
-                let weight = (1.0 - (-here).exp()) * transmittance(free_energy);
-                free_energy += f64::from(here);
-                weight + FINAL_MASS_FLOOR
+    /// Which samples stay, for rays of so many iterations: the same for all of the
+    /// same length, drawn from the shortest to the longest. `None` where no ray
+    /// has that length.
+    fn extra_columns(
+        &self,
+        states: &[RayState],
+        noise: &mut impl SamplingNoise,
+    ) -> Vec<Option<Vec<usize>>> {
+        (0..=self.max_iterations.max(1))
+            .map(|iterations| {
+                let present = states.iter().any(|ray| ray.iterations == iterations);
+                let available = iterations * self.samples_per_iteration;
+                present.then(|| noise.columns(available, self.extra_samples))
             })
-            .collect();
-        let mut drawn = Vec::with_capacity(n);
-        let u = (0..n).map(|i| u.map_or_else(|| linspace(i, n), |u| u[i]));
-        inverse_cdf(
-            &self.z,
-            masses.iter().copied(),
-            FLAT_STEP,
-            u,
-            &mut drawn,
-            &mut self.cdf,
-        );
-        drawn
+            .collect()
     }
 }
 
-/// What passes a stretch of the given free energy. Running sums are float64, as
-/// PyTorch's on the CPU: float32 would lose the small sections behind large ones.
-fn transmittance(free_energy: f64) -> f32 {
-    (-free_energy as f32).exp()
-}
-
-/// Error of one section's density integral (VolSDF eq. 14).
-fn section_error(length: f32, d_star: f32, beta: f32) -> f32 {
-    (-d_star / beta).exp() * length * length / (4.0 * beta * beta)
-}
-
-/// Lower bound d* of the distance to the surface within a section of `length`
-/// between distances `d0` and `d1` (VolSDF Theorem 1).
-fn nearest_distance(length: f32, d0: f32, d1: f32) -> f32 {
-    if d0 * d1 <= 0.0 || d0.is_nan() || d1.is_nan() {
-        return 0.0;
+impl StopRule {
+    /// Decides which of the rays are refined further.
+    fn apply(self, rays: &mut [RayState], beta0: f32) {
+        let converged = |ray: &RayState| ray.beta <= beta0;
+        match self {
+            Self::Batch => {
+                let all = rays.iter().all(converged);
+                rays.iter_mut().for_each(|ray| ray.refining = !all);
+            }
+            Self::Ray => {
+                for ray in rays {
+                    ray.refining = ray.refining && !converged(ray);
+                }
+            }
+        }
     }
-    let (a, b, c) = (length, d0.abs(), d1.abs());
-    if a * a + b * b <= c * c {
-        return b;
-    }
-    if a * a + c * c <= b * b {
-        return c;
-    }
-    if b + c - a <= 0.0 {
-        return 0.0;
-    }
-    // Height of the triangle with sides a, b, c over a (Heron).
-    let s = (a + b + c) / 2.0;
-    2.0 * (s * (s - a) * (s - b) * (s - c)).sqrt() / a
 }
 
 impl ErrorBoundTrace {
-    fn record(&mut self, states: &[RayState]) {
-        let gather = |f: &dyn Fn(&RayState) -> &[f32]| {
-            states.iter().flat_map(|s| f(s).iter().copied()).collect()
-        };
-        self.z.push(gather(&|s| &s.z));
-        self.sdf.push(gather(&|s| &s.sdf));
-        self.error_at_beta0
-            .push(states.iter().map(|s| s.error_at_beta0).collect());
-        self.beta.push(states.iter().map(|s| s.beta).collect());
+    fn record(&mut self, refinement: &mut Refinement, beta0: f32) {
+        let states = refinement.states().to_vec();
+        let took_part = || (0..states.len()).filter(|ray| states[*ray].refining);
+        let sections = |ray| refinement.sections(ray);
+        self.z.push(
+            took_part()
+                .flat_map(|ray| sections(ray).z.to_vec())
+                .collect(),
+        );
+        self.sdf.push(
+            took_part()
+                .flat_map(|ray| sections(ray).sdf.to_vec())
+                .collect(),
+        );
+        self.error_at_beta0.push(
+            took_part()
+                .map(|ray| sections(ray).largest_bound(beta0))
+                .collect(),
+        );
+        self.beta
+            .push(took_part().map(|ray| states[ray].beta).collect());
     }
 }

@@ -4,7 +4,7 @@
 //! evaluations of the error-bounded sampler: a share of its nodes is refreshed
 //! every few iterations.
 
-use super::inverse_cdf::inverse_cdf;
+use super::inverse_cdf::{cumulate, invert};
 use super::{DistanceQuery, RayBundle, RaySamples, SamplingNoise};
 use neat_tensor::kernels::density::passed_shares;
 use rayon::prelude::*;
@@ -157,13 +157,15 @@ const MIN_HALF_CHORD_SQUARED: f32 = 1e-4;
 /// Sampling starts at least this far from the camera.
 const MIN_NEAR: f32 = 0.01;
 
+/// Cumulative steps below this are flat.
+const FLAT_STEP: f32 = 1e-8;
+
 /// Working memory of one ray after the other.
 #[derive(Default)]
 struct Scratch {
     edges: Vec<f32>,
     sdf: Vec<f32>,
     lengths: Vec<f32>,
-    masses: Vec<f32>,
     positions: Vec<f32>,
     cdf: Vec<f32>,
 }
@@ -212,7 +214,6 @@ impl GridCachedConfig {
                     edges,
                     sdf,
                     lengths,
-                    masses,
                     positions,
                     cdf,
                 } = scratch;
@@ -227,23 +228,20 @@ impl GridCachedConfig {
                 );
                 lengths.clear();
                 lengths.extend(edges.windows(2).map(|e| (e[1] - e[0]).max(0.0)));
-                masses.resize(lookups, 0.0);
-                passed_shares(sdf, lengths, beta, masses);
+                cdf.resize(lookups + 1, 0.0);
+                passed_shares(sdf, lengths, beta, &mut cdf[1..]);
                 let mut transmittance = 1.0f32;
-                for mass in masses.iter_mut() {
+                for mass in &mut cdf[1..] {
                     let passed = *mass;
                     *mass = transmittance * (1.0 - passed) + self.weight_floor as f32;
                     transmittance *= passed;
                 }
+                cumulate(cdf);
                 positions.clear();
-                inverse_cdf(
-                    edges,
-                    masses.iter().copied(),
-                    1e-8,
-                    (0..drawn).map(|i| (i as f32 + jitter(lookups + i)) / drawn as f32),
-                    positions,
-                    cdf,
-                );
+                positions.extend((0..drawn).map(|i| {
+                    let u = (i as f32 + jitter(lookups + i)) / drawn as f32;
+                    invert(edges, cdf, FLAT_STEP, u)
+                }));
                 positions.extend(
                     (0..even).map(|i| at((i as f32 + jitter(lookups + drawn + i)) / even as f32)),
                 );

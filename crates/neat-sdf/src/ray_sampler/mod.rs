@@ -10,7 +10,7 @@ mod inverse_cdf;
 mod noise;
 mod uniform;
 
-pub use error_bound::{ErrorBoundConfig, ErrorBoundTrace};
+pub use error_bound::{ErrorBoundConfig, ErrorBoundTrace, StopRule};
 pub use grid_cached::{DistanceGrid, GridCachedConfig};
 pub use noise::{Deterministic, SamplingNoise, Seeded};
 pub use uniform::UniformConfig;
