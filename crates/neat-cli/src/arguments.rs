@@ -122,7 +122,7 @@ pub struct BackendArg {
 }
 
 /// Takes the name of a preset.
-fn preset_parser() -> impl TypedValueParser<Value = Preset> {
+pub fn preset_parser() -> impl TypedValueParser<Value = Preset> {
     PossibleValuesParser::new(Preset::ALL.map(Preset::name)).try_map(|name| name.parse::<Preset>())
 }
 
@@ -130,4 +130,12 @@ fn preset_parser() -> impl TypedValueParser<Value = Preset> {
 pub fn backend_parser() -> impl TypedValueParser<Value = Backend> {
     PossibleValuesParser::new(["auto", "flex", "ndarray", "wgpu"])
         .try_map(|name| name.parse::<Backend>())
+}
+
+/// Takes a number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
+        _ => Err("must be a number above 0".to_owned()),
+    }
 }

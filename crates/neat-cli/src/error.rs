@@ -7,6 +7,7 @@ use neat_pipeline::compare_backends::CompareError;
 use neat_pipeline::error::PipelineError;
 use neat_pipeline::overrides::OverrideError;
 use neat_pipeline::run_dir::RunDirError;
+use neat_pipeline::trainer::TrainError;
 use neat_tensor::BackendError;
 use neat_wireframe::metrics::MetricsError;
 use std::error::Error;
@@ -65,6 +66,7 @@ through_pipeline!(
     SceneError,
     RunDirError,
     BackendError,
+    TrainError,
     SyntheticError,
     MetricsError
 );

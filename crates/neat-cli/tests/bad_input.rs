@@ -270,6 +270,25 @@ fn wrong_options() {
 }
 
 #[test]
+fn wrong_benchmarks() {
+    for (arguments, fragments) in [
+        (
+            ["--preset", "fast,papper-abc"],
+            ["'papper-abc'", "paper-abc"],
+        ),
+        (["--backend", "cuda"], ["'cuda'", "wgpu"]),
+        (["--seconds", "0"], ["'0'", "above 0"]),
+        (["--seconds", "inf"], ["'inf'", "above 0"]),
+        (["--seconds", "soon"], ["'soon'", "above 0"]),
+    ] {
+        let message = stderr(&neat(&["bench"]).args(arguments).assert().code(2));
+        for fragment in fragments {
+            assert!(message.contains(fragment), "no `{fragment}` in: {message}");
+        }
+    }
+}
+
+#[test]
 fn wrong_synthetic_scenes() {
     let scene = TestScene::new();
     for (option, value, name) in [

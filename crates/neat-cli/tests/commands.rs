@@ -200,6 +200,62 @@ fn backends_are_compared() {
 }
 
 #[test]
+fn bench_prints_consistent_numbers() {
+    for (plain, options) in [(false, &[][..]), (true, &["--plain"])] {
+        let assert = neat(&["bench", "--preset", "fast", "--seconds", "0.1", "--json"])
+            .args(["--backend", "flex"])
+            .args(options)
+            .assert()
+            .success();
+        let bench: Value = serde_json::from_str(&stdout(&assert)).unwrap();
+        assert_eq!(bench["backend"], "flex");
+        assert_eq!(bench["fused"], !plain);
+        let yardstick = bench["yardstick"].as_f64().unwrap();
+        assert!(yardstick > 0.0 && bench["yardstick_again"].as_f64().unwrap() > 0.0);
+        let presets = bench["presets"].as_array().unwrap();
+        assert_eq!(presets.len(), 1);
+        assert_eq!(presets[0]["preset"], "fast");
+        let mut names = Vec::new();
+        for part in presets[0]["parts"].as_array().unwrap() {
+            let number = |key: &str| part[key].as_f64().unwrap();
+            let name = part["name"].as_str().unwrap();
+            names.push(name);
+            let (seconds, flops) = (number("seconds"), number("flops"));
+            assert!(seconds > 0.0, "{part}");
+            // A few steps may do without a look at the sampler's grid.
+            if ["forward", "backward", "step"].contains(&name) {
+                assert!(flops > 0.0, "{part}");
+            }
+            let share = flops / seconds / 1e9 / yardstick;
+            assert!((number("share") - share).abs() <= 1e-9 * share, "{part}");
+        }
+        let all = [
+            "rays",
+            "sampler",
+            "forward",
+            "assignment",
+            "backward",
+            "optimiser",
+            "step",
+            "distance with gradient, alone",
+        ];
+        assert_eq!(names, all);
+    }
+}
+
+#[test]
+fn bench_prints_a_table() {
+    let assert = neat(&["bench", "--preset", "fast", "--seconds", "0.1", "--plain"])
+        .args(["--backend", "flex"])
+        .assert()
+        .success();
+    let text = stdout(&assert);
+    for fragment in ["Backend flex", "off", "Yardstick", "fast (", "| step |"] {
+        assert!(text.contains(fragment), "no `{fragment}` in:\n{text}");
+    }
+}
+
+#[test]
 fn help_teaches() {
     let text = stdout(&neat(&["--help"]).assert().success());
     assert!(text.contains("Exit codes") && text.contains("130"));
@@ -213,6 +269,7 @@ fn help_teaches() {
         "info",
         "demo",
         "compare-backends",
+        "bench",
     ] {
         let text = stdout(&neat(&[command, "--help"]).assert().success());
         assert!(text.contains("Examples:") || command == "info", "{command}");

@@ -1,5 +1,6 @@
 //! `neat eval`.
 
+use crate::arguments::positive;
 use crate::error::CliError;
 use crate::output;
 use clap::{Args, ValueEnum};
@@ -80,12 +81,5 @@ impl EvalArgs {
             write_evaluation(path, &evaluation)?;
         }
         output::print(&evaluation.to_markdown())
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
-        _ => Err("must be a number above 0".to_owned()),
     }
 }

@@ -1,5 +1,6 @@
 //! One file per subcommand.
 
+mod bench;
 mod compare_backends;
 mod demo;
 mod distill;
@@ -25,6 +26,7 @@ pub enum Command {
     Info(info::InfoArgs),
     Demo(demo::DemoArgs),
     CompareBackends(compare_backends::CompareBackendsArgs),
+    Bench(bench::BenchArgs),
 }
 
 impl Command {
@@ -40,6 +42,7 @@ impl Command {
             Self::Info(args) => args.run(),
             Self::Demo(args) => args.run(quiet),
             Self::CompareBackends(args) => args.run(quiet),
+            Self::Bench(args) => args.run(quiet),
         }
     }
 }
