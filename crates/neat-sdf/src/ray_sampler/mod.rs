@@ -75,6 +75,18 @@ impl RaySamples {
     }
 }
 
+impl RaySamples {
+    /// The samples of some rays.
+    pub fn of_rays(&self, rays: std::ops::Range<usize>) -> Self {
+        let samples = rays.start * self.per_ray..rays.end * self.per_ray;
+        Self {
+            per_ray: self.per_ray,
+            z: self.z[samples.clone()].to_vec(),
+            deltas: self.deltas[samples].to_vec(),
+        }
+    }
+}
+
 /// A batched signed distance query.
 pub trait DistanceQuery {
     /// The (capped) signed distance at each point.
