@@ -11,7 +11,7 @@ const ROUNDER: f32 = 12_582_912.0; // 1.5 · 2²³
 
 /// Minimax coefficients of `(2ᶠ − 1) / f` on ±½.
 const EXP2: [f32; 5] = [
-    0.693_147_2,
+    std::f32::consts::LN_2,
     0.240_223_5,
     0.055_503_57,
     0.009_666_374,
@@ -76,8 +76,8 @@ pub fn sin_cos<S: Simd>(simd: S, x: S::f32s) -> (S::f32s, S::f32s) {
     let n = simd.sub_f32s(shifted, rounder);
     // π/2 in three parts (Cody and Waite).
     let r = simd.mul_add_f32s(n, simd.splat_f32s(-1.570_312_5), x);
-    let r = simd.mul_add_f32s(n, simd.splat_f32s(-4.837_512_969_970_703e-4), r);
-    let r = simd.mul_add_f32s(n, simd.splat_f32s(-7.549_789_948_768_648e-8), r);
+    let r = simd.mul_add_f32s(n, simd.splat_f32s(-4.837_513e-4), r);
+    let r = simd.mul_add_f32s(n, simd.splat_f32s(-7.549_79e-8), r);
     let square = simd.mul_f32s(r, r);
     let sine = polynomial(
         simd,
