@@ -128,28 +128,18 @@ impl CoordinateMlp {
     }
 
     fn fused_field(&self, points: Tensor<2>, query: FieldQuery) -> Field {
-        let rows = points.dims()[0];
-        let full_rows = rows - query.light_rows;
-        let shape = self.shape();
-        let others = shape.layers[shape.layers.len() - 1].outputs - 1;
         let request = SoftplusRequest {
-            shape,
-            full_rows,
+            shape: self.shape(),
+            full_rows: points.dims()[0] - query.light_rows,
             others: query.others,
             known: query.known,
         };
-        let flat = fused::softplus_network(points, flat_parameters(&self.layers), request);
-        let part = |start: usize, columns: usize, rows: usize| {
-            flat.clone()
-                .narrow(0, start, rows * columns)
-                .reshape([rows, columns])
-        };
+        let (first, gradient, others) =
+            fused::softplus_network(points, flat_parameters(&self.layers), request);
         Field {
-            first: part(0, 1, rows),
-            gradient: part(rows, 3, full_rows),
-            others: query
-                .others
-                .then(|| part(rows + 3 * full_rows, others, full_rows)),
+            first,
+            gradient,
+            others,
         }
     }
 

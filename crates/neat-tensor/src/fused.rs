@@ -120,14 +120,18 @@ impl KnownRows {
     Autodiff,
 )]
 pub trait FusedNetworks: Backend {
-    /// Evaluates a softplus network at `points` `[N, 3]`. The result is flat: the
-    /// first output of all rows `[N]`, then of the `H` full rows the gradient
-    /// `[H, 3]` and the other outputs `[H, outputs − 1]`.
+    /// Evaluates a softplus network at `points` `[N, 3]`: the first output of all
+    /// rows `[N, 1]`; of the `H` full rows the gradient `[H, 3]` and, if asked for,
+    /// the other outputs `[H, outputs − 1]`.
     fn softplus_network(
         points: FloatTensor<Self>,
         parameters: FloatTensor<Self>,
         request: SoftplusRequest,
-    ) -> FloatTensor<Self>;
+    ) -> (
+        FloatTensor<Self>,
+        FloatTensor<Self>,
+        Option<FloatTensor<Self>>,
+    );
 
     /// Evaluates a ReLU perceptron at rows `[inputs, gradients, features]`
     /// `[N, ·]`; `inputs` may consist of several parts of the shape.
@@ -204,17 +208,19 @@ impl<T> Tape<T> {
     }
 
     fn take(&self) -> Option<T> {
-        let mut tape = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        tape.take().map(|(tape, _)| tape)
+        lock(&self.0).take().map(|(tape, _)| tape)
     }
 }
+
+/// What a softplus network says, as tensors.
+type SoftplusTensors<B> = (FloatTensor<B>, FloatTensor<B>, Option<FloatTensor<B>>);
 
 fn softplus_forward<B: Backend>(
     points: FloatTensor<B>,
     parameters: FloatTensor<B>,
     request: &SoftplusRequest,
     keep: bool,
-) -> (FloatTensor<B>, Option<softplus_network::Tape>) {
+) -> (SoftplusTensors<B>, Option<softplus_network::Tape>) {
     let device = points.device();
     let (points, parameters) = (read::<B>(points), read::<B>(parameters));
     let network = SoftplusNetwork::new(Arch::new(), &request.shape, slice(&parameters));
@@ -222,22 +228,27 @@ fn softplus_forward<B: Backend>(
     let known = request.known.as_ref().map(KnownRows::as_known);
     let (output, tape) = network.forward(full, known, request.others, keep);
     let SoftplusOutput {
-        first: mut flat,
+        mut first,
         gradient,
         others,
     } = output;
-    flat.reserve_exact(light.len() / 3 + gradient.len() + others.len());
     match known {
         Some(Known { pass, rows }) => {
             let light = &rows[request.full_rows..];
-            flat.extend(light.iter().map(|row| pass.first[*row as usize]));
+            first.extend(light.iter().map(|row| pass.first[*row as usize]));
         }
-        None => flat.extend(network.first(light)),
+        None => first.extend(network.first(light)),
     }
-    flat.extend_from_slice(&gradient);
-    flat.extend_from_slice(&others);
-    let len = flat.len();
-    (write::<B>(flat, [len], &device), tape)
+    let rows = first.len();
+    let full = request.full_rows;
+    let tensors = (
+        write::<B>(first, [rows, 1], &device),
+        write::<B>(gradient, [full, 3], &device),
+        request
+            .others
+            .then(|| write::<B>(others, [full, network.others()], &device)),
+    );
+    (tensors, tape)
 }
 
 fn relu_forward<B: Backend>(
@@ -263,7 +274,7 @@ macro_rules! on_the_host {
                 points: FloatTensor<Self>,
                 parameters: FloatTensor<Self>,
                 request: SoftplusRequest,
-            ) -> FloatTensor<Self> {
+            ) -> SoftplusTensors<Self> {
                 softplus_forward::<Self>(points, parameters, &request, false).0
             }
 
@@ -287,14 +298,23 @@ on_the_host!(burn::backend::Flex);
 on_the_host!(burn::backend::NdArray);
 
 /// Derivative of [`FusedNetworks::softplus_network`].
+///
+/// An operation of burn has one output and this network three. The operation
+/// itself therefore gives a placeholder, of which the three outputs are
+/// [`OutputOp`]s: each leaves its adjoint with the operation, and passes a
+/// placeholder on so that the operation's own turn comes after theirs.
 #[derive(Debug)]
 struct SoftplusOp;
+
+/// Adjoints that the outputs have left: first, gradient, others.
+type Adjoints = Arc<Mutex<[Option<TensorData>; 3]>>;
 
 #[derive(Clone, Debug)]
 struct SoftplusState<B: Backend> {
     points: FloatTensor<B>,
     parameters: FloatTensor<B>,
     request: SoftplusRequest,
+    adjoints: Adjoints,
     tape: Tape<softplus_network::Tape>,
 }
 
@@ -311,35 +331,88 @@ impl<B: Backend> Backward<B, 2> for SoftplusOp {
             points,
             parameters,
             request,
+            adjoints,
             tape,
         } = ops.state;
         let device = points.device();
-        let adjoint = read::<B>(gradients.consume::<B>(&ops.node));
+        gradients.consume::<B>(&ops.node);
         let (points, parameters) = (read::<B>(points), read::<B>(parameters));
         let points = slice(&points);
         let rows = points.len() / 3;
-        let (first, adjoint) = slice(&adjoint).split_at(rows);
-        let (gradient, others) = adjoint.split_at(3 * request.full_rows);
         let network = SoftplusNetwork::new(Arch::new(), &request.shape, slice(&parameters));
-        let [of_points, of_parameters] = ops.parents.map(|node| Some(node?.id));
+        let adjoints = std::mem::take(&mut *lock(&adjoints));
+        // An output that nothing depends on has left none.
+        let [first, gradient] = [(0, rows), (1, 3 * request.full_rows)].map(|(i, len)| {
+            let zeros = adjoints[i].is_none().then(|| vec![0.0f32; len]);
+            zeros.unwrap_or_default()
+        });
+        let adjoint_or = |i: usize, zeros| adjoints[i].as_ref().map_or(zeros, slice);
+        let adjoint = SoftplusAdjoint {
+            first: adjoint_or(0, &first),
+            gradient: adjoint_or(1, &gradient),
+            others: adjoint_or(2, &[]),
+        };
+        let [of_points, of_parameters] = ops.parents;
         let (to_parameters, to_points) = network.backward(
             points,
             request.known.as_ref().map(KnownRows::as_known),
-            SoftplusAdjoint {
-                first,
-                gradient,
-                others,
-            },
+            adjoint,
             tape.take(),
             of_points.is_some(),
         );
         if let Some(node) = of_parameters {
             let len = to_parameters.len();
-            gradients.register::<B>(node, write::<B>(to_parameters, [len], &device));
+            gradients.register::<B>(node.id, write::<B>(to_parameters, [len], &device));
         }
         if let (Some(node), Some(to_points)) = (of_points, to_points) {
-            gradients.register::<B>(node, write::<B>(to_points, [rows, 3], &device));
+            gradients.register::<B>(node.id, write::<B>(to_points, [rows, 3], &device));
         }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// One of several outputs of an operation; see [`SoftplusOp`].
+#[derive(Debug)]
+struct OutputOp;
+
+impl<B: Backend> Backward<B, 1> for OutputOp {
+    type State = (Adjoints, usize);
+
+    fn backward(
+        self,
+        ops: Ops<Self::State, 1>,
+        gradients: &mut Gradients,
+        _checkpointer: &mut Checkpointer,
+    ) {
+        let (adjoints, output) = ops.state;
+        let adjoint = gradients.consume::<B>(&ops.node);
+        let device = adjoint.device();
+        lock(&adjoints)[output] = Some(read::<B>(adjoint));
+        let [operation] = ops.parents;
+        if let Some(node) = operation {
+            gradients.register::<B>(node.id, placeholder::<B>(&device));
+        }
+    }
+}
+
+fn placeholder<B: Backend>(device: &BackendDevice<B>) -> FloatTensor<B> {
+    write::<B>(vec![0.0], [1], device)
+}
+
+/// Output `output` of the operation that `operation` stands for.
+fn output_of<B: Backend, C: CheckpointStrategy>(
+    operation: &FloatTensor<Autodiff<B, C>>,
+    adjoints: &Adjoints,
+    output: usize,
+    value: FloatTensor<B>,
+) -> FloatTensor<Autodiff<B, C>> {
+    let prepared = OutputOp.prepare::<C>([operation.node()]);
+    match prepared.compute_bound().stateful() {
+        OpsKind::Tracked(prepared) => prepared.finish((Arc::clone(adjoints), output), value),
+        OpsKind::UnTracked(prepared) => prepared.finish(value),
     }
 }
 
@@ -404,13 +477,15 @@ impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodi
         points: FloatTensor<Self>,
         parameters: FloatTensor<Self>,
         request: SoftplusRequest,
-    ) -> FloatTensor<Self> {
+    ) -> SoftplusTensors<Self> {
         let nodes = [points.node(), parameters.node()];
         let (points, parameters) = (points.into_primitive(), parameters.into_primitive());
-        match SoftplusOp.prepare::<C>(nodes).compute_bound().stateful() {
+        let device = points.device();
+        let adjoints = Adjoints::default();
+        let (operation, values) = match SoftplusOp.prepare::<C>(nodes).compute_bound().stateful() {
             OpsKind::Tracked(prepared) => {
                 let booking = Booking::of(request.shape.tape_bytes(request.full_rows));
-                let (out, tape) = softplus_forward::<B>(
+                let (values, tape) = softplus_forward::<B>(
                     points.clone(),
                     parameters.clone(),
                     &request,
@@ -420,14 +495,23 @@ impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodi
                     points,
                     parameters,
                     request,
+                    adjoints: Arc::clone(&adjoints),
                     tape: Tape::new(tape, booking),
                 };
-                prepared.finish(state, out)
+                (prepared.finish(state, placeholder::<B>(&device)), values)
             }
             OpsKind::UnTracked(prepared) => {
-                prepared.finish(B::softplus_network(points, parameters, request))
+                let values = B::softplus_network(points, parameters, request);
+                (prepared.finish(placeholder::<B>(&device)), values)
             }
-        }
+        };
+        let output = |i: usize, value| output_of::<B, C>(&operation, &adjoints, i, value);
+        let (first, gradient, others) = values;
+        (
+            output(0, first),
+            output(1, gradient),
+            others.map(|others| output(2, others)),
+        )
     }
 
     fn relu_network(
@@ -468,13 +552,18 @@ pub(crate) fn softplus_network(
     points: Tensor<2>,
     parameters: Tensor<1>,
     request: SoftplusRequest,
-) -> Tensor<1> {
+) -> (Tensor<2>, Tensor<2>, Option<Tensor<2>>) {
     use burn::backend::Dispatch;
-    Tensor::from_dispatch(<Dispatch as FusedNetworks>::softplus_network(
+    let (first, gradient, others) = <Dispatch as FusedNetworks>::softplus_network(
         points.into_dispatch(),
         parameters.into_dispatch(),
         request,
-    ))
+    );
+    (
+        Tensor::from_dispatch(first),
+        Tensor::from_dispatch(gradient),
+        others.map(Tensor::from_dispatch),
+    )
 }
 
 /// [`FusedNetworks::relu_network`] for tensors of a fused device.

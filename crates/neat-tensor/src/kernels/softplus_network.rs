@@ -369,7 +369,8 @@ impl SoftplusNetwork {
         &self.shape
     }
 
-    fn others(&self) -> usize {
+    /// Number of outputs beyond the first.
+    pub fn others(&self) -> usize {
         self.shape.layers[self.shape.hidden()].outputs - 1
     }
 
