@@ -4,7 +4,7 @@
 //! measured where all else was right to 2·10⁻⁷. That would be the largest error
 //! of a whole network, so on a GPU the encoding sums a series instead.
 
-use crate::fused::is_fused;
+use crate::fused::is_on_host;
 use burn::tensor::{DType, Tensor};
 use std::f64::consts::FRAC_1_PI;
 
@@ -45,7 +45,7 @@ pub fn cosine<const D: usize>(x: Tensor<D>) -> Tensor<D> {
 
 /// The CPU backends call the system's or Rust's library; no GPU has float64 here.
 fn has_exact_sine<const D: usize>(x: &Tensor<D>) -> bool {
-    x.dtype() != DType::F32 || is_fused(&x.device())
+    x.dtype() != DType::F32 || is_on_host(&x.device())
 }
 
 /// `sin(x + half_turns · π)` for half turns of 0 or ½, to about 10⁻⁷.
