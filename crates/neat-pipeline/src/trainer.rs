@@ -417,7 +417,11 @@ impl Trainer {
 
     /// Draws and places everything random of the next iteration.
     fn prepare(&mut self, schedule: f64) -> Prepared {
-        self.beta = f64::from(host_vec(self.beta_tensor(schedule))[0]);
+        let density = &self.config.model.density;
+        self.beta = match density.schedule {
+            BetaSchedule::Learned => f64::from(host_vec(self.beta_tensor(schedule))[0]),
+            BetaSchedule::Annealed => f64::from(density.annealed_beta(schedule) as f32),
+        };
         let start = Instant::now();
         let batch = self.data.batch(&self.config, self.seed, self.iteration);
         self.timings.batch = start.elapsed();
