@@ -142,7 +142,7 @@ pub enum SceneError {
     },
     /// A folder that follows none of the known layouts.
     #[error(
-        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics` or with `world_mat_0` and `scale_mat_0`, or cameras.json"
+        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics` or with `world_mat_0` and `scale_mat_0`, or cameras.json, or transforms.json"
     )]
     UnknownLayout {
         /// The folder.

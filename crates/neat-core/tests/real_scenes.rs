@@ -1,11 +1,13 @@
 //! Every real scene that is at hand loads. The data are not part of the
 //! repository: set `NEAT_DATA`, or keep them in `../shared/data`.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Matrix4, Vector3};
 use neat_core::ground_truth::{read_ground_truth, read_wireframe};
 use neat_core::layout::Layout;
 use neat_core::point_cloud::read_ply;
 use neat_core::{LoadOptions, SceneError, load_scene};
+use std::collections::BTreeMap;
+use std::fs;
 use std::path::PathBuf;
 
 /// The folder of a real scene, or `None`, said aloud, where there is none.
@@ -120,6 +122,56 @@ fn scenes_without_wireframes_name_the_remedy_and_load_without() {
             assert!(difference.amax() < 1e-6, "{name}: {difference}");
             assert!((npz_frame.scale - 231.068).abs() < 1e-3);
         }
+    }
+}
+
+/// A scene of Blender as it was made, and `cameras.json` made from it by others.
+#[test]
+fn blenders_transforms_agree_with_the_cameras_made_from_them() {
+    let Some(dir) = real("abcnef-00000952") else {
+        return;
+    };
+    // The images have got other names since; those of Blender are made again.
+    let cameras = fs::read_to_string(dir.join("cameras.json")).unwrap();
+    let cameras: serde_json::Value = serde_json::from_str(&cameras).unwrap();
+    let blender = tempfile::tempdir().unwrap();
+    fs::create_dir(blender.path().join("train")).unwrap();
+    let transforms = "transforms_train.json";
+    fs::copy(dir.join(transforms), blender.path().join(transforms)).unwrap();
+    let mut expected = BTreeMap::new();
+    for frame in cameras["frames"].as_array().unwrap() {
+        let source = frame["source_name"].as_str().unwrap();
+        let image = dir.join(frame["file"].as_str().unwrap());
+        fs::copy(image, blender.path().join("train").join(source)).unwrap();
+        expected.insert(source.strip_suffix(".png").unwrap(), frame);
+    }
+
+    let options = LoadOptions {
+        require_wireframes: false,
+        ..LoadOptions::default()
+    };
+    let loaded = load_scene(blender.path(), &options).unwrap();
+    assert_eq!(loaded.layout, Layout::TransformsJson);
+    assert_eq!(loaded.warnings, []);
+    assert_eq!(loaded.scene.views.len(), expected.len());
+    // `cameras.json` counts pixel centres, so that its principal point is
+    // (W − 1)/2. The field of view gives W/2 from the corner of the image: the
+    // same rays, half a pixel apart in both.
+    assert_eq!(loaded.scene.pixel_center, 0.5);
+    for view in &loaded.scene.views {
+        let frame = expected[view.name.as_str()];
+        let number = |key: &str, i: usize, j: usize| frame[key][i][j].as_f64().unwrap();
+        let mut k = Matrix3::from_fn(|i, j| number("K", i, j));
+        k[(0, 2)] += loaded.scene.pixel_center;
+        k[(1, 2)] += loaded.scene.pixel_center;
+        // Relative: the angle was rounded to `f32`, which moves the focal length
+        // of 1111 pixels by 2e-5.
+        let difference = (view.camera.intrinsics.matrix() - k).amax() / k[(0, 0)];
+        assert!(difference < 1e-6, "{}: {difference:e}", view.name);
+        let pose = Matrix4::from_fn(|i, j| number("c2w", i, j));
+        // The rotations of `cameras.json` were made orthogonal to the last digit.
+        let difference = (view.camera.matrix_world_from_camera() - pose).amax();
+        assert!(difference < 1e-6, "{}: {difference:e}", view.name);
     }
 }
 

@@ -87,9 +87,14 @@ fn rfc3339(seconds: u64) -> String {
 }
 
 /// The files of a scene folder that belong to the scene.
-const INPUT_FILES: [&str; 2] = ["cameras.npz", "cameras.json"];
+const INPUT_FILES: [&str; 4] = [
+    "cameras.npz",
+    "cameras.json",
+    "transforms.json",
+    "transforms_train.json",
+];
 /// The folders whose files do.
-const INPUT_FOLDERS: [&str; 3] = ["image", "images", "hawp"];
+const INPUT_FOLDERS: [&str; 4] = ["image", "images", "train", "hawp"];
 
 /// SHA-256 of the cameras, images and 2D wireframes in a scene folder, by their
 /// paths in it.

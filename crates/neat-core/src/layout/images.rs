@@ -25,20 +25,38 @@ pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, SceneError> {
 }
 
 fn is_image(path: &Path) -> bool {
+    has_known_ending(path) && !file_stem(path).starts_with('.')
+}
+
+/// Whether the name ends as one of an image, in either case.
+pub(super) fn has_known_ending(path: &Path) -> bool {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
-    let known = ENDINGS
+    ENDINGS
         .iter()
-        .any(|known| ending.eq_ignore_ascii_case(known));
-    known && !file_stem(path).starts_with('.')
+        .any(|known| ending.eq_ignore_ascii_case(known))
+}
+
+/// What to do about a missing image.
+const REMEDY: &str = "put the image there or remove its pose";
+
+/// Width and height, from the first bytes of an image.
+pub(super) fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
+    ImageReader::open(path)
+        .and_then(ImageReader::with_guessed_format)
+        .map_err(|source| crate::file::read_error(path, REMEDY, source))?
+        .into_dimensions()
+        .map_err(|source| SceneError::Image {
+            path: path.into(),
+            source,
+        })
 }
 
 /// Decodes an image; transparent pixels are blended with `background`.
 pub(super) fn read_rgb(path: &Path, background: [u8; 3]) -> Result<RgbImage, SceneError> {
-    let remedy = "put the image there or remove its pose";
     // By its first bytes: endings of converted data sets are not to be trusted.
     let image = ImageReader::open(path)
         .and_then(ImageReader::with_guessed_format)
-        .map_err(|source| crate::file::read_error(path, remedy, source))?
+        .map_err(|source| crate::file::read_error(path, REMEDY, source))?
         .decode()
         .map_err(|source| SceneError::Image {
             path: path.into(),

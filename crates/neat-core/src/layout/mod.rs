@@ -1,6 +1,6 @@
 //! Scenes on disk: which files hold images, poses and 2D wireframes.
 //!
-//! Three layouts are known ([`Layout`]); each has a file here that reads its
+//! Several layouts are known ([`Layout`]); each has a file here that reads its
 //! poses. Images and wireframes are read alike for all of them, by this file.
 
 pub mod abc;
@@ -9,6 +9,7 @@ pub mod dtu;
 mod images;
 mod pixel_center;
 mod poses;
+pub mod transforms_json;
 
 pub use pixel_center::PixelCenter;
 
@@ -33,11 +34,14 @@ pub enum Layout {
     /// `cameras.json` that names every image with its intrinsics and pose, and
     /// `hawp/`.
     CamerasJson,
+    /// `transforms.json` or `transforms_train.json` that names every image with
+    /// its pose, and `hawp/`: Blender's NeRF scenes, instant-ngp, nerfstudio.
+    TransformsJson,
 }
 
 impl Layout {
     /// Tells the layout of the folder `dir` by its files. `cameras.npz` is
-    /// looked at first, then `cameras.json`.
+    /// looked at first, then `cameras.json`, then `transforms.json`.
     ///
     /// # Errors
     /// If the folder does not exist or follows no known layout.
@@ -61,6 +65,9 @@ impl Layout {
         if dir.join(cameras_json::FILE_NAME).exists() {
             return Ok(Self::CamerasJson);
         }
+        if transforms_json::find(dir).is_some() {
+            return Ok(Self::TransformsJson);
+        }
         Err(SceneError::UnknownLayout { path: dir.into() })
     }
 
@@ -69,6 +76,7 @@ impl Layout {
             Self::Abc => abc::read_poses(dir),
             Self::Dtu => dtu::read_poses(dir),
             Self::CamerasJson => cameras_json::read_poses(dir),
+            Self::TransformsJson => transforms_json::read_poses(dir),
         }
     }
 }

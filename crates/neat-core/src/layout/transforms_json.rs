@@ -1,0 +1,446 @@
+//! The layout of Blender's NeRF scenes, instant-ngp and nerfstudio.
+//!
+//! `transforms.json`, else `transforms_train.json`: `{"camera_angle_x": angle,
+//! "frames": [{"file_path": "./train/r_0", "transform_matrix": 4×4}, …]}`, or with
+//! `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`. Poses are camera-to-world in OpenGL axes
+//! (x right, y up, looking along −z) and are turned into OpenCV axes here. The
+//! world of the file is kept: nerfstudio's `applied_transform` and
+//! `applied_scale` have been applied to the poses already. Other keys are ignored.
+
+use super::images::{ENDINGS, has_known_ending, read_size};
+use super::poses::{PosedImage, Poses, upper_left, view_error};
+use crate::hawp_json::file_stem;
+use crate::scene::check_names;
+use crate::{Intrinsics, SceneError, Similarity, file};
+use nalgebra::Matrix4;
+use serde::Deserialize;
+use std::f64::consts::PI;
+use std::path::{Component, Path, PathBuf};
+
+/// In the order in which they are looked for. The second is Blender's.
+const FILE_NAMES: [&str; 2] = ["transforms.json", "transforms_train.json"];
+
+/// Camera models without distortion once their coefficients are zero. Others,
+/// such as fisheye or panorama, are no pinhole cameras with any coefficients.
+const PERSPECTIVE_MODELS: [&str; 7] = [
+    "PINHOLE",
+    "SIMPLE_PINHOLE",
+    "PERSPECTIVE",
+    "OPENCV",
+    "FULL_OPENCV",
+    "RADIAL",
+    "SIMPLE_RADIAL",
+];
+
+/// The middle of an image at W/2: its corner is the origin.
+const PIXEL_CENTER_OF_MIDDLE: f64 = 0.5;
+
+#[derive(Deserialize)]
+struct TransformsJson {
+    #[serde(flatten)]
+    lens: Lens,
+    frames: Vec<Frame>,
+}
+
+#[derive(Deserialize)]
+struct Frame {
+    file_path: String,
+    /// Checked by hand, so that a wrong shape is reported with its frame. `null`
+    /// is what some writers make of NaN.
+    transform_matrix: Vec<Vec<Option<f64>>>,
+    #[serde(flatten)]
+    lens: Lens,
+}
+
+/// What may stand for all frames or for one.
+#[derive(Deserialize)]
+struct Lens {
+    camera_angle_x: Option<f64>,
+    camera_angle_y: Option<f64>,
+    fl_x: Option<f64>,
+    fl_y: Option<f64>,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    /// Written as `800` or `800.0`.
+    w: Option<f64>,
+    h: Option<f64>,
+    camera_model: Option<String>,
+    is_fisheye: Option<bool>,
+    k1: Option<f64>,
+    k2: Option<f64>,
+    k3: Option<f64>,
+    k4: Option<f64>,
+    p1: Option<f64>,
+    p2: Option<f64>,
+    distortion_params: Option<Vec<f64>>,
+}
+
+/// The file of this layout in the folder `dir`, where there is one.
+pub(super) fn find(dir: &Path) -> Option<PathBuf> {
+    let mut paths = FILE_NAMES.iter().map(|name| dir.join(name));
+    paths.find(|path| path.exists())
+}
+
+pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
+    let path = find(dir).unwrap_or_else(|| dir.join(FILE_NAMES[0]));
+    let bytes = file::read(&path, "provide the poses of the images")?;
+    parse(&bytes, path, dir)
+}
+
+fn parse(bytes: &[u8], path: PathBuf, dir: &Path) -> Result<Poses, SceneError> {
+    let json: TransformsJson =
+        serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
+            path: path.clone(),
+            format: "list of transforms",
+            source,
+        })?;
+    if json.frames.is_empty() {
+        return Err(SceneError::NoView { path });
+    }
+    let mut views = Vec::with_capacity(json.frames.len());
+    let mut middle_for_all = true;
+    for frame in &json.frames {
+        let context = FrameContext {
+            path: &path,
+            frame,
+            all: &json.lens,
+        };
+        let given = |number: fn(&Lens) -> Option<f64>| context.first(number).is_some();
+        middle_for_all &= !given(|lens| lens.cx) && !given(|lens| lens.cy);
+        views.push(context.posed_image(dir)?);
+    }
+    views.sort_by(|a, b| a.name.cmp(&b.name));
+    check_names(views.iter().map(|view| view.name.as_str()), &path)?;
+    Ok(Poses {
+        path,
+        views,
+        original_from_world: Similarity::identity(),
+        pixel_center: middle_for_all.then_some(PIXEL_CENTER_OF_MIDDLE),
+    })
+}
+
+/// A frame with what its file says about all frames.
+struct FrameContext<'a> {
+    path: &'a Path,
+    frame: &'a Frame,
+    all: &'a Lens,
+}
+
+impl FrameContext<'_> {
+    fn posed_image(&self, dir: &Path) -> Result<PosedImage, SceneError> {
+        self.check_perspective()?;
+        let world_from_camera = self.world_from_camera()?;
+        let relative = self.relative_path()?;
+        let name = view_name(&relative);
+        let image = existing_image(dir.join(relative));
+        let size = self.size(&image)?;
+        let intrinsics = self.intrinsics(size, &image)?;
+        intrinsics
+            .validate()
+            .map_err(|problem| view_error(self.path, &name, problem))?;
+        Ok(PosedImage {
+            name,
+            image,
+            intrinsics,
+            world_from_camera,
+            size,
+        })
+    }
+
+    /// What the frame says itself, else what the file says for all.
+    fn first<T>(&self, number: impl Fn(&Lens) -> Option<T>) -> Option<T> {
+        number(&self.frame.lens).or_else(|| number(self.all))
+    }
+
+    fn error(&self, reason: impl std::fmt::Display) -> SceneError {
+        SceneError::Malformed {
+            path: self.path.into(),
+            reason: format!("frame `{}` {reason}", self.frame.file_path),
+        }
+    }
+
+    /// Errs at lenses that do not map straight lines to straight lines.
+    fn check_perspective(&self) -> Result<(), SceneError> {
+        const REMEDY: &str = "undistort the images to pinhole cameras first";
+        let model = self.first(|lens| lens.camera_model.clone());
+        if let Some(model) = model
+            && !PERSPECTIVE_MODELS.contains(&model.to_uppercase().as_str())
+        {
+            return Err(self.error(format_args!(
+                "has the camera model `{model}`, which is not read: {REMEDY}"
+            )));
+        }
+        if self.first(|lens| lens.is_fisheye) == Some(true) {
+            return Err(self.error(format_args!("has a fisheye lens: {REMEDY}")));
+        }
+        let mut coefficients = vec![
+            ("k1", self.first(|lens| lens.k1)),
+            ("k2", self.first(|lens| lens.k2)),
+            ("k3", self.first(|lens| lens.k3)),
+            ("k4", self.first(|lens| lens.k4)),
+            ("p1", self.first(|lens| lens.p1)),
+            ("p2", self.first(|lens| lens.p2)),
+        ];
+        let listed = self.first(|lens| lens.distortion_params.clone());
+        let listed = listed.unwrap_or_default().into_iter();
+        coefficients.extend(listed.map(|value| ("distortion_params", Some(value))));
+        for (name, value) in coefficients {
+            let value = value.unwrap_or(0.0);
+            if value != 0.0 {
+                return Err(self.error(format_args!(
+                    "has lens distortion ({name} = {value}): {REMEDY}"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// The pose in OpenCV axes: y and z of the camera change their signs. What
+    /// else makes a pose rigid is checked with the image, as in every layout.
+    fn world_from_camera(&self) -> Result<Matrix4<f64>, SceneError> {
+        let rows = &self.frame.transform_matrix;
+        if rows.len() != 4 || rows.iter().any(|row| row.len() != 4) {
+            let lengths: Vec<_> = rows.iter().map(Vec::len).collect();
+            return Err(self.error(format_args!(
+                "has a `transform_matrix` with rows of {lengths:?} numbers, expected 4×4"
+            )));
+        }
+        let numbers = rows.iter().flatten().map(|x| x.unwrap_or(f64::NAN));
+        let mut pose = Matrix4::from_row_iterator(numbers);
+        // Said here, because the general message asks for OpenCV axes. Poses
+        // that are nearly singular are told so later.
+        let determinant = upper_left(&pose).determinant();
+        if determinant < -1e-3 {
+            return Err(self.error(format_args!(
+                "has a mirrored pose (determinant {determinant:.3}): \
+                 this layout needs OpenGL axes, x right, y up, z backward"
+            )));
+        }
+        for column in [1, 2] {
+            for row in 0..3 {
+                pose[(row, column)] = -pose[(row, column)];
+            }
+        }
+        Ok(pose)
+    }
+
+    /// The path of the image below the scene's folder. Scenes come from
+    /// strangers: no file outside is opened.
+    fn relative_path(&self) -> Result<PathBuf, SceneError> {
+        let mut relative = PathBuf::new();
+        for component in Path::new(&self.frame.file_path).components() {
+            match component {
+                Component::CurDir => {}
+                Component::Normal(part) => relative.push(part),
+                Component::ParentDir | Component::RootDir | Component::Prefix(_) => {
+                    return Err(self.error(
+                        "is outside the scene: put the image into its folder \
+                         and name it without `..` and relative to the folder",
+                    ));
+                }
+            }
+        }
+        if relative.as_os_str().is_empty() {
+            return Err(self.error("names no image"));
+        }
+        Ok(relative)
+    }
+
+    /// Width and height, if the file gives them; one alone is completed by the
+    /// image.
+    fn size(&self, image: &Path) -> Result<Option<(u32, u32)>, SceneError> {
+        let width = self.pixels("w", self.first(|lens| lens.w))?;
+        let height = self.pixels("h", self.first(|lens| lens.h))?;
+        Ok(match (width, height) {
+            (None, None) => None,
+            (Some(width), Some(height)) => Some((width, height)),
+            _ => {
+                let (image_width, image_height) = read_size(image)?;
+                Some((width.unwrap_or(image_width), height.unwrap_or(image_height)))
+            }
+        })
+    }
+
+    fn pixels(&self, key: &str, value: Option<f64>) -> Result<Option<u32>, SceneError> {
+        let Some(value) = value else {
+            return Ok(None);
+        };
+        if value.fract() != 0.0 || !(1.0..=f64::from(u32::MAX)).contains(&value) {
+            return Err(self.error(format_args!(
+                "has `{key}` = {value}, which is no number of pixels"
+            )));
+        }
+        // A whole number within the range, as just checked.
+        Ok(Some(value as u32))
+    }
+
+    fn intrinsics(&self, size: Option<(u32, u32)>, image: &Path) -> Result<Intrinsics, SceneError> {
+        let focal_x = self.first(|lens| Focal::of(lens.fl_x, lens.camera_angle_x));
+        let focal_y = self.first(|lens| Focal::of(lens.fl_y, lens.camera_angle_y));
+        let (cx, cy) = (self.first(|lens| lens.cx), self.first(|lens| lens.cy));
+        let Some(focal_x) = focal_x else {
+            return Err(self.error("has no focal length: give `camera_angle_x` or `fl_x`"));
+        };
+        // The image is only looked at where the numbers need its size.
+        let needs_size = cx.is_none()
+            || cy.is_none()
+            || [Some(focal_x), focal_y]
+                .iter()
+                .flatten()
+                .any(Focal::is_angle);
+        let (width, height) = match size {
+            Some(size) => size,
+            None if needs_size => read_size(image)?,
+            None => (0, 0),
+        };
+        let (width, height) = (f64::from(width), f64::from(height));
+        let fx = self.pixels_of_focal("camera_angle_x", focal_x, width)?;
+        let fy = focal_y.map_or(Ok(fx), |focal| {
+            self.pixels_of_focal("camera_angle_y", focal, height)
+        })?;
+        Ok(Intrinsics {
+            fx,
+            fy,
+            cx: cx.unwrap_or(width / 2.0),
+            cy: cy.unwrap_or(height / 2.0),
+            skew: 0.0,
+        })
+    }
+
+    fn pixels_of_focal(&self, key: &str, focal: Focal, extent: f64) -> Result<f64, SceneError> {
+        match focal {
+            Focal::Pixels(pixels) => Ok(pixels),
+            Focal::Angle(angle) if angle > 0.0 && angle < PI => {
+                Ok(0.5 * extent / (angle / 2.0).tan())
+            }
+            Focal::Angle(angle) => Err(self.error(format_args!(
+                "has `{key}` = {angle}, expected radians between 0 and π"
+            ))),
+        }
+    }
+}
+
+/// A focal length along one axis, as a file may give it.
+#[derive(Clone, Copy)]
+enum Focal {
+    Pixels(f64),
+    /// The field of view, in radians.
+    Angle(f64),
+}
+
+impl Focal {
+    /// Pixels, else the angle: files with both have rounded the angle.
+    fn of(pixels: Option<f64>, angle: Option<f64>) -> Option<Self> {
+        pixels.map(Self::Pixels).or(angle.map(Self::Angle))
+    }
+
+    fn is_angle(&self) -> bool {
+        matches!(self, Self::Angle(_))
+    }
+}
+
+/// The file name without its ending, if that is one of an image: `r_0.5` is a
+/// name without ending.
+fn view_name(relative: &Path) -> String {
+    if has_known_ending(relative) {
+        return file_stem(relative);
+    }
+    let name = relative.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
+}
+
+/// `image`, or where it does not exist the same with an ending that does: Blender
+/// leaves endings out, and data sets are passed on with their images converted.
+fn existing_image(image: PathBuf) -> PathBuf {
+    if image.is_file() {
+        return image;
+    }
+    let known = has_known_ending(&image);
+    let stem = if known {
+        image.with_extension("")
+    } else {
+        image.clone()
+    };
+    let with_ending = |ending: &str| {
+        let mut path = stem.clone().into_os_string();
+        path.push(".");
+        path.push(ending);
+        PathBuf::from(path)
+    };
+    let found = ENDINGS.iter().map(|ending| with_ending(ending));
+    let absent = if known {
+        image
+    } else {
+        with_ending(ENDINGS[0])
+    };
+    found
+        .into_iter()
+        .find(|path| path.is_file())
+        .unwrap_or(absent)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const ONE_FRAME: &str = r#"{"fl_x": 5, "fl_y": 6.0, "cx": 2, "cy": 1.5, "w": 4.0, "h": 3,
+        "k1": 0, "camera_model": "OPENCV", "aabb_scale": 16, "frames": [{"file_path": "./images/a.png",
+        "transform_matrix": [[1, 0, 0, 7], [0, 1, 0, 8], [0, 0, 1, 9], [0, 0, 0, 1]]}]}"#;
+
+    fn parse_text(bytes: &[u8]) -> Result<Poses, SceneError> {
+        parse(bytes, "scene/transforms.json".into(), Path::new("scene"))
+    }
+
+    #[test]
+    fn axes_are_opencv_and_the_center_stays() {
+        let poses = parse_text(ONE_FRAME.as_bytes()).unwrap();
+        let view = &poses.views[0];
+        assert_eq!(view.name, "a");
+        assert_eq!(view.image, Path::new("scene/images/a.png"));
+        assert_eq!(view.size, Some((4, 3)));
+        let expected = Matrix4::new(
+            1.0, 0.0, 0.0, 7.0, 0.0, -1.0, 0.0, 8.0, 0.0, 0.0, -1.0, 9.0, 0.0, 0.0, 0.0, 1.0,
+        );
+        assert_eq!(view.world_from_camera, expected);
+        assert_eq!(poses.original_from_world, Similarity::identity());
+    }
+
+    #[test]
+    fn only_endings_of_images_are_cut_off_names() {
+        let names = ["train/r_0", "r_0.PNG", "r_0.5", "a/b.c/d.jpeg"];
+        let names = names.map(|name| view_name(Path::new(name)));
+        assert_eq!(names, ["r_0", "r_0", "r_0.5", "d"]);
+    }
+
+    proptest! {
+        #[test]
+        fn truncated_and_damaged_files_are_errors_not_panics(
+            end in 0..ONE_FRAME.len(), at in 0..ONE_FRAME.len(), byte: u8,
+        ) {
+            let bytes = ONE_FRAME.as_bytes();
+            prop_assert!(parse_text(&bytes[..end]).is_err());
+            let mut damaged = bytes.to_vec();
+            damaged[at] = byte;
+            if let Ok(poses) = parse_text(&damaged) {
+                prop_assert_eq!(poses.views.len(), 1);
+                prop_assert!(poses.views[0].intrinsics.validate().is_ok());
+            }
+        }
+
+        #[test]
+        fn numbers_of_any_kind_are_errors_not_panics(
+            key in prop::sample::select(vec!["fl_x", "fl_y", "cx", "w", "h", "k1"]),
+            value: f64,
+            cells in prop::collection::vec(prop::collection::vec(any::<f64>(), 0..6), 0..6),
+        ) {
+            let mut json: serde_json::Value = serde_json::from_str(ONE_FRAME).unwrap();
+            json[key] = value.into();
+            if let Ok(poses) = parse_text(json.to_string().as_bytes()) {
+                prop_assert!(poses.views[0].intrinsics.validate().is_ok());
+            }
+            json["frames"][0]["transform_matrix"] = cells.into();
+            let _ = parse_text(json.to_string().as_bytes());
+        }
+    }
+}
