@@ -87,9 +87,18 @@ fn rfc3339(seconds: u64) -> String {
 }
 
 /// The files of a scene folder that belong to the scene.
-const INPUT_FILES: [&str; 2] = ["cameras.npz", "cameras.json"];
+const INPUT_FILES: [&str; 8] = [
+    "cameras.npz",
+    "cameras.json",
+    "cameras.bin",
+    "cameras.txt",
+    "images.bin",
+    "images.txt",
+    "points3D.bin",
+    "points3D.txt",
+];
 /// The folders whose files do.
-const INPUT_FOLDERS: [&str; 3] = ["image", "images", "hawp"];
+const INPUT_FOLDERS: [&str; 5] = ["image", "images", "hawp", "sparse", "sparse/0"];
 
 /// SHA-256 of the cameras, images and 2D wireframes in a scene folder, by their
 /// paths in it.

@@ -16,8 +16,10 @@ Layouts that are read:
   images/NAME.png, hawp/NAME.json, cameras.npz with `intrinsics` and `extrinsics`       (ABC)
   image/NAME.png, hawp/NAME.json, cameras.npz with `world_mat_i` and `scale_mat_i`      (DTU)
   cameras.json naming images with `K` and `c2w`, hawp/NAME.json
+  images/, hawp/NAME.json, cameras, images and points3D (.bin or .txt) in sparse/0/   (COLMAP)
 
-Poses are camera-to-world in OpenCV axes: x right, y down, z forward.")]
+Poses are camera-to-world in OpenCV axes: x right, y down, z forward. Those of COLMAP
+are read as it writes them; its images must be undistorted.")]
 pub struct InfoArgs {
     /// Folder of the scene
     #[arg(value_name = "SCENE")]
@@ -49,6 +51,7 @@ fn describe(loaded: &LoadedScene, min_score: f64) -> String {
         Layout::Abc => "ABC (cameras.npz with intrinsics and extrinsics)",
         Layout::Dtu => "DTU (cameras.npz with world_mat and scale_mat)",
         Layout::CamerasJson => "cameras.json",
+        Layout::Colmap => "COLMAP (cameras and images of a sparse model)",
     };
     let sizes: BTreeSet<(u32, u32)> = scene
         .views

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 /// The endings of the images that are read.
-pub(super) const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
+const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 
 /// The images in a folder, sorted by file name. Hidden files are no images.
 pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, SceneError> {
@@ -30,6 +30,16 @@ fn is_image(path: &Path) -> bool {
         .iter()
         .any(|known| ending.eq_ignore_ascii_case(known));
     known && !file_stem(path).starts_with('.')
+}
+
+/// `image`, or where it does not exist the same with another ending that does:
+/// data sets are often passed on with their images converted.
+pub(super) fn with_existing_ending(image: PathBuf) -> PathBuf {
+    if image.exists() {
+        return image;
+    }
+    let mut others = ENDINGS.iter().map(|ending| image.with_extension(ending));
+    others.find(|other| other.exists()).unwrap_or(image)
 }
 
 /// Decodes an image; transparent pixels are blended with `background`.

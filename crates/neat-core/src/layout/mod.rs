@@ -1,10 +1,11 @@
 //! Scenes on disk: which files hold images, poses and 2D wireframes.
 //!
-//! Three layouts are known ([`Layout`]); each has a file here that reads its
+//! Four layouts are known ([`Layout`]); each has a file here that reads its
 //! poses. Images and wireframes are read alike for all of them, by this file.
 
 pub mod abc;
 pub mod cameras_json;
+pub mod colmap;
 pub mod dtu;
 mod images;
 mod pixel_center;
@@ -33,11 +34,14 @@ pub enum Layout {
     /// `cameras.json` that names every image with its intrinsics and pose, and
     /// `hawp/`.
     CamerasJson,
+    /// `images/`, `hawp/`, and a COLMAP model of undistorted images in
+    /// `sparse/0/`, `sparse/` or the folder itself, binary or text.
+    Colmap,
 }
 
 impl Layout {
     /// Tells the layout of the folder `dir` by its files. `cameras.npz` is
-    /// looked at first, then `cameras.json`.
+    /// looked at first, then `cameras.json`, then a COLMAP model.
     ///
     /// # Errors
     /// If the folder does not exist or follows no known layout.
@@ -61,6 +65,9 @@ impl Layout {
         if dir.join(cameras_json::FILE_NAME).exists() {
             return Ok(Self::CamerasJson);
         }
+        if colmap::is_in(dir) {
+            return Ok(Self::Colmap);
+        }
         Err(SceneError::UnknownLayout { path: dir.into() })
     }
 
@@ -69,6 +76,7 @@ impl Layout {
             Self::Abc => abc::read_poses(dir),
             Self::Dtu => dtu::read_poses(dir),
             Self::CamerasJson => cameras_json::read_poses(dir),
+            Self::Colmap => colmap::read_poses(dir),
         }
     }
 }
