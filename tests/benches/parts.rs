@@ -69,7 +69,9 @@ mod network {
             ..StepRows::default()
         };
         Setting {
-            mlp: NeatModel::new(&config, 1.0, 0, &device).implicit_network.mlp,
+            mlp: NeatModel::new(&config, 1.0, 0, &device)
+                .implicit_network
+                .mlp,
             points: matrix(rows, 3, &device),
             flops: StepFlops::count(&config, &counted),
         }

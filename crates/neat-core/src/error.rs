@@ -98,6 +98,18 @@ pub enum SceneError {
         /// What is wrong with it.
         problem: ViewError,
     },
+    /// A camera that is not a pinhole without distortion.
+    #[error(
+        "{path}: camera {camera} of model {model} is not a pinhole without distortion: run `colmap image_undistorter` and give its images and model"
+    )]
+    NotPinhole {
+        /// The file with the camera.
+        path: PathBuf,
+        /// Its number in that file.
+        camera: u32,
+        /// Name of its model.
+        model: String,
+    },
     /// Files and poses that do not belong together.
     #[error(
         "{path} holds {poses} poses, but {images_dir} holds {images} images: add or remove images so that their sorted names match the poses"
@@ -142,7 +154,7 @@ pub enum SceneError {
     },
     /// A folder that follows none of the known layouts.
     #[error(
-        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics` or with `world_mat_0` and `scale_mat_0`, or cameras.json, or transforms.json"
+        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics` or with `world_mat_0` and `scale_mat_0`, or cameras.json, or transforms.json, or a COLMAP model (cameras and images, .bin or .txt) in sparse/0, sparse or the folder itself"
     )]
     UnknownLayout {
         /// The folder.

@@ -87,14 +87,20 @@ fn rfc3339(seconds: u64) -> String {
 }
 
 /// The files of a scene folder that belong to the scene.
-const INPUT_FILES: [&str; 4] = [
+const INPUT_FILES: [&str; 10] = [
     "cameras.npz",
     "cameras.json",
     "transforms.json",
     "transforms_train.json",
+    "cameras.bin",
+    "cameras.txt",
+    "images.bin",
+    "images.txt",
+    "points3D.bin",
+    "points3D.txt",
 ];
 /// The folders whose files do.
-const INPUT_FOLDERS: [&str; 4] = ["image", "images", "train", "hawp"];
+const INPUT_FOLDERS: [&str; 6] = ["image", "images", "train", "hawp", "sparse", "sparse/0"];
 
 /// SHA-256 of the cameras, images and 2D wireframes in a scene folder, by their
 /// paths in it.

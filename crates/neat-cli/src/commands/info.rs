@@ -17,9 +17,11 @@ Layouts that are read:
   image/NAME.png, hawp/NAME.json, cameras.npz with `world_mat_i` and `scale_mat_i`      (DTU)
   cameras.json naming images with `K` and `c2w`, hawp/NAME.json
   transforms.json or transforms_train.json (Blender, nerfstudio), hawp/NAME.json
+  images/, hawp/NAME.json, cameras, images and points3D (.bin or .txt) in sparse/0/   (COLMAP)
 
 Poses are camera-to-world in OpenCV axes: x right, y down, z forward; in transforms.json
-in OpenGL axes: x right, y up, z backward.")]
+in OpenGL axes: x right, y up, z backward. Those of COLMAP are read as it writes them. Images
+must be undistorted.")]
 pub struct InfoArgs {
     /// Folder of the scene
     #[arg(value_name = "SCENE")]
@@ -52,6 +54,7 @@ fn describe(loaded: &LoadedScene, min_score: f64) -> String {
         Layout::Dtu => "DTU (cameras.npz with world_mat and scale_mat)",
         Layout::CamerasJson => "cameras.json",
         Layout::TransformsJson => "transforms.json (OpenGL axes)",
+        Layout::Colmap => "COLMAP (cameras and images of a sparse model)",
     };
     let sizes: BTreeSet<(u32, u32)> = scene
         .views

@@ -5,7 +5,7 @@
 //! OpenCV axes; the optional `scale_mat` leads from the world to the original
 //! frame. Other keys are ignored.
 
-use super::images::ENDINGS;
+use super::images::with_existing_ending;
 use super::poses::{PosedImage, Poses, similarity_of, view_error};
 use crate::hawp_json::file_stem;
 use crate::{Intrinsics, SceneError, Similarity, file};
@@ -68,16 +68,6 @@ fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
         original_from_world,
         pixel_center: None,
     })
-}
-
-/// `image`, or where it does not exist the same with another ending that does:
-/// data sets are often passed on with their images converted.
-fn with_existing_ending(image: PathBuf) -> PathBuf {
-    if image.exists() {
-        return image;
-    }
-    let mut others = ENDINGS.iter().map(|ending| image.with_extension(ending));
-    others.find(|other| other.exists()).unwrap_or(image)
 }
 
 #[cfg(test)]

@@ -51,6 +51,16 @@ pub(super) fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
         })
 }
 
+/// `image`, or where it does not exist the same with another ending that does:
+/// data sets are often passed on with their images converted.
+pub(super) fn with_existing_ending(image: PathBuf) -> PathBuf {
+    if image.exists() {
+        return image;
+    }
+    let mut others = ENDINGS.iter().map(|ending| image.with_extension(ending));
+    others.find(|other| other.exists()).unwrap_or(image)
+}
+
 /// Decodes an image; transparent pixels are blended with `background`.
 pub(super) fn read_rgb(path: &Path, background: [u8; 3]) -> Result<RgbImage, SceneError> {
     // By its first bytes: endings of converted data sets are not to be trusted.

@@ -5,6 +5,7 @@
 
 pub mod abc;
 pub mod cameras_json;
+pub mod colmap;
 pub mod dtu;
 mod images;
 mod pixel_center;
@@ -37,11 +38,15 @@ pub enum Layout {
     /// `transforms.json` or `transforms_train.json` that names every image with
     /// its pose, and `hawp/`: Blender's NeRF scenes, instant-ngp, nerfstudio.
     TransformsJson,
+    /// `images/`, `hawp/`, and a COLMAP model of undistorted images in
+    /// `sparse/0/`, `sparse/` or the folder itself, binary or text.
+    Colmap,
 }
 
 impl Layout {
     /// Tells the layout of the folder `dir` by its files. `cameras.npz` is
-    /// looked at first, then `cameras.json`, then `transforms.json`.
+    /// looked at first, then `cameras.json`, then `transforms.json`, then a COLMAP
+    /// model.
     ///
     /// # Errors
     /// If the folder does not exist or follows no known layout.
@@ -68,6 +73,9 @@ impl Layout {
         if transforms_json::find(dir).is_some() {
             return Ok(Self::TransformsJson);
         }
+        if colmap::is_in(dir) {
+            return Ok(Self::Colmap);
+        }
         Err(SceneError::UnknownLayout { path: dir.into() })
     }
 
@@ -77,6 +85,7 @@ impl Layout {
             Self::Dtu => dtu::read_poses(dir),
             Self::CamerasJson => cameras_json::read_poses(dir),
             Self::TransformsJson => transforms_json::read_poses(dir),
+            Self::Colmap => colmap::read_poses(dir),
         }
     }
 }

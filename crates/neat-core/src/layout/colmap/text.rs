@@ -1,0 +1,267 @@
+//! COLMAP's text files: one record per line, two lines per image; lines that
+//! start with `#` are comments.
+
+use super::camera_model::CameraModel;
+use super::{ColmapCamera, ColmapImage, malformed, unknown_model};
+use crate::SceneError;
+use std::path::Path;
+use std::str::FromStr;
+
+pub(super) fn cameras(path: &Path, bytes: &[u8]) -> Result<Vec<ColmapCamera>, SceneError> {
+    let mut cameras = Vec::new();
+    for mut line in records(path, bytes)? {
+        let id: u32 = line.parse("CAMERA_ID")?;
+        line.owner = Some(format!("camera {id}"));
+        let name = line.field("MODEL")?;
+        let Some(model) = CameraModel::by_name(name) else {
+            return Err(unknown_model(path, id, name.into()));
+        };
+        let (width, height) = (line.parse("WIDTH")?, line.parse("HEIGHT")?);
+        let mut parameters = Vec::with_capacity(model.parameters);
+        for _ in 0..model.parameters {
+            parameters.push(line.parse("PARAMS")?);
+        }
+        if !line.rest.trim().is_empty() {
+            let reason = format!("{name} has only {} parameters", model.parameters);
+            return Err(line.error(&reason));
+        }
+        cameras.push(ColmapCamera {
+            id,
+            model,
+            width,
+            height,
+            parameters,
+        });
+    }
+    Ok(cameras)
+}
+
+pub(super) fn images(path: &Path, bytes: &[u8]) -> Result<Vec<ColmapImage>, SceneError> {
+    let mut lines = lines(path, bytes)?;
+    let mut images = Vec::new();
+    while let Some(line) = lines.next() {
+        if line.is_record() {
+            let image = image(line)?;
+            // The next line holds the points even where it is empty. Only the
+            // last one may be missing: editors strip empty lines.
+            if let Some(points) = lines.next() {
+                check_points(points, &image.name)?;
+            }
+            images.push(image);
+        }
+    }
+    Ok(images)
+}
+
+fn image(mut line: Line) -> Result<ColmapImage, SceneError> {
+    // The name first, for messages about the other fields.
+    let mut name = line.rest;
+    for _ in 0..9 {
+        next_field(&mut name);
+    }
+    let name = name.trim();
+    if name.is_empty() {
+        return Err(line.error("expected IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID and NAME"));
+    }
+    line.owner = Some(format!("view `{name}`"));
+    let _id: u32 = line.parse("IMAGE_ID")?;
+    let mut quaternion = [0.0; 4];
+    for (number, what) in quaternion.iter_mut().zip(["QW", "QX", "QY", "QZ"]) {
+        *number = line.parse(what)?;
+    }
+    let mut translation = [0.0; 3];
+    for (number, what) in translation.iter_mut().zip(["TX", "TY", "TZ"]) {
+        *number = line.parse(what)?;
+    }
+    Ok(ColmapImage {
+        name: name.into(),
+        camera: line.parse("CAMERA_ID")?,
+        quaternion,
+        translation,
+    })
+}
+
+/// Errs unless the line is a list of x, y, number of the 3D point. A file without
+/// the lines of points would otherwise lose every other image in silence.
+fn check_points(mut line: Line, view: &str) -> Result<(), SceneError> {
+    let last = line.rest.split_whitespace().next_back();
+    let number = last.is_none_or(|last| last.parse::<i64>().is_ok());
+    if number && line.rest.split_whitespace().count().is_multiple_of(3) {
+        return Ok(());
+    }
+    line.owner = Some(format!("view `{view}`"));
+    Err(line.error("expected the image's points as X, Y, POINT3D_ID, or an empty line"))
+}
+
+pub(super) fn points(path: &Path, bytes: &[u8]) -> Result<Vec<[f64; 3]>, SceneError> {
+    let mut points = Vec::new();
+    for mut line in records(path, bytes)? {
+        let _id: u64 = line.parse("POINT3D_ID")?;
+        let point = [line.parse("X")?, line.parse("Y")?, line.parse("Z")?];
+        for what in ["R", "G", "B"] {
+            let _colour: u8 = line.parse(what)?;
+        }
+        let _error: f64 = line.parse("ERROR")?;
+        points.push(point);
+    }
+    Ok(points)
+}
+
+/// What is left of a line.
+struct Line<'a> {
+    path: &'a Path,
+    number: usize,
+    /// The view or camera that it is about, once that is known.
+    owner: Option<String>,
+    rest: &'a str,
+}
+
+impl<'a> Line<'a> {
+    fn is_record(&self) -> bool {
+        let text = self.rest.trim_start();
+        !text.is_empty() && !text.starts_with('#')
+    }
+
+    fn field(&mut self, what: &str) -> Result<&'a str, SceneError> {
+        next_field(&mut self.rest).ok_or_else(|| self.error(&format!("it ends before {what}")))
+    }
+
+    fn parse<T: FromStr>(&mut self, what: &str) -> Result<T, SceneError> {
+        let field = self.field(what)?;
+        field
+            .parse()
+            .map_err(|_| self.error(&format!("`{field}` cannot be {what}")))
+    }
+
+    fn error(&self, reason: &str) -> SceneError {
+        let owner = self
+            .owner
+            .as_deref()
+            .map_or(String::new(), |owner| format!(", {owner}"));
+        malformed(self.path, format!("line {}{owner}: {reason}", self.number))
+    }
+}
+
+/// Takes what is before the next white space.
+fn next_field<'a>(rest: &mut &'a str) -> Option<&'a str> {
+    let text = rest.trim_start();
+    let end = text.find(char::is_whitespace).unwrap_or(text.len());
+    let (field, after) = text.split_at(end);
+    *rest = after;
+    (!field.is_empty()).then_some(field)
+}
+
+fn lines<'a>(
+    path: &'a Path,
+    bytes: &'a [u8],
+) -> Result<impl Iterator<Item = Line<'a>>, SceneError> {
+    let text = std::str::from_utf8(bytes)
+        .map_err(|error| malformed(path, format!("it is not UTF-8 text: {error}")))?;
+    Ok((1..).zip(text.lines()).map(move |(number, rest)| Line {
+        path,
+        number,
+        owner: None,
+        rest,
+    }))
+}
+
+/// Lines that are neither empty nor comments.
+fn records<'a>(
+    path: &'a Path,
+    bytes: &'a [u8],
+) -> Result<impl Iterator<Item = Line<'a>>, SceneError> {
+    Ok(lines(path, bytes)?.filter(Line::is_record))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const FILES: [&str; 3] = [
+        "# Camera list\n7 SIMPLE_PINHOLE 4 3 5 2 1.5\n",
+        "# Image list\n1 1 0 0 0 7 8 9 7 left/a b.png\n\n2 1 0 0 0 7 8 -9e0 7 c.png\n1.5 2.5 -1\n",
+        "1 1.0 2.0 3.0 255 0 128 0.5 1 0 2 1\n",
+    ];
+
+    /// Reads the file as the kind of the same index; how many records it has.
+    fn read(kind: usize, bytes: &[u8]) -> Result<usize, SceneError> {
+        let path = Path::new("model.txt");
+        match kind {
+            0 => cameras(path, bytes).map(|records| records.len()),
+            1 => images(path, bytes).map(|records| records.len()),
+            _ => points(path, bytes).map(|records| records.len()),
+        }
+    }
+
+    #[test]
+    fn names_may_hold_spaces_and_points_may_be_missing() {
+        for (file, count) in FILES.iter().zip([1, 2, 1]) {
+            let kind = FILES.iter().position(|other| other == file).unwrap();
+            assert_eq!(read(kind, file.as_bytes()).unwrap(), count);
+            let dos = file.replace('\n', "\r\n");
+            assert_eq!(read(kind, dos.as_bytes()).unwrap(), count);
+        }
+        let images = images(Path::new("images.txt"), FILES[1].as_bytes()).unwrap();
+        assert_eq!(images[0].name, "left/a b.png");
+        assert_eq!(images[1].translation, [7.0, 8.0, -9.0]);
+        assert_eq!(read(1, b"1 1 0 0 0 7 8 9 7 a.png").unwrap(), 1);
+    }
+
+    #[test]
+    fn messages_name_line_and_field() {
+        for (kind, text, expected) in [
+            (
+                0,
+                "\n7 PINHOLE 4 3 5 2 1.5",
+                "line 2, camera 7: it ends before PARAMS",
+            ),
+            (
+                0,
+                "7 SIMPLE_PINHOLE 4 3 5 2 1.5 0",
+                "SIMPLE_PINHOLE has only 3 parameters",
+            ),
+            (0, "7 SIMPLE_PINHOLE -4 3 5 2 1.5", "`-4` cannot be WIDTH"),
+            (0, "7 SPHERE 4 3 5", "camera 7 of model SPHERE"),
+            (1, "1 1 0 0 0 7 8 9 7", "line 1: expected IMAGE_ID"),
+            (
+                1,
+                "1 1 0 0 x 7 8 9 7 a.png",
+                "line 1, view `a.png`: `x` cannot be QZ",
+            ),
+            (
+                1,
+                "1 1 0 0 0 7 8 9 7 a.png\n2 1 0 0 0 7 8 9 7 b.png",
+                "line 2, view `a.png`: expected the image's points",
+            ),
+            (2, "1 1.0 2.0", "line 1: it ends before Z"),
+        ] {
+            let message = read(kind, text.as_bytes()).unwrap_err().to_string();
+            assert!(message.contains("model.txt"), "{message}");
+            assert!(message.contains(expected), "{message}");
+        }
+        assert!(read(0, b"\xff").unwrap_err().to_string().contains("UTF-8"));
+    }
+
+    proptest! {
+        #[test]
+        fn truncated_and_damaged_files_never_panic(
+            kind in 0..3usize, end: prop::sample::Index, at: prop::sample::Index, byte: u8,
+            noise in prop::collection::vec(any::<u8>(), 0..200), text in "[0-9a-z #.\n-]{0,200}",
+        ) {
+            let file = FILES[kind].as_bytes();
+            // A cut between records cannot be seen.
+            if let Ok(records) = read(kind, &file[..end.index(file.len())]) {
+                prop_assert!(records <= 2);
+            }
+            let mut damaged = file.to_vec();
+            damaged[at.index(file.len())] = byte;
+            if let Ok(records) = read(kind, &damaged) {
+                prop_assert!(records <= 2);
+            }
+            // Any outcome but a panic.
+            let _ = read(kind, &noise);
+            let _ = read(kind, text.as_bytes());
+        }
+    }
+}
