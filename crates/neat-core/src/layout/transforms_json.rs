@@ -7,7 +7,7 @@
 //! world of the file is kept: nerfstudio's `applied_transform` and
 //! `applied_scale` have been applied to the poses already. Other keys are ignored.
 
-use super::images::{ENDINGS, has_known_ending, read_size};
+use super::images::{ENDINGS, has_known_ending, read_size, with_existing_ending};
 use super::poses::{PosedImage, Poses, upper_left, view_error};
 use crate::hawp_json::file_stem;
 use crate::scene::check_names;
@@ -349,34 +349,26 @@ fn view_name(relative: &Path) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// `image`, or where it does not exist the same with an ending that does: Blender
-/// leaves endings out, and data sets are passed on with their images converted.
+/// The image of a name: Blender leaves endings out, and data sets are passed on
+/// with their images converted.
 fn existing_image(image: PathBuf) -> PathBuf {
     if image.is_file() {
         return image;
     }
-    let known = has_known_ending(&image);
-    let stem = if known {
-        image.with_extension("")
-    } else {
-        image.clone()
-    };
+    if has_known_ending(&image) {
+        return with_existing_ending(image);
+    }
     let with_ending = |ending: &str| {
-        let mut path = stem.clone().into_os_string();
+        let mut path = image.clone().into_os_string();
         path.push(".");
         path.push(ending);
         PathBuf::from(path)
     };
-    let found = ENDINGS.iter().map(|ending| with_ending(ending));
-    let absent = if known {
-        image
-    } else {
-        with_ending(ENDINGS[0])
-    };
-    found
-        .into_iter()
+    ENDINGS
+        .iter()
+        .map(|ending| with_ending(ending))
         .find(|path| path.is_file())
-        .unwrap_or(absent)
+        .unwrap_or_else(|| with_ending(ENDINGS[0]))
 }
 
 #[cfg(test)]
