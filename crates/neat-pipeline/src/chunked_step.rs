@@ -7,9 +7,10 @@
 //! second, which adds up the gradients of the parameters chunk by chunk.
 
 use crate::config::TrainConfig;
+use crate::flops::StepRows;
 use crate::losses::{
-    Losses, RayTerms, StepInput, compared_rays, compared_with_observed, junction_terms, ray_terms,
-    segment_gradient,
+    Losses, RayTerms, RenderedSegments, StepInput, compared_rays, compared_with_observed,
+    eikonal_rows, junction_terms, ray_terms, render_batch, segment_gradient,
 };
 use crate::model::{NeatModel, host_vec};
 use crate::training_data::Batch;
@@ -21,8 +22,6 @@ use neat_gjp::junction_loss::JunctionLoss;
 use neat_sdf::{RayBundle, RaySamples};
 use std::ops::Range;
 use std::time::{Duration, Instant};
-
-use crate::flops::StepRows;
 
 /// What an iteration did, with the gradients of the parameters.
 pub(crate) struct StepGradients {
@@ -103,13 +102,14 @@ pub(crate) fn chunked_step(
     let fixed = model.valid();
     let plain = device.clone().inner();
     let fixed_beta = beta().inner();
-    let (mut ends, mut opacity, mut eikonal_rows) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut ends, mut opacity, mut all_eikonal_rows) = (Vec::new(), Vec::new(), 0);
     for i in 0..parts.len() {
-        let terms = ray_terms(&fixed, &of_part(i), fixed_beta.clone(), config, &plain);
-        eikonal_rows.push(terms.eikonal_rows);
-        if let Some(rendered) = terms.ends {
-            ends.extend(host_vec(rendered));
-            opacity.extend(host_vec(terms.opacity));
+        let (input, beta) = (of_part(i), fixed_beta.clone());
+        let (rendering, rows) = render_batch(&fixed, &input, beta, config, false, &plain);
+        all_eikonal_rows += eikonal_rows(&rows, config);
+        if let Some(segments) = RenderedSegments::of(&rendering) {
+            ends.extend(host_vec(segments.ends));
+            opacity.extend(host_vec(segments.opacity));
         }
     }
     let compared = compared_with_observed(&ends, &opacity, input, config);
@@ -145,7 +145,6 @@ pub(crate) fn chunked_step(
         }
     }
 
-    let all_eikonal_rows: usize = eikonal_rows.iter().sum();
     let mut rows = StepRows::default();
     let mut first_end = 0;
     for (i, range) in ranges.iter().enumerate() {
@@ -153,14 +152,14 @@ pub(crate) fn chunked_step(
             rgb,
             eikonal,
             mask,
-            ends,
+            segments,
             rows: part_rows,
             ..
         } = ray_terms(model, &of_part(i), beta(), config, device);
         rows += part_rows;
         // Means over a part become their share of the mean over all.
         let of_rays = range.len() as f64 / rays as f64;
-        let of_eikonal = eikonal_rows[i] as f64 / all_eikonal_rows.max(1) as f64;
+        let of_eikonal = eikonal_rows(&part_rows, config) as f64 / all_eikonal_rows.max(1) as f64;
         let terms = host_vec(Tensor::cat(
             vec![rgb.clone(), eikonal.clone(), mask.clone()],
             0,
@@ -171,7 +170,7 @@ pub(crate) fn chunked_step(
         let mut loss = rgb.mul_scalar(config.loss.rgb * of_rays)
             + eikonal.mul_scalar(config.loss.eikonal * of_eikonal)
             + mask.mul_scalar(config.loss.mask * of_rays);
-        if let Some(ends) = ends {
+        if let Some(RenderedSegments { ends, .. }) = segments {
             let count = ends.dims()[0] * 6;
             let gradient = compared.gradient[first_end..first_end + count].to_vec();
             first_end += count;

@@ -2,7 +2,7 @@
 
 use crate::config::TrainConfig;
 use crate::flops::StepRows;
-use crate::model::{NeatModel, RenderRequest, host_points, host_vec, point_tensor};
+use crate::model::{NeatModel, RenderRequest, Rendering, host_points, host_vec, point_tensor};
 use crate::training_data::Batch;
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::Vector2;
@@ -82,16 +82,73 @@ pub(crate) struct RayTerms {
     pub mask: Tensor<1>,
     /// Rendered colour `[R, 3]`.
     pub color: Tensor<2>,
-    /// Rendered ends `[R', 6]` of the rays that carry a segment.
-    pub ends: Option<Tensor<2>>,
-    /// Accumulated weight of those rays `[R', 1]`.
-    pub opacity: Tensor<2>,
+    pub segments: Option<RenderedSegments>,
     pub rows: StepRows,
-    /// Gradients that the eikonal term is the mean over.
-    pub eikonal_rows: usize,
 }
 
-/// Renders the batch: colour, silhouette, gradients.
+/// Segments along the rays that carry one.
+pub(crate) struct RenderedSegments {
+    /// Both ends `[R', 6]`.
+    pub ends: Tensor<2>,
+    /// Accumulated weight `[R', 1]`.
+    pub opacity: Tensor<2>,
+}
+
+impl RenderedSegments {
+    /// Those of a rendering, if any ray carries one.
+    pub fn of(rendering: &Rendering) -> Option<Self> {
+        let ends = rendering.segments.clone()?;
+        let rays = ends.dims()[0];
+        Some(Self {
+            ends,
+            opacity: rendering.opacity.clone().narrow(0, 0, rays),
+        })
+    }
+}
+
+/// Renders the batch, with or without colour; and what went through the networks
+/// for all terms of it.
+pub(crate) fn render_batch(
+    model: &NeatModel,
+    input: &StepInput<'_>,
+    beta: Tensor<1>,
+    config: &TrainConfig,
+    color: bool,
+    device: &Device,
+) -> (Rendering, StepRows) {
+    let batch = input.batch;
+    let rendering = model.render(
+        &RenderRequest {
+            rays: &batch.rays,
+            samples: input.samples,
+            distances: input.distances,
+            beta,
+            min_sample_weight: config.min_sample_weight,
+            segment_rays: batch.segment_of_ray.len(),
+            color,
+        },
+        device,
+    );
+    let samples = batch.rays.len() * input.samples.per_ray;
+    let rows = StepRows {
+        sampler: 0,
+        samples,
+        full: rendering.evaluated.as_ref().map_or(samples, Vec::len),
+        segment: rendering.segment_samples,
+        eikonal: input.eikonal_points.len(),
+    };
+    (rendering, rows)
+}
+
+/// Gradients that the eikonal term is the mean over.
+pub(crate) fn eikonal_rows(rows: &StepRows, config: &TrainConfig) -> usize {
+    match config.eikonal.rendered_samples {
+        true => rows.eikonal + rows.full,
+        false => rows.eikonal,
+    }
+}
+
+/// Colour, silhouette and gradients of the batch.
 pub(crate) fn ray_terms(
     model: &NeatModel,
     input: &StepInput<'_>,
@@ -100,43 +157,21 @@ pub(crate) fn ray_terms(
     device: &Device,
 ) -> RayTerms {
     let batch = input.batch;
-    let segment_rays = batch.segment_of_ray.len();
-    let rendering = model.render(
-        &RenderRequest {
-            rays: &batch.rays,
-            samples: input.samples,
-            distances: input.distances,
-            beta,
-            min_sample_weight: config.min_sample_weight,
-            segment_rays,
-            color: true,
-        },
-        device,
-    );
+    let (rendering, rows) = render_batch(model, input, beta, config, true, device);
+    let segments = RenderedSegments::of(&rendering);
     let zero = || Tensor::<1>::zeros([1], device);
     let rays = batch.rays.len();
-    let samples = rays * input.samples.per_ray;
-    let rows = StepRows {
-        sampler: 0,
-        samples,
-        full: rendering.evaluated.as_ref().map_or(samples, Vec::len),
-        segment: rendering.segment_samples,
-        eikonal: input.eikonal_points.len(),
-    };
 
     let color = rendering.color.expect("colour was asked for");
     let rgb = rgb_loss(color.clone(), point_tensor(&batch.colors, device));
 
     let mut gradients = Vec::new();
-    let mut eikonal_rows = 0;
     if !input.eikonal_points.is_empty() {
         let points = point_tensor(input.eikonal_points, device);
         gradients.push(model.implicit_network.gradient_uncapped(points));
-        eikonal_rows += rows.eikonal;
     }
     if config.eikonal.rendered_samples {
-        gradients.push(rendering.gradients.clone());
-        eikonal_rows += rows.full;
+        gradients.push(rendering.gradients);
     }
     let eikonal = match gradients.is_empty() {
         true => zero(),
@@ -146,7 +181,7 @@ pub(crate) fn ray_terms(
     let mask = match config.loss.mask > 0.0 {
         false => zero(),
         true => mask_loss(
-            rendering.opacity.clone(),
+            rendering.opacity,
             Tensor::from_data(TensorData::new(batch.silhouette.clone(), [rays, 1]), device),
         ),
     };
@@ -155,14 +190,8 @@ pub(crate) fn ray_terms(
         eikonal,
         mask,
         color,
-        ends: rendering.segments,
-        // Where no ray carries a segment nobody asks.
-        opacity: match segment_rays == rays || segment_rays == 0 {
-            true => rendering.opacity,
-            false => rendering.opacity.narrow(0, 0, segment_rays),
-        },
+        segments,
         rows,
-        eikonal_rows,
     }
 }
 
@@ -184,16 +213,14 @@ pub fn step_loss(
         eikonal,
         mask,
         color,
-        ends,
-        opacity,
+        segments,
         rows,
-        ..
     } = ray_terms(model, input, beta, config, device);
 
     let (mut segment, mut segment_errors) = (zero(), Vec::new());
     let (mut junction_3d, mut junction_2d, mut targets) = (zero(), zero(), 0);
     let mut assignment = Duration::ZERO;
-    if let Some(ends) = ends {
+    if let Some(RenderedSegments { ends, opacity }) = segments {
         let compared = match is_fused(device) && ends.dtype() == DType::F32 {
             true => compare_on_host(ends, opacity, input, config),
             false => compare_on_device(ends, opacity, input, config, device),
