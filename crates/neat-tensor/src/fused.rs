@@ -15,11 +15,11 @@ use crate::kernels::softplus_network::{
 use burn::backend::tensor::{Device as BackendDevice, FloatTensor};
 use burn::backend::{Backend, TensorMetadata, backend_extension};
 use burn::tensor::{DType, Device, Tensor, TensorData};
-use burn_autodiff::Autodiff;
 use burn_autodiff::checkpoint::base::Checkpointer;
 use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn_autodiff::grads::Gradients;
 use burn_autodiff::ops::{Backward, Ops, OpsKind};
+use burn_autodiff::{Autodiff, NodeId};
 use pulp::Arch;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -352,7 +352,7 @@ impl<B: Backend> Backward<B, 2> for SoftplusOp {
             gradient: adjoint_or(1, &gradient),
             others: adjoint_or(2, &[]),
         };
-        let [of_points, of_parameters] = ops.parents;
+        let [of_points, of_parameters] = ops.parents.map(|node| Some(node?.id));
         let (to_parameters, to_points) = network.backward(
             points,
             request.known.as_ref().map(KnownRows::as_known),
@@ -360,13 +360,23 @@ impl<B: Backend> Backward<B, 2> for SoftplusOp {
             tape.take(),
             of_points.is_some(),
         );
-        if let Some(node) = of_parameters {
-            let len = to_parameters.len();
-            gradients.register::<B>(node.id, write::<B>(to_parameters, [len], &device));
-        }
+        register_flat::<B>(gradients, of_parameters, to_parameters, &device);
         if let (Some(node), Some(to_points)) = (of_points, to_points) {
-            gradients.register::<B>(node.id, write::<B>(to_points, [rows, 3], &device));
+            gradients.register::<B>(node, write::<B>(to_points, [rows, 3], &device));
         }
+    }
+}
+
+/// Hands the gradient of flat parameters to their node, if they have one.
+fn register_flat<B: Backend>(
+    gradients: &mut Gradients,
+    node: Option<NodeId>,
+    values: Vec<f32>,
+    device: &BackendDevice<B>,
+) {
+    if let Some(node) = node {
+        let len = values.len();
+        gradients.register::<B>(node, write::<B>(values, [len], device));
     }
 }
 
@@ -459,10 +469,7 @@ impl<B: Backend> Backward<B, 4> for ReluOp {
             tape.take(),
             &nodes.each_ref().map(Option::is_some),
         );
-        if let Some(node) = of_parameters {
-            let len = to_parameters.len();
-            gradients.register::<B>(node, write::<B>(to_parameters, [len], &device));
-        }
+        register_flat::<B>(gradients, of_parameters, to_parameters, &device);
         for (node, to_input) in nodes.into_iter().zip(to_inputs) {
             if let (Some(node), Some(to_input)) = (node, to_input) {
                 let width = to_input.len().checked_div(rows).unwrap_or(0);

@@ -2,8 +2,8 @@
 
 use crate::encoding::PositionalEncoding;
 use crate::fused;
+use crate::kernels::layers::LayerShape;
 use crate::kernels::relu_network::{PartShape, ReluShape};
-use crate::kernels::weight_gradient::LayerShape;
 use crate::random::standard_normal;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData, activation};

@@ -13,6 +13,7 @@ pub mod arena;
 pub mod block;
 pub mod density;
 pub mod gemm;
+pub mod layers;
 pub mod relu_network;
 pub mod simd_math;
 pub mod softplus_network;

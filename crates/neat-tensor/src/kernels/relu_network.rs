@@ -3,8 +3,9 @@
 
 use super::arena::{Arena, Pooled, with_arena};
 use super::block;
-use super::gemm::{Panels, add_outer_products, multiply};
-use super::weight_gradient::{LayerShape, WeightGradient, split_parameters, sum_over_blocks};
+use super::gemm::{add_outer_products, multiply};
+use super::layers::{LayerShape, PackedLayers, block_size, cut_block, per_block, widest};
+use super::weight_gradient::{WeightGradient, sum_over_blocks};
 use super::{BLOCK_ROWS, padded};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -39,14 +40,12 @@ impl PartShape {
     }
 }
 
-/// A perceptron with its weights packed for products in both directions.
+/// A perceptron with its weights packed.
 #[derive(Debug)]
 pub struct ReluNetwork {
     shape: ReluShape,
     arch: Arch,
-    forward: Vec<Panels>,
-    backward: Vec<Panels>,
-    biases: Vec<Vec<f32>>,
+    packed: PackedLayers,
 }
 
 /// Activations of a forward pass, block after block.
@@ -63,18 +62,12 @@ impl ReluShape {
         self.layers[self.hidden()].outputs
     }
 
-    fn widest(&self) -> usize {
-        let widths = self.layers.iter().flat_map(|l| [l.inputs, l.outputs]);
-        padded(widths.max().unwrap_or(0))
-    }
-
     fn block_tape(&self) -> usize {
-        let hidden = &self.layers[..self.hidden()];
-        BLOCK_ROWS * hidden.iter().map(|l| padded(l.outputs)).sum::<usize>()
+        block_size(&self.layers[..self.hidden()])
     }
 
     fn scratch(&self) -> usize {
-        BLOCK_ROWS * 5 * self.widest() + self.block_tape()
+        BLOCK_ROWS * 5 * widest(&self.layers) + self.block_tape()
     }
 
     /// Bytes that the tape of `rows` rows takes.
@@ -83,10 +76,7 @@ impl ReluShape {
     }
 
     fn cut_tape<'a>(&self, arena: &mut Arena<'a>) -> Vec<&'a mut [f32]> {
-        self.layers[..self.hidden()]
-            .iter()
-            .map(|l| arena.take(BLOCK_ROWS * padded(l.outputs)))
-            .collect()
+        cut_block(&self.layers[..self.hidden()], arena)
     }
 }
 
@@ -106,29 +96,15 @@ impl ReluNetwork {
     /// # Panics
     /// If they do not fit the shape.
     pub fn new(arch: Arch, shape: &ReluShape, parameters: &[f32]) -> Self {
-        let parameters = split_parameters(&shape.layers, parameters);
         assert_eq!(
             shape.layers[0].inputs,
             shape.parts.iter().map(PartShape::encoded).sum::<usize>(),
             "ReluNetwork::new: parts do not fit the first layer"
         );
-        let (mut forward, mut backward, mut biases) = (Vec::new(), Vec::new(), Vec::new());
-        for (layer, (weight, bias)) in shape.layers.iter().zip(parameters) {
-            let n = layer.inputs;
-            forward.push(Panels::new(arch, n, layer.outputs, |k, c| {
-                weight[c * n + k]
-            }));
-            backward.push(Panels::new(arch, layer.outputs, n, |k, c| {
-                weight[k * n + c]
-            }));
-            biases.push(layer.padded_bias(bias));
-        }
         Self {
+            packed: PackedLayers::new(arch, &shape.layers, parameters),
             shape: shape.clone(),
             arch,
-            forward,
-            backward,
-            biases,
         }
     }
 
@@ -140,11 +116,8 @@ impl ReluNetwork {
         let of_block = self.shape.block_tape();
         let mut out = vec![0.0; rows * width];
         let mut tape = Pooled::take(if keep { blocks * of_block } else { 0 });
-        let mut tapes: Vec<Option<&mut [f32]>> = if keep {
-            tape.as_mut_slice().chunks_mut(of_block).map(Some).collect()
-        } else {
-            (0..blocks).map(|_| None).collect()
-        };
+        let kept = keep.then(|| tape.as_mut_slice());
+        let mut tapes = per_block(kept, of_block, blocks);
         out.par_chunks_mut(BLOCK_ROWS * width)
             .zip(tapes.par_iter_mut())
             .enumerate()
@@ -155,14 +128,15 @@ impl ReluNetwork {
                         None => self.shape.cut_tape(arena),
                     };
                     let rows = out.len() / width;
-                    let input = arena.take(BLOCK_ROWS * self.shape.widest());
+                    let input = arena.take(BLOCK_ROWS * widest(&self.shape.layers));
                     self.gather(block * BLOCK_ROWS, rows, sources, input, arena);
                     self.activations(input, &mut h);
                     let last = h.last().map_or(&*input, |h| &**h);
                     let l = self.shape.hidden();
                     let (stride, columns) = (self.stride(l), padded(width));
                     let y = arena.take(BLOCK_ROWS * columns);
-                    let (weight, bias) = (&self.forward[l], Some(&self.biases[l][..]));
+                    let (weight, bias) =
+                        (&self.packed.forward[l], Some(&self.packed.biases[l][..]));
                     multiply(
                         self.arch, BLOCK_ROWS, last, stride, weight, bias, y, columns,
                     );
@@ -194,7 +168,7 @@ impl ReluNetwork {
         for row in input.chunks_exact_mut(stride).skip(rows) {
             row.fill(0.0);
         }
-        let dense = arena.take(BLOCK_ROWS * self.shape.widest());
+        let dense = arena.take(BLOCK_ROWS * widest(&self.shape.layers));
         let mut column = 0;
         for part in &self.shape.parts {
             let (width, octaves) = (part.width, part.octaves);
@@ -215,7 +189,7 @@ impl ReluNetwork {
             let (done, next) = h.split_at_mut(l);
             let input = done.last().map_or(input, |h| &**h);
             let columns = padded(self.shape.layers[l].outputs);
-            let (weight, bias) = (&self.forward[l], Some(&self.biases[l][..]));
+            let (weight, bias) = (&self.packed.forward[l], Some(&self.packed.biases[l][..]));
             let (z, stride) = (&mut *next[0], self.stride(l));
             multiply(
                 self.arch, BLOCK_ROWS, input, stride, weight, bias, z, columns,
@@ -283,7 +257,7 @@ impl ReluNetwork {
         arena: &mut Arena<'_>,
     ) {
         let (arch, shape) = (self.arch, &self.shape);
-        let input = arena.take(BLOCK_ROWS * shape.widest());
+        let input = arena.take(BLOCK_ROWS * widest(&shape.layers));
         self.gather(job.first_row, job.rows, sources, input, arena);
         let h = match job.tape {
             Some(tape) => shape.cut_tape(&mut Arena::new(tape)),
@@ -293,8 +267,8 @@ impl ReluNetwork {
                 h
             }
         };
-        let mut z = arena.take(BLOCK_ROWS * shape.widest());
-        let mut before = arena.take(BLOCK_ROWS * shape.widest());
+        let mut z = arena.take(BLOCK_ROWS * widest(&shape.layers));
+        let mut before = arena.take(BLOCK_ROWS * widest(&shape.layers));
         let width = shape.outputs();
         let columns = padded(width);
         let y = &mut z[..BLOCK_ROWS * columns];
@@ -324,7 +298,7 @@ impl ReluNetwork {
             );
             block::add_column_sums(arch, zl, columns, sum.bias(l));
             if l > 0 || to_input {
-                let weight = &self.backward[l];
+                let weight = &self.packed.backward[l];
                 multiply(arch, BLOCK_ROWS, zl, columns, weight, None, before, stride);
                 std::mem::swap(&mut z, &mut before);
             }

@@ -1,56 +1,15 @@
 //! Gradients of weights, summed over blocks in an order that no thread decides.
 
 use super::arena::Pooled;
+use super::layers::LayerShape;
 use super::padded;
 use rayon::prelude::*;
 
-/// Size of one affine layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LayerShape {
-    /// Width of its input.
-    pub inputs: usize,
-    /// Width of its output.
-    pub outputs: usize,
-}
-
 impl LayerShape {
-    /// Number of weights and biases.
-    pub fn parameters(&self) -> usize {
-        (self.inputs + 1) * self.outputs
-    }
-
-    pub(super) fn padded_bias(&self, bias: &[f32]) -> Vec<f32> {
-        let mut padded_bias = vec![0.0; padded(self.outputs)];
-        padded_bias[..self.outputs].copy_from_slice(bias);
-        padded_bias
-    }
-
     /// Numbers of this layer's gradient with padded rows.
     fn padded_parameters(&self) -> usize {
         self.outputs * padded(self.inputs) + padded(self.outputs)
     }
-}
-
-/// Weight `[outputs, inputs]` and bias of each layer, cut from `parameters`.
-///
-/// # Panics
-/// If their number is another.
-pub(super) fn split_parameters<'a>(
-    layers: &[LayerShape],
-    parameters: &'a [f32],
-) -> Vec<(&'a [f32], &'a [f32])> {
-    let wanted: usize = layers.iter().map(LayerShape::parameters).sum();
-    assert_eq!(parameters.len(), wanted, "parameters do not fit the layers");
-    let mut rest = parameters;
-    layers
-        .iter()
-        .map(|layer| {
-            let (weight, tail) = rest.split_at(layer.inputs * layer.outputs);
-            let (bias, tail) = tail.split_at(layer.outputs);
-            rest = tail;
-            (weight, bias)
-        })
-        .collect()
 }
 
 /// The gradient of all layers that some blocks contribute to.

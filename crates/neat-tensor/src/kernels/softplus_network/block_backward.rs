@@ -6,6 +6,7 @@ use super::{Known, POINT, SoftplusNetwork};
 use crate::kernels::arena::Arena;
 use crate::kernels::block::{self, SweepAdjoint};
 use crate::kernels::gemm::{add_outer_products, multiply};
+use crate::kernels::layers::widest;
 use crate::kernels::weight_gradient::WeightGradient;
 use crate::kernels::{BLOCK_ROWS, padded};
 
@@ -51,7 +52,7 @@ impl SoftplusNetwork {
                 None => shape.cut_tape(arena),
             },
             encoding: arena.take(BLOCK_ROWS * padded(shape.encoded())),
-            joined: arena.take(BLOCK_ROWS * shape.widest()),
+            joined: arena.take(BLOCK_ROWS * widest(&shape.layers)),
             slopes: Vec::new(),
             through: Vec::new(),
         };
@@ -120,8 +121,8 @@ impl SoftplusNetwork {
             block::push_forward(encoding, n, shape.octaves, tangent);
         }
         // p̄_l, then ū_l and ḡ_l.
-        let p = arena.take(BLOCK_ROWS * shape.widest());
-        let up = arena.take(BLOCK_ROWS * shape.widest());
+        let p = arena.take(BLOCK_ROWS * widest(&shape.layers));
+        let up = arena.take(BLOCK_ROWS * widest(&shape.layers));
         p[..tangent.len()].copy_from_slice(tangent);
         for l in 0..hidden {
             let layer = shape.layers[l];
@@ -133,7 +134,7 @@ impl SoftplusNetwork {
                 p[..BLOCK_ROWS * inputs].copy_from_slice(&joined[..BLOCK_ROWS * inputs]);
             }
             let up = &mut up[..size];
-            let weight = &self.forward[l];
+            let weight = &self.packed.forward[l];
             multiply(arch, BLOCK_ROWS, p, inputs, weight, None, up, width);
             if slopes.len() <= l {
                 slopes.push(arena.take(size));
@@ -195,15 +196,15 @@ impl SoftplusNetwork {
             slopes,
             through,
         } = pass;
-        let mut adjoint = arena.take(BLOCK_ROWS * shape.widest());
-        let mut before = arena.take(BLOCK_ROWS * shape.widest());
+        let mut adjoint = arena.take(BLOCK_ROWS * widest(&shape.layers));
+        let mut before = arena.take(BLOCK_ROWS * widest(&shape.layers));
         let to_encoding = arena.take(BLOCK_ROWS * padded(shape.encoded()));
         to_encoding.fill(0.0);
 
         let stride = padded(shape.layers[hidden].inputs);
         let (outputs, weight) = match adjoint_of.others {
             None => (1, &self.first_backward),
-            Some(_) => (shape.layers[hidden].outputs, &self.backward[hidden]),
+            Some(_) => (shape.layers[hidden].outputs, &self.packed.backward[hidden]),
         };
         let width = padded(outputs);
         let y = &mut before[..BLOCK_ROWS * width];
@@ -237,7 +238,7 @@ impl SoftplusNetwork {
             if l == 0 && !to_points {
                 break;
             }
-            let weight = &self.backward[l];
+            let weight = &self.packed.backward[l];
             multiply(arch, BLOCK_ROWS, z, width, weight, None, before, stride);
             if l == 0 {
                 for (sum, x) in to_encoding.iter_mut().zip(&*before) {

@@ -3,6 +3,7 @@
 use super::{Known, POINT, SoftplusNetwork, SoftplusShape};
 use crate::kernels::arena::Arena;
 use crate::kernels::gemm::multiply;
+use crate::kernels::layers::{cut_block, widest};
 use crate::kernels::{BLOCK_ROWS, PADDING, block, padded};
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -24,20 +25,11 @@ pub(super) struct Wanted<'a> {
 }
 
 impl SoftplusShape {
-    pub(super) fn cut_values<'a>(&self, arena: &mut Arena<'a>) -> Vec<&'a mut [f32]> {
-        self.layers[..self.hidden()]
-            .iter()
-            .map(|l| arena.take(BLOCK_ROWS * padded(l.outputs)))
-            .collect()
-    }
-
     pub(super) fn cut_tape<'a>(&self, arena: &mut Arena<'a>) -> BlockTape<'a> {
+        let hidden = self.hidden_layers();
         BlockTape {
-            h: self.cut_values(arena),
-            g: self.layers[..self.hidden() - 1]
-                .iter()
-                .map(|l| arena.take(BLOCK_ROWS * padded(l.outputs)))
-                .collect(),
+            h: cut_block(hidden, arena),
+            g: cut_block(&hidden[..hidden.len() - 1], arena),
             g_encoding: arena.take(BLOCK_ROWS * padded(self.encoded())),
         }
     }
@@ -157,7 +149,7 @@ impl SoftplusNetwork {
         let (arch, hidden) = (self.arch, shape.hidden());
         let rows = points.len() / POINT;
         let encoding = arena.take(BLOCK_ROWS * padded(shape.encoded()));
-        let joined = arena.take(BLOCK_ROWS * shape.widest());
+        let joined = arena.take(BLOCK_ROWS * widest(&shape.layers));
         self.encode(points, encoding);
         let slopes = match known {
             None => self.activations(tape, encoding, joined, wanted.gradient.is_some(), arena),
@@ -168,7 +160,7 @@ impl SoftplusNetwork {
         };
         let last = &*tape.h[hidden - 1];
         let stride = padded(shape.layers[hidden].inputs);
-        let bias = &self.biases[hidden];
+        let bias = &self.packed.biases[hidden];
         match wanted.others {
             None => {
                 let y = &mut joined[..BLOCK_ROWS * PADDING];
@@ -190,7 +182,7 @@ impl SoftplusNetwork {
             Some(others) => {
                 let width = padded(shape.layers[hidden].outputs);
                 let y = &mut joined[..BLOCK_ROWS * width];
-                let (weight, bias) = (&self.forward[hidden], Some(&bias[..]));
+                let (weight, bias) = (&self.packed.forward[hidden], Some(&bias[..]));
                 multiply(arch, BLOCK_ROWS, last, stride, weight, bias, y, width);
                 let count = self.others();
                 for ((first, others), y) in wanted
@@ -234,7 +226,7 @@ impl SoftplusNetwork {
             let (input, stride) = self.input(l, done, encoding, joined);
             let width = padded(self.shape.layers[l].outputs);
             let z = &mut *next[0];
-            let (weight, bias) = (&self.forward[l], Some(&self.biases[l][..]));
+            let (weight, bias) = (&self.packed.forward[l], Some(&self.packed.biases[l][..]));
             multiply(self.arch, BLOCK_ROWS, input, stride, weight, bias, z, width);
             let mut slope = slopes.then(|| arena.take(z.len()));
             block::softplus(self.arch, z, self.shape.sharpness, slope.as_deref_mut());
@@ -282,7 +274,7 @@ impl SoftplusNetwork {
     ) {
         let shape = &self.shape;
         let (arch, hidden) = (self.arch, shape.hidden());
-        let u = arena.take(BLOCK_ROWS * shape.widest());
+        let u = arena.take(BLOCK_ROWS * widest(&shape.layers));
         tape.g_encoding.fill(0.0);
         for l in (0..hidden).rev() {
             let width = padded(shape.layers[l].outputs);
@@ -293,7 +285,7 @@ impl SoftplusNetwork {
                 block::product(arch, tape.g[l], slopes[l], u);
             }
             let inputs = padded(shape.layers[l].inputs);
-            let weight = &self.backward[l];
+            let weight = &self.packed.backward[l];
             if l == 0 {
                 let p = &mut joined[..BLOCK_ROWS * inputs];
                 multiply(arch, BLOCK_ROWS, u, width, weight, None, p, inputs);

@@ -23,7 +23,8 @@ use block_forward::{BlockTape, Wanted};
 
 use super::arena::{Arena, Pooled, with_arena};
 use super::gemm::Panels;
-use super::weight_gradient::{LayerShape, split_parameters, sum_over_blocks};
+use super::layers::{LayerShape, PackedLayers, block_size, cut_block, per_block, widest};
+use super::weight_gradient::sum_over_blocks;
 use super::{BLOCK_ROWS, padded};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -44,17 +45,12 @@ pub struct SoftplusShape {
     pub sharpness: f32,
 }
 
-/// A network with its weights packed for products in both directions.
+/// A network with its weights packed.
 #[derive(Debug)]
 pub struct SoftplusNetwork {
     shape: SoftplusShape,
     arch: Arch,
-    /// `W_lᵀ` as right operand: `z = a Wᵀ`.
-    forward: Vec<Panels>,
-    /// `W_l` as right operand: `p = u W`.
-    backward: Vec<Panels>,
-    /// `[padded(outputs)]` each.
-    biases: Vec<Vec<f32>>,
+    packed: PackedLayers,
     /// The first output's column of the last layer, as right operand.
     first_forward: Panels,
     /// … its row, as right operand of one-column left operands.
@@ -122,35 +118,31 @@ impl SoftplusShape {
         self.layers.len() - 1
     }
 
+    fn hidden_layers(&self) -> &[LayerShape] {
+        &self.layers[..self.hidden()]
+    }
+
     fn encoded(&self) -> usize {
         POINT * (1 + 2 * self.octaves)
     }
 
-    fn widest(&self) -> usize {
-        let widths = self.layers.iter().flat_map(|l| [l.inputs, l.outputs]);
-        padded(widths.max().unwrap_or(0))
-    }
-
     /// Numbers of a block's activations.
     fn block_values(&self) -> usize {
-        let hidden = &self.layers[..self.hidden()];
-        BLOCK_ROWS * hidden.iter().map(|l| padded(l.outputs)).sum::<usize>()
+        block_size(self.hidden_layers())
     }
 
     /// Numbers of a block's tape: activations, and what the sweep leaves.
     fn block_tape(&self) -> usize {
         let swept = &self.layers[..self.hidden() - 1];
-        let sweep: usize = swept.iter().map(|l| padded(l.outputs)).sum();
-        self.block_values() + BLOCK_ROWS * (sweep + padded(self.encoded()))
+        self.block_values() + block_size(swept) + BLOCK_ROWS * padded(self.encoded())
     }
 
     /// Numbers of working memory that any pass over a block needs.
     fn scratch(&self) -> usize {
-        let hidden = self.hidden();
+        let (hidden, widest) = (self.hidden(), widest(&self.layers));
         // Slopes and second-order terms of all layers, encoding and its adjoints,
         // and a handful of matrices of the widest layer; a tape where none is kept.
-        BLOCK_ROWS * (2 * hidden * self.widest() + 6 * self.widest() + 4 * padded(self.encoded()))
-            + self.block_tape()
+        BLOCK_ROWS * ((2 * hidden + 6) * widest + 4 * padded(self.encoded())) + self.block_tape()
     }
 
     /// Bytes that the tape of `rows` rows takes.
@@ -171,39 +163,18 @@ impl SoftplusNetwork {
     /// # Panics
     /// If they do not fit the shape.
     pub fn new(arch: Arch, shape: &SoftplusShape, parameters: &[f32]) -> Self {
-        let parameters = split_parameters(&shape.layers, parameters);
-        let (mut forward, mut backward, mut biases) = (Vec::new(), Vec::new(), Vec::new());
-        let mut first = None;
-        for (l, (layer, (weight, bias))) in shape.layers.iter().zip(parameters).enumerate() {
-            let n = layer.inputs;
-            forward.push(Panels::new(arch, n, layer.outputs, |k, c| {
-                weight[c * n + k]
-            }));
-            backward.push(Panels::new(arch, layer.outputs, n, |k, c| {
-                weight[k * n + c]
-            }));
-            biases.push(layer.padded_bias(bias));
-            if l + 1 == shape.layers.len() {
-                let mut row = vec![0.0; padded(n)];
-                row[..n].copy_from_slice(&weight[..n]);
-                first = Some((
-                    Panels::new(arch, n, 1, |k, _| weight[k]),
-                    Panels::new(arch, 1, n, |_, c| weight[c]),
-                    row,
-                ));
-            }
-        }
-        let (first_forward, first_backward, first_row) =
-            first.expect("SoftplusNetwork::new: a network has layers");
+        let packed = PackedLayers::new(arch, &shape.layers, parameters);
+        let last = shape.layers[shape.hidden()];
+        let first_row = &parameters[parameters.len() - last.parameters()..][..last.inputs];
+        let mut padded_row = first_row.to_vec();
+        padded_row.resize(padded(last.inputs), 0.0);
         Self {
             shape: shape.clone(),
             arch,
-            forward,
-            backward,
-            biases,
-            first_forward,
-            first_backward,
-            first_row,
+            packed,
+            first_forward: Panels::new(arch, last.inputs, 1, |k, _| first_row[k]),
+            first_backward: Panels::new(arch, 1, last.inputs, |_, c| first_row[c]),
+            first_row: padded_row,
         }
     }
 
@@ -235,7 +206,7 @@ impl SoftplusNetwork {
             .for_each(|((first, points), values)| {
                 with_arena(self.shape.scratch(), |arena| {
                     let tape = BlockTape {
-                        h: self.shape.cut_values(&mut Arena::new(values)),
+                        h: cut_block(self.shape.hidden_layers(), &mut Arena::new(values)),
                         ..self.shape.cut_tape(arena)
                     };
                     self.block_first(points, first, tape, arena);
@@ -263,20 +234,10 @@ impl SoftplusNetwork {
         let blocks = rows.div_ceil(BLOCK_ROWS);
         let of_block = self.shape.block_tape();
         let mut tape = Pooled::take(if keep { blocks * of_block } else { 0 });
-        let mut tapes: Vec<Option<&mut [f32]>> = if keep {
-            tape.as_mut_slice().chunks_mut(of_block).map(Some).collect()
-        } else {
-            (0..blocks).map(|_| None).collect()
-        };
-        let mut others: Vec<Option<&mut [f32]>> = if width > 0 {
-            output
-                .others
-                .chunks_mut(BLOCK_ROWS * width)
-                .map(Some)
-                .collect()
-        } else {
-            (0..blocks).map(|_| None).collect()
-        };
+        let kept = keep.then(|| tape.as_mut_slice());
+        let mut tapes = per_block(kept, of_block, blocks);
+        let wanted = (width > 0).then_some(&mut output.others[..]);
+        let mut others = per_block(wanted, BLOCK_ROWS * width, blocks);
         output
             .first
             .par_chunks_mut(BLOCK_ROWS)
