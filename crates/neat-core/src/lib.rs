@@ -15,6 +15,7 @@
 
 pub mod assignment;
 pub mod camera;
+pub mod distortion;
 pub mod error;
 pub mod file;
 pub mod ground_truth;
@@ -29,9 +30,10 @@ pub mod wireframe2d;
 pub mod wireframe3d;
 
 pub use camera::{Camera, CameraError, Intrinsics, Projection, Ray};
+pub use distortion::Distortion;
 pub use error::{SceneError, ViewError};
 pub use layout::{LoadOptions, LoadedScene, load_scene};
 pub use line_segment::{LineSegment, LineSegment2, LineSegment3};
-pub use scene::{Scene, Similarity, View};
+pub use scene::{Observation, Scene, Similarity, SparsePoint, View};
 pub use wireframe2d::{ScoredSegment2, Wireframe2d, Wireframe2dError};
 pub use wireframe3d::Wireframe3d;

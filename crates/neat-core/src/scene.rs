@@ -2,7 +2,7 @@
 
 use crate::{Camera, SceneError, ViewError, Wireframe2d};
 use image::RgbImage;
-use nalgebra::{Matrix4, Vector3};
+use nalgebra::{Matrix4, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -56,6 +56,24 @@ pub struct View {
     pub image: RgbImage,
 }
 
+/// A point of a sparse reconstruction, such as structure from motion finds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SparsePoint {
+    /// Where it is, in the world of the cameras.
+    pub position_in_world: Vector3<f64>,
+    /// Where it was seen; empty where the files do not say.
+    pub observations: Vec<Observation>,
+}
+
+/// Where a view saw a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// Index of the view.
+    pub view: usize,
+    /// Image coordinates.
+    pub pixel: Vector2<f64>,
+}
+
 /// Posed images with their 2D wireframes, in one world frame.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -68,6 +86,9 @@ pub struct Scene {
     /// Image coordinates of the centre of pixel (0, 0), on both axes: 0.5 where
     /// the intrinsics' origin is the image corner, 0 where it is that centre.
     pub pixel_center: f64,
+    /// Points of the reconstruction that the poses come from, where the files
+    /// hold them.
+    pub sparse_points: Vec<SparsePoint>,
 }
 
 /// Every object of a scene should lie within this share of the space that all
@@ -154,6 +175,9 @@ impl Scene {
         for view in &mut self.views {
             view.camera.center_in_world *= factor;
         }
+        for point in &mut self.sparse_points {
+            point.position_in_world *= factor;
+        }
         self.original_from_world.scale /= factor;
         self
     }
@@ -214,6 +238,7 @@ mod tests {
             views,
             original_from_world: Similarity::identity(),
             pixel_center: 0.5,
+            sparse_points: Vec::new(),
         }
     }
 

@@ -60,6 +60,7 @@ fn scene() -> Scene {
             translation: Vector3::new(5.0, 7.5, 3.0),
         },
         pixel_center: 0.5,
+        sparse_points: Vec::new(),
     }
 }
 

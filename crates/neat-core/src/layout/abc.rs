@@ -16,7 +16,7 @@ use super::poses::{
     similarity_of, view_error, wrong_shape,
 };
 use crate::npz::{NpyArray, NpzReader, write_npz};
-use crate::{Scene, SceneError, Similarity, ViewError, file, hawp_json};
+use crate::{Distortion, Scene, SceneError, Similarity, ViewError, file, hawp_json};
 use nalgebra::{Matrix3, Matrix4, SMatrix};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -52,6 +52,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
             name,
             image,
             intrinsics,
+            distortion: Distortion::None,
             world_from_camera,
             size: None,
         });
@@ -61,6 +62,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     Ok(Poses {
         original_from_world: read_scale_mat(&mut npz, &path)?,
         pixel_center: read_pixel_center(&mut npz, &path)?,
+        points: Vec::new(),
         path,
         views,
     })

@@ -8,7 +8,7 @@
 use super::images::with_existing_ending;
 use super::poses::{PosedImage, Poses, similarity_of, view_error};
 use crate::hawp_json::file_stem;
-use crate::{Intrinsics, SceneError, Similarity, file};
+use crate::{Distortion, Intrinsics, SceneError, Similarity, file};
 use nalgebra::{Matrix3, Matrix4};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -57,6 +57,7 @@ fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
             image: with_existing_ending(dir.join(&frame.file)),
             name,
             intrinsics,
+            distortion: Distortion::None,
             world_from_camera: Matrix4::from(frame.c2w).transpose(),
             size: Some((frame.width, frame.height)),
         });
@@ -67,6 +68,7 @@ fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
         views,
         original_from_world,
         pixel_center: None,
+        points: Vec::new(),
     })
 }
 

@@ -21,7 +21,7 @@ use super::images;
 use super::poses::{PosedImage, Poses, view_error};
 use crate::hawp_json::file_stem;
 use crate::scene::check_names;
-use crate::{CameraError, Intrinsics, SceneError, Similarity, file};
+use crate::{CameraError, Distortion, Intrinsics, SceneError, Similarity, file};
 use camera_model::CameraModel;
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
@@ -156,6 +156,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         views.push(PosedImage {
             image: images::with_existing_ending(images_dir.join(relative)),
             intrinsics: intrinsics_of(camera, &cameras_path, &name)?,
+            distortion: Distortion::None,
             world_from_camera: world_from_camera(&image, &origin, &path, &name)?,
             size: Some(size_of(camera, &cameras_path)?),
             name,
@@ -171,6 +172,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
             translation: origin,
         },
         pixel_center: Some(PIXEL_CENTER),
+        points: Vec::new(),
     })
 }
 

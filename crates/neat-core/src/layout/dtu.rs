@@ -13,7 +13,7 @@ use super::poses::{
 };
 use crate::hawp_json::file_stem;
 use crate::npz::NpzReader;
-use crate::{CameraError, Intrinsics, SceneError};
+use crate::{CameraError, Distortion, Intrinsics, SceneError};
 use nalgebra::{Matrix3, Matrix4};
 use std::path::Path;
 
@@ -59,6 +59,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
             name,
             image,
             intrinsics,
+            distortion: Distortion::None,
             world_from_camera,
             size: None,
         });
@@ -74,6 +75,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         views,
         original_from_world,
         pixel_center: None,
+        points: Vec::new(),
     })
 }
 

@@ -16,7 +16,9 @@ pub use pixel_center::PixelCenter;
 
 use crate::npz::NpzReader;
 use crate::scene::{check_image_size, check_names};
-use crate::{Camera, Scene, SceneError, View, ViewError, Wireframe2d, hawp_json};
+use crate::{
+    Camera, Observation, Scene, SceneError, SparsePoint, View, ViewError, Wireframe2d, hawp_json,
+};
 use image::RgbImage;
 use poses::{PosedImage, Poses};
 use rayon::prelude::*;
@@ -229,6 +231,8 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
     })?;
 
     let mut views = Vec::new();
+    // Where each view of the files is in `views`, if it is kept.
+    let mut kept = Vec::new();
     for ((posed, (camera, image)), wireframe) in poses.views.iter().zip(photos).zip(wireframes) {
         let view = View {
             name: posed.name.clone(),
@@ -244,7 +248,9 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
                 view: view.name,
                 min_segment_score: options.min_segment_score,
             });
+            kept.push(None);
         } else {
+            kept.push(Some(views.len()));
             views.push(view);
         }
     }
@@ -261,10 +267,25 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
             views,
             original_from_world: poses.original_from_world,
             pixel_center,
+            sparse_points: observed_by(poses.points, &kept),
         },
         layout,
         warnings,
     })
+}
+
+/// `points` with the observations of the views that are kept, under their new
+/// indices.
+fn observed_by(mut points: Vec<SparsePoint>, kept: &[Option<usize>]) -> Vec<SparsePoint> {
+    for point in &mut points {
+        point.observations = (point.observations.iter())
+            .filter_map(|&Observation { view, pixel }| {
+                let view = *kept.get(view)?;
+                view.map(|view| Observation { view, pixel })
+            })
+            .collect();
+    }
+    points
 }
 
 /// The camera of `posed`, for its decoded `image`. `path` is that of the poses.

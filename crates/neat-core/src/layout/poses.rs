@@ -1,7 +1,7 @@
 //! What every layout says about its images: file, intrinsics and pose.
 
 use crate::npz::NpyArray;
-use crate::{CameraError, Intrinsics, SceneError, Similarity, ViewError};
+use crate::{CameraError, Distortion, Intrinsics, SceneError, Similarity, SparsePoint, ViewError};
 use nalgebra::{Matrix3, Matrix4};
 use std::path::{Path, PathBuf};
 
@@ -15,6 +15,9 @@ pub(super) struct Poses {
     pub original_from_world: Similarity,
     /// Where the layout says where pixel centres are, in pixels.
     pub pixel_center: Option<f64>,
+    /// Sparse points of the reconstruction, in the world of the poses, observed
+    /// in the photographs as they are on disk; empty where there are none.
+    pub points: Vec<SparsePoint>,
 }
 
 /// An image on disk with its camera.
@@ -23,8 +26,10 @@ pub(super) struct PosedImage {
     pub name: String,
     /// The image.
     pub image: PathBuf,
-    /// Its intrinsics.
+    /// Its intrinsics, for the image as it is on disk.
     pub intrinsics: Intrinsics,
+    /// Its lens.
+    pub distortion: Distortion,
     /// Its 4×4 camera-to-world matrix.
     pub world_from_camera: Matrix4<f64>,
     /// Width and height, where the layout gives them.

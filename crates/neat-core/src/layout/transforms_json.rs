@@ -11,7 +11,7 @@ use super::images::{ENDINGS, has_known_ending, read_size, with_existing_ending};
 use super::poses::{PosedImage, Poses, upper_left, view_error};
 use crate::hawp_json::file_stem;
 use crate::scene::check_names;
-use crate::{Intrinsics, SceneError, Similarity, file};
+use crate::{Distortion, Intrinsics, SceneError, Similarity, file};
 use nalgebra::Matrix4;
 use serde::Deserialize;
 use std::f64::consts::PI;
@@ -116,6 +116,7 @@ fn parse(bytes: &[u8], path: PathBuf, dir: &Path) -> Result<Poses, SceneError> {
         views,
         original_from_world: Similarity::identity(),
         pixel_center: middle_for_all.then_some(PIXEL_CENTER_OF_MIDDLE),
+        points: Vec::new(),
     })
 }
 
@@ -142,6 +143,7 @@ impl FrameContext<'_> {
             name,
             image,
             intrinsics,
+            distortion: Distortion::None,
             world_from_camera,
             size,
         })

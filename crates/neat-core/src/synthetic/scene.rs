@@ -179,6 +179,7 @@ pub fn generate(config: &SyntheticScene) -> Result<SyntheticData, SyntheticError
             views,
             original_from_world: Similarity::identity(),
             pixel_center: 0.5,
+            sparse_points: Vec::new(),
         },
         truth: solid.wireframe().clone(),
         solid,

@@ -1,0 +1,1 @@
+//! Examines a posed scene: do poses, intrinsics and images agree?
