@@ -282,6 +282,13 @@ impl Camera {
         }
     }
 
+    /// Whether a world point lies in front of the camera and within the image.
+    pub fn sees(&self, point_in_world: &Vector3<f64>) -> bool {
+        let Projection { pixel, depth, .. } = self.project(point_in_world);
+        let within = |x: f64, size: u32| (0.0..f64::from(size)).contains(&x);
+        depth > 0.0 && within(pixel.x, self.width) && within(pixel.y, self.height)
+    }
+
     /// The ray through a point given in image coordinates.
     pub fn ray_through(&self, point_in_image: &Vector2<f64>) -> Ray {
         let calibrated = self.intrinsics.calibrate(point_in_image);

@@ -152,6 +152,16 @@ pub enum SceneError {
         /// The minimum score.
         min_segment_score: f64,
     },
+    /// A scene sphere that cannot be placed as asked for.
+    #[error(
+        "the scene sphere of {path} cannot be placed: there is {evidence}; choose another with --scene-sphere, such as cameras, points, or x,y,z,radius"
+    )]
+    NoSphere {
+        /// The scene.
+        path: PathBuf,
+        /// What it lacks.
+        evidence: &'static str,
+    },
     /// A folder that follows none of the known layouts.
     #[error(
         "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics` or with `world_mat_0` and `scale_mat_0`, or cameras.json, or transforms.json, or a COLMAP model (cameras and images, .bin or .txt) in sparse/0, sparse or the folder itself"

@@ -5,7 +5,8 @@ use image::{Rgb, RgbImage};
 use nalgebra::{Vector2, Vector3};
 use neat_core::layout::Layout;
 use neat_core::{
-    LoadOptions, LoadedScene, Scene, SceneError, Similarity, Wireframe2d, hawp_json, load_scene,
+    LoadOptions, LoadedScene, Scene, SceneError, Similarity, SphereChoice, Wireframe2d, hawp_json,
+    load_scene,
 };
 use std::fs;
 use std::path::Path;
@@ -148,7 +149,12 @@ fn write_binary(dir: &Path, [cameras, images, points]: &[Vec<u8>; 3]) {
 }
 
 fn load(dir: &TempDir) -> Result<LoadedScene, SceneError> {
-    load_scene(dir.path(), &LoadOptions::default())
+    // The sphere has its own tests: here the frame of the files counts.
+    let options = LoadOptions {
+        sphere: SphereChoice::File,
+        ..LoadOptions::default()
+    };
+    load_scene(dir.path(), &options)
 }
 
 fn assert_same(a: &Scene, b: &Scene) {

@@ -5,8 +5,8 @@ use nalgebra::{Matrix4, Rotation3, Vector2, Vector3};
 use neat_core::layout::{Layout, PixelCenter, SceneWarning, abc};
 use neat_core::npz::{NpyArray, write_npz};
 use neat_core::{
-    Camera, Intrinsics, LoadOptions, LoadedScene, Scene, SceneError, Similarity, View, Wireframe2d,
-    load_scene,
+    Camera, Intrinsics, LoadOptions, LoadedScene, Scene, SceneError, Similarity, SphereChoice,
+    View, Wireframe2d, load_scene,
 };
 use std::collections::BTreeMap;
 use std::fs;
@@ -60,6 +60,7 @@ fn scene() -> Scene {
             translation: Vector3::new(5.0, 7.5, 3.0),
         },
         pixel_center: 0.5,
+        sphere_radius: 0.75,
         sparse_points: Vec::new(),
     }
 }
@@ -128,6 +129,7 @@ fn the_abc_layout_round_trips_exactly() {
         scene().original_from_world
     );
     assert_eq!(loaded.scene.pixel_center, 0.5);
+    assert_eq!(loaded.scene.sphere_radius, 0.75);
     loaded.scene.validate().unwrap();
 }
 
@@ -295,7 +297,11 @@ fn an_undecided_pixel_center_is_the_published_one_with_a_warning() {
         ),
     ]);
     write_npz(&dir.path().join("cameras.npz"), &arrays).unwrap();
-    let loaded = load(&dir).unwrap();
+    let options = LoadOptions {
+        sphere: SphereChoice::File,
+        ..LoadOptions::default()
+    };
+    let loaded = load_scene(dir.path(), &options).unwrap();
     assert_eq!(loaded.scene.pixel_center, 0.0);
     assert_eq!(
         loaded.warnings,

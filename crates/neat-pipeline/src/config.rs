@@ -3,6 +3,7 @@
 //! The tree is TOML on disk (`config.toml` of every run), starts from a preset,
 //! and takes `--set key.path=value` on top. Unknown keys are errors.
 
+use neat_core::SphereChoice;
 use neat_field::AttractionNetworkConfig;
 use neat_gjp::{CandidateConfig, MatchingConfig, PerceiverConfig};
 use neat_sdf::{DensityConfig, ImplicitNetworkConfig, RaySamplerConfig, RenderingNetworkConfig};
@@ -37,8 +38,12 @@ pub struct DataConfig {
     /// Pixels nearer to a 2D segment than this belong to its attraction region
     /// (τ_d of the paper).
     pub attraction_distance: f64,
-    /// Radius of the modelled ball around the origin. `None` scales the world so
-    /// that the ball that all cameras see has radius 1.
+    /// What places the scene sphere: `auto`, `file`, `points`, `cameras`, `masks`,
+    /// or `x,y,z,radius` in the frame of the files.
+    #[serde(default)]
+    pub scene_sphere: SphereChoice,
+    /// Radius of the modelled ball, in the unit of the poses. `None` takes that of
+    /// the scene sphere and scales the world so that it is 1.
     pub scene_radius: Option<f64>,
 }
 

@@ -63,6 +63,9 @@ pub enum Event<'a> {
         /// How long it took.
         seconds: f64,
     },
+    /// A fact about the scene that a person should check, such as where its sphere
+    /// is.
+    Note(String),
     /// Something that a person should know and that does not stop the run.
     Warning(String),
     /// A result that a person may want to open is on disk.

@@ -6,9 +6,9 @@ use std::path::Path;
 
 /// Reads the scene in the folder `dir`.
 ///
-/// Without a configured radius the world is scaled so that the ball that all
-/// cameras see has radius 1: every length of a configuration (β, grid, encoding)
-/// then means the same in a scene of millimetres and in one of metres.
+/// Without a configured radius the world is scaled so that the scene sphere has
+/// radius 1: every length of a configuration (β, grid, encoding) then means the
+/// same in a scene of millimetres and in one of metres.
 ///
 /// # Errors
 /// If the scene cannot be read.
@@ -16,6 +16,7 @@ pub fn read_scene(dir: &Path, config: &DataConfig) -> Result<LoadedScene, SceneE
     let options = LoadOptions {
         pixel_center: config.pixel_center,
         min_segment_score: config.min_segment_score,
+        sphere: config.scene_sphere,
         ..LoadOptions::default()
     };
     let mut loaded = load_scene(dir, &options)?;
@@ -25,10 +26,15 @@ pub fn read_scene(dir: &Path, config: &DataConfig) -> Result<LoadedScene, SceneE
 
 /// `scene` in the unit that the configuration wants.
 pub(crate) fn scaled_for(config: &DataConfig, scene: Scene) -> Scene {
-    let radius = scene.bounding_ball_radius();
-    match config.scene_radius.is_none() && radius.is_finite() && radius > 0.0 {
-        true => scene.scaled(1.0 / radius),
-        false => scene,
+    match config.scene_radius {
+        None => {
+            let radius = scene.sphere_radius;
+            scene.scaled(1.0 / radius)
+        }
+        Some(radius) => Scene {
+            sphere_radius: radius,
+            ..scene
+        },
     }
 }
 
@@ -58,7 +64,7 @@ mod tests {
 
         let mut config = Preset::Fast.config().data;
         let scaled = read_scene(dir.path(), &config).unwrap().scene;
-        assert!((scaled.bounding_ball_radius() - 1.0).abs() < 1e-12);
+        assert!((scaled.sphere_radius - 1.0).abs() < 1e-12);
         let camera = |scene: &neat_core::Scene| scene.views[1].camera.center_in_world;
         let back = scaled.original_from_world.apply(&camera(&scaled));
         assert!((back - camera(&in_millimetres)).norm() < 1e-9);
@@ -66,5 +72,6 @@ mod tests {
         config.scene_radius = Some(1500.0);
         let kept = read_scene(dir.path(), &config).unwrap().scene;
         assert!((camera(&kept) - camera(&in_millimetres)).norm() < 1e-9);
+        assert_eq!(kept.sphere_radius, 1500.0);
     }
 }

@@ -5,10 +5,10 @@
 //! - `cameras.npz`: `intrinsics` [N, 3, 3] or [N, 4, 4], `extrinsics` [N, 4, 4]
 //!   camera-to-world in OpenCV axes, in the order of the sorted image names.
 //!
-//! Two more arrays are written and, where they are, read: `scale_mat` [4, 4]
-//! leads from the world to the original frame, and `pixel_center` [] says which
-//! image coordinates the centre of the first pixel has. Other programs ignore
-//! them.
+//! Three more arrays are written and, where they are, read: `scale_mat` [4, 4]
+//! leads from the world to the original frame, `pixel_center` [] says which image
+//! coordinates the centre of the first pixel has, and `sphere_radius` [] how large
+//! the scene sphere around the origin is. Other programs ignore them.
 
 use super::images;
 use super::poses::{
@@ -26,6 +26,7 @@ pub(super) const INTRINSICS: &str = "intrinsics";
 pub(super) const EXTRINSICS: &str = "extrinsics";
 const SCALE_MAT: &str = "scale_mat";
 const PIXEL_CENTER: &str = "pixel_center";
+const SPHERE_RADIUS: &str = "sphere_radius";
 const IMAGES_DIR: &str = "images";
 /// The folder of 2D wireframes, in every layout.
 pub(super) const HAWP_DIR: &str = "hawp";
@@ -63,6 +64,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         original_from_world: read_scale_mat(&mut npz, &path)?,
         pixel_center: read_pixel_center(&mut npz, &path)?,
         points: Vec::new(),
+        declared_radius: read_sphere_radius(&mut npz, &path)?,
         path,
         views,
     })
@@ -88,14 +90,33 @@ fn read_scale_mat(npz: &mut NpzReader, path: &Path) -> Result<Similarity, SceneE
 }
 
 fn read_pixel_center(npz: &mut NpzReader, path: &Path) -> Result<Option<f64>, SceneError> {
-    if !npz.contains(PIXEL_CENTER) {
+    number(npz, path, PIXEL_CENTER, "0 or 0.5", |x| {
+        [0.0, 0.5].contains(&x)
+    })
+}
+
+fn read_sphere_radius(npz: &mut NpzReader, path: &Path) -> Result<Option<f64>, SceneError> {
+    number(npz, path, SPHERE_RADIUS, "a number above 0", |x| {
+        x.is_finite() && x > 0.0
+    })
+}
+
+/// The array `name` of one number, where there is one, which must be `expected`.
+fn number(
+    npz: &mut NpzReader,
+    path: &Path,
+    name: &str,
+    expected: &str,
+    is_good: impl Fn(f64) -> bool,
+) -> Result<Option<f64>, SceneError> {
+    if !npz.contains(name) {
         return Ok(None);
     }
-    match npz.array(PIXEL_CENTER)?.values.as_slice() {
-        [value] if [0.0, 0.5].contains(value) => Ok(Some(*value)),
+    match npz.array(name)?.values.as_slice() {
+        [value] if is_good(*value) => Ok(Some(*value)),
         other => Err(SceneError::Malformed {
             path: path.into(),
-            reason: format!("`{PIXEL_CENTER}` is {other:?}, not 0 or 0.5"),
+            reason: format!("`{name}` holds {other:?}, not {expected}"),
         }),
     }
 }
@@ -150,15 +171,18 @@ fn write_cameras(scene: &Scene, path: &Path) -> Result<(), SceneError> {
                 values: row_major(&scene.original_from_world.matrix()),
             },
         ),
-        (
-            PIXEL_CENTER,
-            NpyArray {
-                shape: vec![],
-                values: vec![scene.pixel_center],
-            },
-        ),
+        (PIXEL_CENTER, scalar(scene.pixel_center)),
+        (SPHERE_RADIUS, scalar(scene.sphere_radius)),
     ]);
     write_npz(path, &arrays)
+}
+
+/// An array of shape [].
+fn scalar(value: f64) -> NpyArray {
+    NpyArray {
+        shape: vec![],
+        values: vec![value],
+    }
 }
 
 /// The elements of a matrix, row by row.

@@ -2,8 +2,8 @@
 //!
 //! `cameras.json`: `{"frames": [{"file": "images/a.png", "width": w, "height": h,
 //! "K": 3×3, "c2w": 4×4}, …], "scale_mat": 4×4}`. Poses are camera-to-world in
-//! OpenCV axes; the optional `scale_mat` leads from the world to the original
-//! frame. Other keys are ignored.
+//! OpenCV axes; the optional `scale_mat` leads from the world, whose unit ball holds
+//! the object, to the original frame. Other keys are ignored.
 
 use super::images::with_existing_ending;
 use super::poses::{PosedImage, Poses, similarity_of, view_error};
@@ -43,6 +43,8 @@ fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
         format: "list of cameras",
         source,
     })?;
+    // Who normalised the world did so for the unit ball.
+    let declared_radius = json.scale_mat.is_some().then_some(1.0);
     let original_from_world = json.scale_mat.map_or(Ok(Similarity::identity()), |rows| {
         similarity_of(&path, &Matrix4::from(rows).transpose())
     })?;
@@ -69,6 +71,7 @@ fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
         original_from_world,
         pixel_center: None,
         points: Vec::new(),
+        declared_radius,
     })
 }
 

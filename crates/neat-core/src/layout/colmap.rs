@@ -173,6 +173,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         },
         pixel_center: Some(PIXEL_CENTER),
         points: Vec::new(),
+        declared_radius: None,
     })
 }
 

@@ -17,6 +17,8 @@ use crate::{CameraError, Distortion, Intrinsics, SceneError};
 use nalgebra::{Matrix3, Matrix4};
 use std::path::Path;
 
+/// `scale_mat` is made so that the unit ball holds the object.
+const DECLARED_RADIUS: f64 = 1.0;
 const IMAGES_DIRS: [&str; 2] = ["image", "images"];
 
 pub(super) fn world_mat(index: usize) -> String {
@@ -76,6 +78,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         original_from_world,
         pixel_center: None,
         points: Vec::new(),
+        declared_radius: Some(DECLARED_RADIUS),
     })
 }
 

@@ -1,7 +1,7 @@
 //! Images on disk.
 
 use crate::{SceneError, hawp_json::file_stem};
-use image::{DynamicImage, ImageReader, RgbImage};
+use image::{DynamicImage, ImageDecoder, ImageReader, RgbImage};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -49,6 +49,12 @@ pub(super) fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
             path: path.into(),
             source,
         })
+}
+
+/// Whether an image has transparency, from its first bytes.
+pub(super) fn has_alpha(path: &Path) -> Option<bool> {
+    let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
+    Some(reader.into_decoder().ok()?.color_type().has_alpha())
 }
 
 /// `image`, or where it does not exist the same with another ending that does:

@@ -8,20 +8,26 @@ pub mod cameras_json;
 pub mod colmap;
 pub mod dtu;
 mod images;
+mod masks;
 mod pixel_center;
+mod point_files;
 mod poses;
+mod sphere;
 pub mod transforms_json;
 
 pub use pixel_center::PixelCenter;
 
 use crate::npz::NpzReader;
 use crate::scene::{check_image_size, check_names};
+use crate::scene_sphere::SphereSource;
 use crate::{
-    Camera, Observation, Scene, SceneError, SparsePoint, View, ViewError, Wireframe2d, hawp_json,
+    Camera, Observation, Scene, SceneError, SceneSphere, SparsePoint, SphereChoice, View,
+    ViewError, Wireframe2d, hawp_json,
 };
 use image::RgbImage;
 use poses::{PosedImage, Poses};
 use rayon::prelude::*;
+use sphere::Evidence;
 use std::fmt;
 use std::path::Path;
 
@@ -108,6 +114,8 @@ pub struct LoadOptions {
     pub require_wireframes: bool,
     /// The colour behind transparent pixels.
     pub background: [u8; 3],
+    /// What places the scene sphere, whose centre becomes the world's origin.
+    pub sphere: SphereChoice,
 }
 
 impl Default for LoadOptions {
@@ -118,6 +126,7 @@ impl Default for LoadOptions {
             min_segment_score: 0.05,
             require_wireframes: true,
             background: [0; 3],
+            sphere: SphereChoice::Auto,
         }
     }
 }
@@ -129,6 +138,8 @@ pub struct LoadedScene {
     pub scene: Scene,
     /// The layout that it was read by.
     pub layout: Layout,
+    /// The scene sphere, in the frame and unit of the files.
+    pub sphere: SceneSphere,
     /// In the order of the views.
     pub warnings: Vec<SceneWarning>,
 }
@@ -142,6 +153,9 @@ pub enum SceneWarning {
         /// The value taken.
         pixel_center: f64,
     },
+    /// Nothing tells where the scene is: its sphere lies around the origin of the
+    /// poses.
+    SphereUnknown,
     /// A view was dropped because nothing was detected in it.
     ViewWithoutSegments {
         /// Name of the view.
@@ -157,6 +171,9 @@ impl fmt::Display for SceneWarning {
             Self::PixelCenterAssumed { pixel_center } => write!(
                 f,
                 "the intrinsics do not tell where pixel centres are: {pixel_center} is assumed"
+            ),
+            Self::SphereUnknown => f.write_str(
+                "neither sparse points nor the cameras tell where the scene is: its sphere is put around the origin of the poses; give --scene-sphere x,y,z,radius if that is not the object",
             ),
             Self::ViewWithoutSegments {
                 view,
@@ -261,14 +278,41 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
             min_segment_score: options.min_segment_score,
         });
     }
+    let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
+    let points = match poses.points.is_empty() {
+        true => point_files::read(dir, &cameras, &poses.original_from_world)?,
+        false => observed_by(poses.points, &kept),
+    };
+    let images: Vec<PosedImage> = (poses.views.into_iter().zip(&kept))
+        .filter_map(|(image, kept)| kept.map(|_| image))
+        .collect();
+    let sphere = Evidence {
+        dir,
+        images: &images,
+        cameras: &cameras,
+        points: &points,
+        declared_radius: poses.declared_radius,
+    }
+    .sphere(options.sphere, &poses.original_from_world)?;
+    if sphere.source == SphereSource::Unknown {
+        warnings.push(SceneWarning::SphereUnknown);
+    }
+    let scene = Scene {
+        name: scene_name(dir),
+        views,
+        original_from_world: poses.original_from_world,
+        pixel_center,
+        sphere_radius: sphere.radius,
+        sparse_points: points,
+    }
+    .centered_at(&sphere.center);
     Ok(LoadedScene {
-        scene: Scene {
-            name: scene_name(dir),
-            views,
-            original_from_world: poses.original_from_world,
-            pixel_center,
-            sparse_points: observed_by(poses.points, &kept),
+        sphere: SceneSphere {
+            center: poses.original_from_world.apply(&sphere.center),
+            radius: poses.original_from_world.scale * sphere.radius,
+            ..sphere
         },
+        scene,
         layout,
         warnings,
     })

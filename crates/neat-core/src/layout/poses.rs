@@ -18,6 +18,9 @@ pub(super) struct Poses {
     /// Sparse points of the reconstruction, in the world of the poses, observed
     /// in the photographs as they are on disk; empty where there are none.
     pub points: Vec<SparsePoint>,
+    /// Radius of the ball around the origin that holds the object, where the
+    /// layout's world is made so.
+    pub declared_radius: Option<f64>,
 }
 
 /// An image on disk with its camera.

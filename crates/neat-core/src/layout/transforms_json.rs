@@ -117,6 +117,7 @@ fn parse(bytes: &[u8], path: PathBuf, dir: &Path) -> Result<Poses, SceneError> {
         original_from_world: Similarity::identity(),
         pixel_center: middle_for_all.then_some(PIXEL_CENTER_OF_MIDDLE),
         points: Vec::new(),
+        declared_radius: None,
     })
 }
 

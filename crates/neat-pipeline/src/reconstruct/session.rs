@@ -69,6 +69,7 @@ impl<'a> Session<'a> {
             threads: rayon::current_num_threads(),
             seed: options.seed,
             scene: scene_dir,
+            sphere: Some(loaded.sphere),
             inputs,
             warnings,
             status: Status::Running,
@@ -220,6 +221,7 @@ fn load(
     on_event: OnEvent<'_>,
 ) -> Result<LoadedScene, PipelineError> {
     let loaded = read_scene(scene, &config.data)?;
+    on_event(Event::Note(format!("scene sphere: {}", loaded.sphere)));
     for warning in &loaded.warnings {
         on_event(Event::Warning(warning.to_string()));
     }
