@@ -3,6 +3,7 @@
 //! The tree is TOML on disk (`config.toml` of every run), starts from a preset,
 //! and takes `--set key.path=value` on top. Unknown keys are errors.
 
+use crate::background::Background;
 use neat_core::SphereChoice;
 use neat_field::AttractionNetworkConfig;
 use neat_gjp::{CandidateConfig, MatchingConfig, PerceiverConfig};
@@ -42,6 +43,9 @@ pub struct DataConfig {
     /// or `x,y,z,radius` in the frame of the files.
     #[serde(default)]
     pub scene_sphere: SphereChoice,
+    /// What lies behind the object; `None` changes nothing.
+    #[serde(default)]
+    pub background: Option<Background>,
     /// Radius of the modelled ball, in the unit of the poses. `None` takes that of
     /// the scene sphere and scales the world so that it is 1.
     pub scene_radius: Option<f64>,

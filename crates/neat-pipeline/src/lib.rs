@@ -3,6 +3,7 @@
 //! Everything here reports through events and results; nothing draws.
 
 mod awake;
+pub mod background;
 pub mod benchmark;
 mod chunked_step;
 pub mod compare_backends;

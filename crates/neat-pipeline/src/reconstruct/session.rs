@@ -1,6 +1,7 @@
 //! A run in progress: its folder, its scene, and its manifest kept up to date.
 
 use super::RunOptions;
+use crate::background::fit_background;
 use crate::config::Config;
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage};
@@ -55,8 +56,10 @@ impl<'a> Session<'a> {
             warnings.push(warning);
         }
 
+        let mut config = options.config.clone();
+        fit_background(&mut config, &loaded.scene);
         let dir = RunDir::create(&options.out, options.existing)?;
-        dir.write_config(&options.config)?;
+        dir.write_config(&config)?;
         let now = utc_now();
         let manifest = Manifest {
             neat: env!("CARGO_PKG_VERSION").to_owned(),
@@ -82,7 +85,7 @@ impl<'a> Session<'a> {
         };
         let mut session = Self {
             dir,
-            config: options.config.clone(),
+            config,
             manifest,
             scene: loaded.scene,
             device,
