@@ -11,6 +11,7 @@ pub mod config;
 pub mod demo;
 pub mod distill;
 pub mod error;
+pub mod estimate;
 pub mod event;
 pub mod field;
 pub mod flops;
