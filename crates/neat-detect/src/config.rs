@@ -37,6 +37,9 @@ pub struct DetectorConfig {
     pub max_extension: f64,
     /// A segment's end moves at most so far inwards to meet another.
     pub max_retreat: f64,
+    /// As `max_extension`, towards a junction of other segments, where colours
+    /// change all the way: a weak edge cannot be seen beside a stronger one.
+    pub max_attraction: f64,
     /// A junction lies no farther from the line of each of its segments.
     pub junction_distance: f64,
     /// Segments that meet under a smaller angle than this, in degrees, do not
@@ -44,6 +47,12 @@ pub struct DetectorConfig {
     pub min_junction_angle: f64,
     /// A free end this near to the inside of another segment is put on it.
     pub t_junction_distance: f64,
+    /// Junctions no farther apart are joined by an edge where the image shows one
+    /// between them, however short.
+    pub max_completion: f64,
+    /// Edges that bend more are curves and are dropped: the height of the arc as
+    /// a share of its length.
+    pub max_sagitta: f64,
     /// Segments with a lower score are dropped.
     pub min_score: f64,
 }
@@ -61,8 +70,11 @@ impl Default for DetectorConfig {
             merge_angle: 5.0,
             max_extension: 8.0,
             max_retreat: 5.0,
+            max_attraction: 25.0,
             junction_distance: 1.5,
-            min_junction_angle: 8.0,
+            min_junction_angle: 2.5,
+            max_completion: 40.0,
+            max_sagitta: 0.012,
             t_junction_distance: 4.0,
             min_score: 0.06,
         }

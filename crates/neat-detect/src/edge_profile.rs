@@ -17,6 +17,12 @@ pub(crate) struct EdgePoint {
     pub change: Vector3<f64>,
 }
 
+/// The strength of an edge with this change of colour: the root mean square over
+/// the channels, so that for a grey edge it is the change of grey.
+pub(crate) fn strength(change: &Vector3<f64>) -> f64 {
+    change.norm() / 3f64.sqrt()
+}
+
 /// The profile of `image` through `point` along the unit vector `normal`, of
 /// length 2 `half_width` in pixels.
 ///

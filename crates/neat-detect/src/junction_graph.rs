@@ -19,9 +19,15 @@ pub(crate) struct JunctionLimits {
     pub distance: f64,
     /// Sine of the smallest angle under which two lines determine a junction.
     pub sin_angle: f64,
+    /// As `extension`, to a junction of other segments where the image is not flat
+    /// between; but at most half of the segment's length.
+    pub attraction: f64,
     /// As `extension`, to the inside of another segment.
     pub t_extension: f64,
 }
+
+/// The smallest sine of the angle at which a T-junction is made.
+const T_SIN_ANGLE: f64 = 0.3;
 
 /// The graph: vertices with the segments that meet in each, and for each
 /// segment its two vertices.
@@ -50,8 +56,13 @@ impl SegmentEnd {
     }
 }
 
-/// Builds the graph of `segments`.
-pub(crate) fn build(segments: &[LineSegment2], limits: &JunctionLimits) -> JunctionGraph {
+/// Builds the graph of `segments`; `may_bridge` says whether one may be extended
+/// by a stretch that is not supported by an edge of its own.
+pub(crate) fn build(
+    segments: &[LineSegment2],
+    limits: &JunctionLimits,
+    may_bridge: impl Fn(&LineSegment2) -> bool,
+) -> JunctionGraph {
     let ends: Vec<SegmentEnd> = (segments.iter())
         .flat_map(|segment| {
             let length = segment.length();
@@ -95,6 +106,23 @@ pub(crate) fn build(segments: &[LineSegment2], limits: &JunctionLimits) -> Junct
             members[from].clear();
             members[into] = together;
             positions[into] = position;
+        }
+    }
+    for end in 0..ends.len() {
+        if members[vertex_of[end]].len() == 1
+            && let Some(vertex) = attracting_vertex(
+                end,
+                &ends,
+                &vertex_of,
+                &members,
+                &positions,
+                limits,
+                &may_bridge,
+            )
+        {
+            members[vertex_of[end]].clear();
+            vertex_of[end] = vertex;
+            members[vertex].push(end);
         }
     }
     for end in 0..ends.len() {
@@ -197,6 +225,37 @@ fn junction_of(
     fits.then_some(position)
 }
 
+/// The nearest junction that a free end points at.
+fn attracting_vertex(
+    end: usize,
+    ends: &[SegmentEnd],
+    vertex_of: &[usize],
+    members: &[Vec<usize>],
+    positions: &[Vector2<f64>],
+    limits: &JunctionLimits,
+    may_bridge: impl Fn(&LineSegment2) -> bool,
+) -> Option<usize> {
+    let free = &ends[end];
+    let reach = limits
+        .attraction
+        .min(0.5 * free.length)
+        .max(limits.extension);
+    (0..members.len())
+        .filter(|&vertex| members[vertex].len() > 1 && vertex != vertex_of[end ^ 1])
+        .filter_map(|vertex| {
+            let [along, across] = free.offset_to(&positions[vertex]);
+            let reached =
+                (-limits.retreat..=reach).contains(&along) && across.abs() <= limits.distance;
+            reached.then_some((along, vertex))
+        })
+        .min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
+        .filter(|&(along, vertex)| {
+            along <= limits.extension
+                || may_bridge(&LineSegment2::new(free.position, positions[vertex]))
+        })
+        .map(|(_, vertex)| vertex)
+}
+
 /// Where a free end meets the inside of another segment, if it comes near one.
 fn t_junction(
     end: usize,
@@ -211,7 +270,7 @@ fn t_junction(
             let length = segment.length();
             let direction = (segment.end - segment.start) / length;
             let sine = free.outward.perp(&direction);
-            if sine.abs() < limits.sin_angle.max(0.3) {
+            if sine.abs() < T_SIN_ANGLE {
                 return None;
             }
             let between = segment.start - free.position;

@@ -2,10 +2,13 @@
 
 mod config;
 mod detection;
+mod edge_completion;
 mod edge_profile;
 mod junction_graph;
 mod line_fitting;
 mod merging;
+mod noise;
+mod robust_line;
 mod segment_search;
 mod smoothed_image;
 

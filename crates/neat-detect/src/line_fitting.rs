@@ -1,35 +1,41 @@
-//! Lines fitted to the gradient maxima along them, to a fraction of a pixel.
+//! Segments fitted to the gradient maxima along them, to a fraction of a pixel.
 
-use crate::edge_profile::{EdgePoint, find_edge};
+use crate::edge_profile::{EdgePoint, find_edge, strength};
+use crate::robust_line::{MIN_POINTS, RobustLine, sagitta};
 use crate::smoothed_image::SmoothedImage;
 use nalgebra::{Vector2, Vector3};
 use neat_core::LineSegment2;
 
-/// Half lengths of the profiles of the successive fits, in pixels.
-const HALF_WIDTHS: [f64; 3] = [3.0, 2.0, 1.5];
-/// An edge point so far from its line, in pixels, is not one of the line.
-const MAX_OFFSET: f64 = 1.25;
-/// Rounds of reweighting in one fit.
-const REWEIGHTINGS: usize = 3;
-/// The smallest spread of offsets that the robust weights assume, in pixels.
-const MIN_SPREAD: f64 = 0.1;
-/// A fit needs so many edge points.
-const MIN_POINTS: usize = 3;
+/// Half lengths of the profiles of the second and third fit, in pixels.
+const NARROW: [f64; 2] = [2.0, 1.5];
+/// An edge point of a line lies within so many spreads of it, and
+const OFFSET_SPREADS: f64 = 4.0;
+/// within these bounds, in pixels.
+const OFFSET_BOUNDS: [f64; 2] = [0.5, 1.25];
+/// Rounds of following an edge beyond the ends of its segment.
+const FOLLOWINGS: usize = 3;
+/// Edges are round at corners: so much at each end, in pixels, tells nothing
+/// about the curvature of a segment.
+const CORNER: f64 = 2.0;
 /// Along an edge the colour changes at most so much for its change across it.
 const MAX_SLANT: f64 = 0.6;
+/// A fit that turns a segment by a larger slope has found another edge.
+const MAX_TURN: f64 = 0.5;
 
 /// A segment of an image edge.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FittedSegment {
     /// Where it is.
     pub segment: LineSegment2,
-    /// The mean change of colour from its left to its right, per pixel, where
-    /// right is +y for a segment along +x.
+    /// The mean change of colour from its left to its right, in grey levels per
+    /// pixel; right is +y for a segment along +x.
     pub change: Vector3<f64>,
     /// The share of its length along which there is an edge, in [0, 1].
     pub support: f64,
-    /// Root mean square distance of its edge points, in pixels.
-    pub residual: f64,
+    /// Robust standard deviation of its edge points from its line, in pixels.
+    pub spread: f64,
+    /// How far the edge bends from the straight line, in pixels.
+    pub sagitta: f64,
 }
 
 impl FittedSegment {
@@ -44,237 +50,221 @@ pub(crate) fn normal_of(direction: &Vector2<f64>) -> Vector2<f64> {
     Vector2::new(-direction.y, direction.x)
 }
 
-/// What a line is fitted with.
+/// Fits segments to the edges of an image.
 pub(crate) struct LineFitter<'a> {
     /// The image.
     pub image: &'a SmoothedImage,
-    /// Changes of colour below this are noise, in grey levels per pixel.
+    /// Edges of a smaller [`strength`] are none, in grey levels per pixel.
     pub min_gradient: f64,
     /// Stretches without an edge up to this length are walked over, in pixels.
     pub max_gap: f64,
-    /// Uncertainty of the segments that come in, in pixels.
-    pub initial_error: f64,
 }
 
-/// A place along a segment and the edge there.
-struct EdgeSample {
-    /// Distance from the segment's middle along it, in pixels.
-    position: f64,
-    edge: EdgePoint,
+/// A segment with the axes that it is measured along.
+struct Axes {
+    middle: Vector2<f64>,
+    direction: Vector2<f64>,
+    normal: Vector2<f64>,
+    length: f64,
+}
+
+impl Axes {
+    /// `None` for a segment of less than a pixel.
+    fn of(segment: &LineSegment2) -> Option<Self> {
+        let length = segment.length();
+        if !(length >= 1.0 && length.is_finite()) {
+            return None;
+        }
+        let direction = (segment.end - segment.start) / length;
+        Some(Self {
+            middle: segment.point_at(0.5),
+            normal: normal_of(&direction),
+            direction,
+            length,
+        })
+    }
+
+    fn point(&self, position: f64, offset: f64) -> Vector2<f64> {
+        self.middle + self.direction * position + self.normal * offset
+    }
+
+    /// Positions about a pixel apart, from one end to the other.
+    fn positions(&self) -> impl Iterator<Item = f64> {
+        let (steps, length) = ((self.length.round() as usize).max(MIN_POINTS), self.length);
+        (0..=steps).map(move |step| (step as f64 / steps as f64 - 0.5) * length)
+    }
 }
 
 impl LineFitter<'_> {
-    /// Moves `segment` onto the image edge that it stands for, and lets its ends
-    /// follow that edge. `None` where there is no straight edge.
-    pub(crate) fn fit(&self, segment: &LineSegment2) -> Option<FittedSegment> {
-        let mut segment = *segment;
-        for half_width in HALF_WIDTHS {
-            let half_width = if half_width == HALF_WIDTHS[0] {
-                half_width.max(self.initial_error)
-            } else {
-                half_width
-            };
-            segment = self.refit(&segment, half_width)?;
+    /// Moves `segment` onto the image edge within `search_width` pixels that it
+    /// stands for, and lets its ends follow that edge. `None` where there is no
+    /// straight edge.
+    pub(crate) fn fit(&self, segment: &LineSegment2, search_width: f64) -> Option<FittedSegment> {
+        let (mut segment, _) = self.refit(segment, search_width)?;
+        let mut spread = 0.0;
+        for half_width in NARROW {
+            (segment, spread) = self.refit(&segment, half_width)?;
         }
-        let segment = self.follow(&segment)?;
-        let segment = self.refit(&segment, HALF_WIDTHS[2])?;
-        self.describe(&segment)
+        for _ in 0..FOLLOWINGS {
+            let length = segment.length();
+            segment = self.follow(&segment, max_offset(spread))?;
+            (segment, spread) = self.refit(&segment, NARROW[1])?;
+            if segment.length() <= length + 1.0 {
+                break;
+            }
+        }
+        self.describe(&segment, spread)
     }
 
-    /// The edge points near a segment, one per pixel of its length.
-    fn edge_samples(
+    /// How well the image supports `segment` as it is: the share of its length,
+    /// without `margin` at each end, along which there is an edge.
+    pub(crate) fn support(&self, segment: &LineSegment2, margin: f64) -> f64 {
+        let Some(axes) = Axes::of(segment) else {
+            return 0.0;
+        };
+        let limit = 0.5 * axes.length - margin;
+        let (mut supported, mut total) = (0, 0);
+        for position in axes.positions().filter(|position| position.abs() <= limit) {
+            total += 1;
+            supported += usize::from(self.has_edge(&axes, position, OFFSET_BOUNDS[1]));
+        }
+        supported as f64 / total.max(1) as f64
+    }
+
+    /// Whether colours change all along `segment`, in whatever direction: near a
+    /// stronger edge a weaker one cannot be told apart, but the image is not flat.
+    pub(crate) fn is_nowhere_flat(&self, segment: &LineSegment2) -> bool {
+        Axes::of(segment).is_none_or(|axes| {
+            axes.positions()
+                .all(|at| self.edge(&axes, at, NARROW[0], None).is_some())
+        })
+    }
+
+    /// The fit of a segment whose line is already where it should be.
+    pub(crate) fn describe(&self, segment: &LineSegment2, spread: f64) -> Option<FittedSegment> {
+        let axes = Axes::of(segment)?;
+        let limit = max_offset(spread);
+        let edges: Vec<(f64, EdgePoint)> = (axes.positions())
+            .filter_map(|position| Some((position, self.edge(&axes, position, limit, None)?)))
+            .collect();
+        if edges.len() < MIN_POINTS {
+            return None;
+        }
+        let change: Vector3<f64> = edges.iter().map(|(_, edge)| edge.change).sum();
+        let straight = 0.5 * axes.length - CORNER;
+        let inner: Vec<[f64; 2]> = (edges.iter())
+            .filter(|(position, _)| position.abs() <= straight)
+            .map(|(position, edge)| [*position, edge.offset])
+            .collect();
+        let bend = if inner.len() > 2 * MIN_POINTS {
+            sagitta(&inner, axes.length)
+        } else {
+            0.0
+        };
+        Some(FittedSegment {
+            segment: *segment,
+            change: change / edges.len() as f64,
+            support: self.support(segment, 0.0),
+            spread,
+            sagitta: bend,
+        })
+    }
+
+    /// The edge across the line at `position`, if it is strong enough.
+    fn edge(
         &self,
-        segment: &LineSegment2,
+        axes: &Axes,
+        position: f64,
         half_width: f64,
         contrast: Option<&Vector3<f64>>,
-    ) -> Vec<EdgeSample> {
-        let length = segment.length();
-        let direction = (segment.end - segment.start) / length;
-        let normal = normal_of(&direction);
-        let steps = (length.round() as usize).max(4);
-        (0..=steps)
-            .filter_map(|step| {
-                let t = step as f64 / steps as f64;
-                let edge = find_edge(
-                    self.image,
-                    &segment.point_at(t),
-                    &normal,
-                    half_width,
-                    contrast,
-                )?;
-                let position = (t - 0.5) * length;
-                (edge.change.norm() >= self.min_gradient).then_some(EdgeSample { position, edge })
-            })
-            .collect()
+    ) -> Option<EdgePoint> {
+        let point = axes.point(position, 0.0);
+        find_edge(self.image, &point, &axes.normal, half_width, contrast)
+            .filter(|edge| strength(&edge.change) >= self.min_gradient)
     }
 
-    /// One robust fit of a line to the edge points within `half_width`; the ends
-    /// move only across the segment.
-    fn refit(&self, segment: &LineSegment2, half_width: f64) -> Option<LineSegment2> {
-        let length = segment.length();
-        if !(length > 1.0) {
-            return None;
-        }
-        let any = self.edge_samples(segment, half_width, None);
-        let change: Vector3<f64> = any.iter().map(|sample| sample.edge.change).sum();
+    /// One robust fit of a line to the edge points within `half_width`, and their
+    /// spread. The ends move only across the segment.
+    fn refit(&self, segment: &LineSegment2, half_width: f64) -> Option<(LineSegment2, f64)> {
+        let axes = Axes::of(segment)?;
+        // Edges of either contrast say which contrast is meant.
+        let any = axes
+            .positions()
+            .filter_map(|at| self.edge(&axes, at, half_width, None));
+        let change: Vector3<f64> = any.map(|edge| edge.change).sum();
         let contrast = change.try_normalize(1e-9)?;
-        let samples = self.edge_samples(segment, half_width, Some(&contrast));
-        let [offset, slope] = robust_line(&samples)?;
-        if slope.abs() > 1.0 {
+        let points: Vec<[f64; 2]> = (axes.positions())
+            .filter_map(|at| {
+                Some([
+                    at,
+                    self.edge(&axes, at, half_width, Some(&contrast))?.offset,
+                ])
+            })
+            .collect();
+        let line = RobustLine::fit(&points)?;
+        if line.slope.abs() > MAX_TURN {
             return None;
         }
-        let direction = (segment.end - segment.start) / length;
-        let normal = normal_of(&direction);
-        let moved = |end: Vector2<f64>, position: f64| end + normal * (offset + slope * position);
-        Some(LineSegment2::new(
-            moved(segment.start, -0.5 * length),
-            moved(segment.end, 0.5 * length),
-        ))
+        let [start, end] = [-0.5, 0.5].map(|side| {
+            let position = side * axes.length;
+            axes.point(position, line.offset + line.slope * position)
+        });
+        Some((LineSegment2::new(start, end), line.spread))
     }
 
-    /// The longest stretch around the middle of `segment`, on its line, along
-    /// which there is an edge with gaps of at most `max_gap`.
-    fn follow(&self, segment: &LineSegment2) -> Option<LineSegment2> {
-        let length = segment.length();
-        let direction = (segment.end - segment.start) / length;
-        let normal = normal_of(&direction);
-        let supported = |position: f64| {
-            let point = segment.start + direction * position;
-            self.has_edge(&point, &direction, &normal)
-        };
-        let seed = (0..=length as usize)
-            .map(|step| step as f64)
-            .filter(|&position| supported(position))
-            .min_by(|a, b| {
-                (a - 0.5 * length)
-                    .abs()
-                    .total_cmp(&(b - 0.5 * length).abs())
-            })?;
+    /// The stretch around the middle of `segment`, on its line, along which there
+    /// is an edge within `max_offset` of it. A gap is passed if the edge beyond it
+    /// is longer than the gap.
+    fn follow(&self, segment: &LineSegment2, max_offset: f64) -> Option<LineSegment2> {
+        let axes = Axes::of(segment)?;
+        let seed = (axes.positions())
+            .filter(|&position| self.has_edge(&axes, position, max_offset))
+            .min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
         let walk = |sign: f64| {
-            let mut last = seed;
-            let mut position = seed;
-            while (position - last).abs() <= self.max_gap {
+            let (mut end, mut position) = (seed, seed);
+            let (mut gap, mut run) = (0.0, 0.0);
+            while gap <= self.max_gap {
                 position += sign;
-                let point = segment.start + direction * position;
-                if !self.image.contains(&point) {
+                if !self.image.contains(&axes.point(position, 0.0)) {
                     break;
                 }
-                if supported(position) {
-                    last = position;
+                if self.has_edge(&axes, position, max_offset) {
+                    run += 1.0;
+                    if run > gap {
+                        (end, gap) = (position, 0.0);
+                    }
+                } else {
+                    gap += 1.0 + run;
+                    run = 0.0;
                 }
             }
-            last
+            end
         };
         let [start, end] = [walk(-1.0), walk(1.0)];
         Some(LineSegment2::new(
-            segment.start + direction * start,
-            segment.start + direction * end,
+            axes.point(start, 0.0),
+            axes.point(end, 0.0),
         ))
     }
 
-    /// Whether an edge along `direction` passes through `point`.
-    fn has_edge(
-        &self,
-        point: &Vector2<f64>,
-        direction: &Vector2<f64>,
-        normal: &Vector2<f64>,
-    ) -> bool {
-        let Some(edge) = find_edge(self.image, point, normal, MAX_OFFSET, None) else {
+    /// Whether an edge along the line passes it at `position`.
+    fn has_edge(&self, axes: &Axes, position: f64, max_offset: f64) -> bool {
+        let Some(edge) = self.edge(axes, position, max_offset, None) else {
             return false;
         };
-        let across = edge.change.norm();
-        if across < self.min_gradient || edge.offset.abs() > MAX_OFFSET {
+        if edge.offset.abs() > max_offset {
             return false;
         }
-        let on_edge = point + normal * edge.offset;
-        let [before, after] = [-0.5, 0.5].map(|step| on_edge + direction * step);
+        let [before, after] = [-0.5, 0.5].map(|step| axes.point(position + step, edge.offset));
         if !self.image.contains(&before) || !self.image.contains(&after) {
             return false;
         }
-        let along = (self.image.sample(&after) - self.image.sample(&before)).norm();
-        f64::from(along) <= MAX_SLANT * across
-    }
-
-    /// Measures how well the image supports `segment`.
-    fn describe(&self, segment: &LineSegment2) -> Option<FittedSegment> {
-        let length = segment.length();
-        if !(length > 1.0) {
-            return None;
-        }
-        let direction = (segment.end - segment.start) / length;
-        let normal = normal_of(&direction);
-        let steps = (length.round() as usize).max(4);
-        let supported = (0..=steps)
-            .filter(|&step| {
-                self.has_edge(
-                    &segment.point_at(step as f64 / steps as f64),
-                    &direction,
-                    &normal,
-                )
-            })
-            .count();
-        let samples = self.edge_samples(segment, MAX_OFFSET, None);
-        if samples.len() < MIN_POINTS {
-            return None;
-        }
-        let count = samples.len() as f64;
-        let change = samples.iter().map(|s| s.edge.change).sum::<Vector3<f64>>() / count;
-        let squares: f64 = samples.iter().map(|s| s.edge.offset.powi(2)).sum();
-        Some(FittedSegment {
-            segment: *segment,
-            change,
-            support: supported as f64 / (steps + 1) as f64,
-            residual: (squares / count).sqrt(),
-        })
+        let along = self.image.sample(&after) - self.image.sample(&before);
+        f64::from(along.norm()) <= MAX_SLANT * edge.change.norm()
     }
 }
 
-/// Offset at position 0 and slope of the line through edge points, by least
-/// squares reweighted with Tukey's biweight.
-fn robust_line(samples: &[EdgeSample]) -> Option<[f64; 2]> {
-    if samples.len() < MIN_POINTS {
-        return None;
-    }
-    let mut line = [median(samples.iter().map(|s| s.edge.offset)), 0.0];
-    for round in 0..=REWEIGHTINGS {
-        let residual =
-            |sample: &EdgeSample| sample.edge.offset - line[0] - line[1] * sample.position;
-        let spread = 1.4826 * median(samples.iter().map(|s| residual(s).abs()));
-        let cutoff = 4.685 * spread.max(MIN_SPREAD) * if round == 0 { 2.0 } else { 1.0 };
-        let weights: Vec<f64> = samples
-            .iter()
-            .map(|s| (1.0 - (residual(s) / cutoff).powi(2)).max(0.0).powi(2))
-            .collect();
-        line = weighted_line(samples, &weights)?;
-    }
-    Some(line)
-}
-
-/// The weighted least-squares line; `None` where the weight lies on one place.
-fn weighted_line(samples: &[EdgeSample], weights: &[f64]) -> Option<[f64; 2]> {
-    let sum: f64 = weights.iter().sum();
-    let mean = |value: fn(&EdgeSample) -> f64| {
-        samples
-            .iter()
-            .zip(weights)
-            .map(|(s, w)| w * value(s))
-            .sum::<f64>()
-            / sum
-    };
-    let [position, offset] = [mean(|s| s.position), mean(|s| s.edge.offset)];
-    let (mut variance, mut covariance) = (0.0, 0.0);
-    for (sample, weight) in samples.iter().zip(weights) {
-        let centered = sample.position - position;
-        variance += weight * centered * centered;
-        covariance += weight * centered * (sample.edge.offset - offset);
-    }
-    let slope = covariance / variance;
-    (slope.is_finite()).then_some([offset - slope * position, slope])
-}
-
-/// The upper median; 0 of nothing.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+/// How far an edge point of a line with this spread may lie from it, in pixels.
+fn max_offset(spread: f64) -> f64 {
+    (OFFSET_SPREADS * spread).clamp(OFFSET_BOUNDS[0], OFFSET_BOUNDS[1])
 }

@@ -64,11 +64,12 @@ impl SmoothedImage {
         Vector3::from_fn(|channel, _| sample_plane(&self.planes[channel]))
     }
 
-    /// Luminance of every pixel in row order (the weights of Rec. 601).
-    pub(crate) fn luminance(&self) -> Vec<f64> {
+    /// The components of all colours along a direction of the colour space, in
+    /// row order.
+    pub(crate) fn projected(&self, direction: &Vector3<f32>) -> Vec<f64> {
         let [red, green, blue] = &self.planes;
         (red.iter().zip(green).zip(blue))
-            .map(|((r, g), b)| f64::from(0.299 * r + 0.587 * g + 0.114 * b))
+            .map(|((r, g), b)| f64::from(direction.x * r + direction.y * g + direction.z * b))
             .collect()
     }
 }
