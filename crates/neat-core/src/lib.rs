@@ -26,6 +26,7 @@ pub mod npz;
 pub mod point_cloud;
 pub mod scene;
 pub mod synthetic;
+pub mod undistortion;
 pub mod wireframe2d;
 pub mod wireframe3d;
 
