@@ -16,8 +16,10 @@
 pub mod assignment;
 pub mod camera;
 pub mod distortion;
+pub mod downscaling;
 pub mod error;
 pub mod file;
+pub mod file_cache;
 pub mod ground_truth;
 pub mod hawp_json;
 pub mod layout;
