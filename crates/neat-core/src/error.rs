@@ -182,6 +182,14 @@ pub enum ViewError {
     /// Its 2D wireframe.
     #[error(transparent)]
     Wireframe(#[from] Wireframe2dError),
+    /// A lens that shows no whole image of a pinhole.
+    #[error(
+        "its lens of model {lens} cannot be undistorted: check the order and the signs of its coefficients and its principal point"
+    )]
+    Lens {
+        /// Name of the model.
+        lens: &'static str,
+    },
     /// Its image differs in size from what describes it.
     #[error(
         "the {what} is for {expected_width}×{expected_height} pixels, but the image has {width}×{height}: make the {what} from this very image"

@@ -5,6 +5,7 @@ use image::{ImageFormat, RgbImage};
 use std::fs;
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The largest text or array file that is read, in bytes.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
@@ -78,10 +79,13 @@ pub fn create_dir(path: &Path) -> Result<(), SceneError> {
     })
 }
 
-/// `.name.PID.tmp` beside `path`: hidden, so that no reader lists it.
+/// `.name.PID.N.tmp` beside `path`: hidden, so that no reader lists it, and
+/// another one each time, so that two writers of one file do not meet.
 fn temporary_name(path: &Path) -> PathBuf {
+    static WRITTEN: AtomicU64 = AtomicU64::new(0);
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!(".{name}.{}.tmp", std::process::id()))
+    let count = WRITTEN.fetch_add(1, Ordering::Relaxed);
+    path.with_file_name(format!(".{name}.{}.{count}.tmp", std::process::id()))
 }
 
 /// Writes a PNG, completely or not at all.

@@ -16,8 +16,10 @@
 pub mod assignment;
 pub mod camera;
 pub mod distortion;
+pub mod downscaling;
 pub mod error;
 pub mod file;
+pub mod file_cache;
 pub mod ground_truth;
 pub mod hawp_json;
 pub mod layout;
@@ -27,6 +29,7 @@ pub mod point_cloud;
 pub mod scene;
 pub mod scene_sphere;
 pub mod synthetic;
+pub mod undistortion;
 pub mod wireframe2d;
 pub mod wireframe3d;
 

@@ -1,5 +1,7 @@
 //! 2D wireframes: scored vertices joined by scored edges, as HAWP writes them.
 
+mod mapping;
+
 use crate::LineSegment2;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};

@@ -1,0 +1,146 @@
+//! A folder of results that take long to compute and can be computed again.
+//!
+//! One file per result, named by a digest of all that it depends on: nothing is
+//! ever out of date, only no longer asked for. The folder is not bounded in size;
+//! it can be deleted, whole or in part, at any time.
+
+use crate::{SceneError, file};
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+
+/// A folder of results; it is created when the first one is stored.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileCache {
+    dir: PathBuf,
+}
+
+/// What a result is and what it depends on: the name of its file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CacheKey {
+    file_name: String,
+}
+
+impl CacheKey {
+    /// The key of a result of the kind `kind` (a plain file name, such as
+    /// "undistorted") made by `version` of its algorithm from `inputs`.
+    pub fn new(kind: &str, version: u32, inputs: &[&[u8]]) -> Self {
+        let mut digest = Sha256::new();
+        digest.update(version.to_le_bytes());
+        for input in inputs {
+            // The length first: ("ab", "c") is not ("a", "bc").
+            digest.update((input.len() as u64).to_le_bytes());
+            digest.update(input);
+        }
+        let hex: String = digest
+            .finalize()
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect();
+        Self {
+            file_name: format!("{kind}-{hex}"),
+        }
+    }
+}
+
+/// Bytes of the digest at the head of every file.
+const DIGEST_BYTES: usize = 32;
+
+impl FileCache {
+    /// The cache in the folder `dir`, which need not exist.
+    pub fn new(dir: impl Into<PathBuf>) -> Self {
+        Self { dir: dir.into() }
+    }
+
+    /// The folder.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// The result stored under `key`, if it is there and undamaged.
+    pub fn get(&self, key: &CacheKey) -> Option<Vec<u8>> {
+        let mut stored = file::read(&self.path(key), "").ok()?;
+        let digest = stored.get(..DIGEST_BYTES)?;
+        if digest != Sha256::digest(&stored[DIGEST_BYTES..]).as_slice() {
+            return None;
+        }
+        stored.drain(..DIGEST_BYTES);
+        Some(stored)
+    }
+
+    /// Stores a result in place of one that may be there.
+    ///
+    /// # Errors
+    /// If the folder cannot be created or written, or the disk is full. The
+    /// result need not be stored, so that this is a warning to the user.
+    pub fn put(&self, key: &CacheKey, result: &[u8]) -> Result<(), SceneError> {
+        file::create_dir(&self.dir)?;
+        let stored = [Sha256::digest(result).as_slice(), result].concat();
+        file::write_atomically(&self.path(key), &stored)
+    }
+
+    fn path(&self, key: &CacheKey) -> PathBuf {
+        self.dir.join(&key.file_name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn results_come_back_until_they_are_damaged() {
+        let dir = tempfile::tempdir().unwrap();
+        let cache = FileCache::new(dir.path().join("neat/cache"));
+        let key = CacheKey::new("test", 1, &[b"input"]);
+        assert_eq!(cache.get(&key), None);
+        cache.put(&key, b"result").unwrap();
+        assert_eq!(cache.get(&key).unwrap(), b"result");
+        cache.put(&key, b"").unwrap();
+        assert_eq!(cache.get(&key).unwrap(), b"");
+        cache.put(&key, b"result").unwrap();
+
+        let file = cache.path(&key);
+        let good = fs::read(&file).unwrap();
+        for damage in [&good[..good.len() - 1], &good[..20], &[], &good[1..]] {
+            fs::write(&file, damage).unwrap();
+            assert_eq!(cache.get(&key), None);
+        }
+        for at in 0..good.len() {
+            let mut damaged = good.clone();
+            damaged[at] ^= 4;
+            fs::write(&file, damaged).unwrap();
+            assert_eq!(cache.get(&key), None);
+        }
+        cache.put(&key, b"again").unwrap();
+        assert_eq!(cache.get(&key).unwrap(), b"again");
+    }
+
+    #[test]
+    fn keys_tell_kind_version_and_inputs_apart() {
+        let keys = [
+            CacheKey::new("a", 1, &[b"ab", b"c"]),
+            CacheKey::new("a", 1, &[b"a", b"bc"]),
+            CacheKey::new("a", 1, &[b"abc"]),
+            CacheKey::new("a", 1, &[b"ab", b"c", b""]),
+            CacheKey::new("a", 2, &[b"ab", b"c"]),
+            CacheKey::new("b", 1, &[b"ab", b"c"]),
+        ];
+        for (index, key) in keys.iter().enumerate() {
+            assert!(!keys[..index].contains(key));
+        }
+        assert_eq!(keys[0], CacheKey::new("a", 1, &[b"ab", b"c"]));
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_written_is_an_error_that_names_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let occupied = dir.path().join("cache");
+        fs::write(&occupied, "a file").unwrap();
+        let cache = FileCache::new(&occupied);
+        let key = CacheKey::new("test", 1, &[]);
+        assert_eq!(cache.get(&key), None);
+        let error = cache.put(&key, b"result").unwrap_err();
+        assert!(error.to_string().contains("cache"), "{error}");
+    }
+}
