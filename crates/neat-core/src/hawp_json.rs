@@ -101,6 +101,11 @@ pub fn parse(bytes: &[u8], pixel_center: f64, path: &Path) -> Result<Wireframe2d
 /// # Errors
 /// If the file cannot be written.
 pub fn write(path: &Path, wireframe: &Wireframe2d, pixel_center: f64) -> Result<(), SceneError> {
+    file::write_atomically(path, &to_bytes(wireframe, pixel_center))
+}
+
+/// What [`write`] writes.
+pub fn to_bytes(wireframe: &Wireframe2d, pixel_center: f64) -> Vec<u8> {
     let json = HawpJson {
         vertices: Pairs::Nested(
             wireframe
@@ -115,11 +120,7 @@ pub fn write(path: &Path, wireframe: &Wireframe2d, pixel_center: f64) -> Result<
         height: wireframe.height,
         width: wireframe.width,
     };
-    let bytes = serde_json::to_vec(&json).map_err(|source| SceneError::Write {
-        path: path.into(),
-        source: source.into(),
-    })?;
-    file::write_atomically(path, &bytes)
+    serde_json::to_vec(&json).expect("hawp_json::to_bytes: numbers and lists can be written")
 }
 
 /// File name without ending, for names of views.

@@ -153,6 +153,28 @@ impl Scene {
         check_names(self.views.iter().map(|view| view.name.as_str()), &path)
     }
 
+    /// Keeps the views for which `keep` is true; sparse points lose what the others
+    /// observed.
+    pub fn retain_views(&mut self, mut keep: impl FnMut(&View) -> bool) {
+        let kept: Vec<bool> = self.views.iter().map(&mut keep).collect();
+        // Where each view is among those that are kept.
+        let new_index: Vec<usize> = (kept.iter())
+            .scan(0, |next, &kept| {
+                let index = *next;
+                *next += usize::from(kept);
+                Some(index)
+            })
+            .collect();
+        for point in &mut self.sparse_points {
+            point.observations.retain(|seen| kept[seen.view]);
+            for seen in &mut point.observations {
+                seen.view = new_index[seen.view];
+            }
+        }
+        let mut kept = kept.into_iter();
+        self.views.retain(|_| kept.next() == Some(true));
+    }
+
     /// The same scene in a world whose lengths are `factor` times as large;
     /// [`Self::original_from_world`] still leads to the frame of the files.
     pub fn scaled(mut self, factor: f64) -> Self {
@@ -270,6 +292,27 @@ mod tests {
         assert!((seen - shown).norm() < 1e-9);
         let back = moved.original_from_world.apply(&(point * 0.25 - center));
         assert!((back - point).norm() < 1e-12);
+    }
+
+    #[test]
+    fn points_follow_the_views_that_are_kept() {
+        let names = ["a", "b", "c", "d"];
+        let mut scene = scene(names.map(|name| view(name, 5.0, 4, 3)).to_vec());
+        let seen = |view| Observation {
+            view,
+            pixel: Vector2::new(view as f64, 0.0),
+        };
+        scene.sparse_points = vec![SparsePoint {
+            position_in_world: Vector3::zeros(),
+            observations: (0..4).map(seen).collect(),
+        }];
+        scene.retain_views(|view| view.name != "b" && view.name != "c");
+        let left: Vec<_> = scene.views.iter().map(|view| view.name.as_str()).collect();
+        assert_eq!(left, ["a", "d"]);
+        let observations: Vec<_> = (scene.sparse_points[0].observations.iter())
+            .map(|seen| (seen.view, seen.pixel.x))
+            .collect();
+        assert_eq!(observations, [(0, 0.0), (1, 3.0)]);
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 use crate::background::Background;
 use neat_core::SphereChoice;
+use neat_detect::DetectorConfig;
 use neat_field::AttractionNetworkConfig;
 use neat_gjp::{CandidateConfig, MatchingConfig, PerceiverConfig};
 use neat_sdf::{DensityConfig, ImplicitNetworkConfig, RaySamplerConfig, RenderingNetworkConfig};
@@ -19,6 +20,9 @@ use serde::{Deserialize, Serialize};
 pub struct Config {
     /// How the scene is read.
     pub data: DataConfig,
+    /// How 2D wireframes are detected in scenes that come without.
+    #[serde(default)]
+    pub detect: DetectorConfig,
     /// The networks.
     pub model: ModelConfig,
     /// The optimisation.

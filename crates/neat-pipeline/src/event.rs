@@ -14,6 +14,8 @@ pub enum Stage {
     Synthesise,
     /// Images, poses and 2D wireframes are read, and hashed for the manifest.
     Load,
+    /// 2D wireframes are detected, where the scene has none.
+    Detect,
     /// The fields are optimised.
     Train,
     /// The wireframe is taken out of the fields.
@@ -29,6 +31,7 @@ impl fmt::Display for Stage {
         f.pad(match self {
             Self::Synthesise => "synthesise",
             Self::Load => "load",
+            Self::Detect => "detect",
             Self::Train => "train",
             Self::Distill => "distill",
             Self::Export => "export",

@@ -9,6 +9,7 @@ mod chunked_step;
 pub mod compare_backends;
 pub mod config;
 pub mod demo;
+pub mod detection;
 pub mod distill;
 pub mod error;
 pub mod estimate;

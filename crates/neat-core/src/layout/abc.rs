@@ -29,7 +29,7 @@ const PIXEL_CENTER: &str = "pixel_center";
 const SPHERE_RADIUS: &str = "sphere_radius";
 const IMAGES_DIR: &str = "images";
 /// The folder of 2D wireframes, in every layout.
-pub(super) const HAWP_DIR: &str = "hawp";
+pub const HAWP_DIR: &str = "hawp";
 
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let path = dir.join(CAMERAS_NPZ);

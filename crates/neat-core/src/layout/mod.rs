@@ -15,6 +15,7 @@ mod poses;
 mod sphere;
 pub mod transforms_json;
 
+pub use abc::HAWP_DIR;
 pub use pixel_center::PixelCenter;
 
 use crate::npz::NpzReader;
