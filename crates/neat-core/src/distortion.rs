@@ -32,6 +32,19 @@ pub enum Distortion {
         /// s1 … s4.
         thin_prism: [f64; 4],
     },
+    /// COLMAP's thin-prism fisheye, in which tangential and prism terms act before
+    /// the radial ones: with θ = atan r and `(u, v) = (x, y) · θ/r`, it is
+    /// `(u, v) · (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` plus
+    /// `(2 p1 u v + p2 (θ² + 2u²), p1 (θ² + 2v²) + 2 p2 u v)` and
+    /// `(s1 θ², s2 θ²)`.
+    ThinPrismFisheye {
+        /// k1 … k4.
+        radial: [f64; 4],
+        /// p1, p2.
+        tangential: [f64; 2],
+        /// s1, s2.
+        thin_prism: [f64; 2],
+    },
     /// Field of view: `(x, y) · atan(2 r tan(ω/2)) / (r ω)`.
     Fov {
         /// ω, in radians.
@@ -55,7 +68,7 @@ impl Distortion {
             Self::Brown { radial, tangential } => {
                 radial.iter().chain(tangential).all(|&x| x == 0.0)
             }
-            Self::Fisheye { .. } => false,
+            Self::Fisheye { .. } | Self::ThinPrismFisheye { .. } => false,
             Self::Fov { omega } => *omega == 0.0,
             Self::Division { k } => *k == 0.0,
         }

@@ -98,9 +98,9 @@ pub enum SceneError {
         /// What is wrong with it.
         problem: ViewError,
     },
-    /// A camera that is not a pinhole without distortion.
+    /// A camera of a model that cannot be turned into a pinhole here.
     #[error(
-        "{path}: camera {camera} of model {model} is not a pinhole without distortion: run `colmap image_undistorter` and give its images and model"
+        "{path}: camera {camera} has the model {model}, which is not read: run `colmap image_undistorter` and give its images and model"
     )]
     NotPinhole {
         /// The file with the camera.

@@ -4,12 +4,15 @@
 //! poses. Images and wireframes are read alike for all of them, by this file.
 
 pub mod abc;
+mod binary_reader;
 pub mod cameras_json;
 pub mod colmap;
 pub mod dtu;
 mod images;
 mod pixel_center;
 mod poses;
+mod reconstruction;
+mod text_lines;
 pub mod transforms_json;
 
 pub use pixel_center::PixelCenter;
