@@ -154,7 +154,7 @@ pub enum SceneError {
     },
     /// A folder that follows none of the known layouts.
     #[error(
-        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics` or with `world_mat_0` and `scale_mat_0`, or cameras.json, or transforms.json, or a COLMAP model (cameras and images, .bin or .txt) in sparse/0, sparse or the folder itself"
+        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics`, cameras.npz or cameras_sphere.npz with `world_mat_0` and `scale_mat_0`, cameras.json, transforms.json, a COLMAP model (cameras and images, .bin or .txt) in sparse/0, sparse or the folder itself, meta_data.json, sfm_data.json (OpenMVG), scene.mvs (OpenMVS), a .nvm file (VisualSfM), bundle.out with list.txt (Bundler), or NAME.jpg.camera files (Strecha)"
     )]
     UnknownLayout {
         /// The folder.
