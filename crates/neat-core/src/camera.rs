@@ -70,6 +70,18 @@ impl Intrinsics {
         }
     }
 
+    /// Square pixels, and the principal point in the middle of an image of
+    /// `size` = (width, height) whose corner is the origin.
+    pub fn centered(focal_length: f64, (width, height): (u32, u32)) -> Self {
+        Self {
+            fx: focal_length,
+            fy: focal_length,
+            cx: f64::from(width) / 2.0,
+            cy: f64::from(height) / 2.0,
+            skew: 0.0,
+        }
+    }
+
     /// As a matrix.
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::new(

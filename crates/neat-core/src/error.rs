@@ -98,9 +98,9 @@ pub enum SceneError {
         /// What is wrong with it.
         problem: ViewError,
     },
-    /// A camera that is not a pinhole without distortion.
+    /// A camera of a model that cannot be turned into a pinhole here.
     #[error(
-        "{path}: camera {camera} of model {model} is not a pinhole without distortion: run `colmap image_undistorter` and give its images and model"
+        "{path}: camera {camera} has the model {model}, which is not read: run `colmap image_undistorter` and give its images and model"
     )]
     NotPinhole {
         /// The file with the camera.
@@ -164,7 +164,7 @@ pub enum SceneError {
     },
     /// A folder that follows none of the known layouts.
     #[error(
-        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics` or with `world_mat_0` and `scale_mat_0`, or cameras.json, or transforms.json, or a COLMAP model (cameras and images, .bin or .txt) in sparse/0, sparse or the folder itself"
+        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics`, cameras.npz or cameras_sphere.npz with `world_mat_0` and `scale_mat_0`, cameras.json, transforms.json, a COLMAP model (cameras and images, .bin or .txt) in sparse/0, sparse or the folder itself, meta_data.json, sfm_data.json (OpenMVG), scene.mvs (OpenMVS), a .nvm file (VisualSfM), bundle.out with list.txt (Bundler), or NAME.jpg.camera files (Strecha)"
     )]
     UnknownLayout {
         /// The folder.

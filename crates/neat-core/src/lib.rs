@@ -24,6 +24,8 @@ pub mod ground_truth;
 pub mod hawp_json;
 pub mod layout;
 pub mod line_segment;
+#[cfg(test)]
+mod mutation;
 pub mod npz;
 pub mod point_cloud;
 pub mod scene;

@@ -78,15 +78,17 @@ fn detect_in(
     };
     let key = key(view, config);
     let name = Path::new("2D wireframe");
-    let stored = cache.get(&key).and_then(|bytes| hawp_json::parse(&bytes, 0.0, name).ok());
+    let stored = cache
+        .get(&key)
+        .and_then(|bytes| hawp_json::parse(&bytes, 0.0, name).ok());
     if let Some(wireframe) = stored {
         return (wireframe, None);
     }
     let wireframe = detect(&view.image, config);
     let stored = cache.put(&key, &hawp_json::to_bytes(&wireframe, 0.0));
-    let warning = stored.err().map(|error| {
-        format!("detected 2D wireframes are not kept for the next run: {error}")
-    });
+    let warning = stored
+        .err()
+        .map(|error| format!("detected 2D wireframes are not kept for the next run: {error}"));
     (wireframe, warning)
 }
 
@@ -131,9 +133,17 @@ mod tests {
         let mut fresh = scene();
         assert!(detected(&mut fresh, None).unwrap().is_empty());
         let found = |scene: &Scene| -> Vec<Wireframe2d> {
-            scene.views.iter().map(|view| view.wireframe.clone()).collect()
+            scene
+                .views
+                .iter()
+                .map(|view| view.wireframe.clone())
+                .collect()
         };
-        assert!(found(&fresh).iter().all(|wireframe| wireframe.edges.len() > 3));
+        assert!(
+            found(&fresh)
+                .iter()
+                .all(|wireframe| wireframe.edges.len() > 3)
+        );
         for _ in 0..2 {
             let mut cached = scene();
             detected(&mut cached, Some(&cache)).unwrap();

@@ -22,14 +22,19 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-pub(super) const INTRINSICS: &str = "intrinsics";
-pub(super) const EXTRINSICS: &str = "extrinsics";
+const INTRINSICS: &str = "intrinsics";
+const EXTRINSICS: &str = "extrinsics";
 const SCALE_MAT: &str = "scale_mat";
 const PIXEL_CENTER: &str = "pixel_center";
 const SPHERE_RADIUS: &str = "sphere_radius";
 const IMAGES_DIR: &str = "images";
 /// The folder of 2D wireframes, in every layout.
 pub const HAWP_DIR: &str = "hawp";
+
+/// Whether the arrays are those of this layout.
+pub(super) fn is_in(npz: &NpzReader) -> bool {
+    npz.contains(INTRINSICS) && npz.contains(EXTRINSICS)
+}
 
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let path = dir.join(CAMERAS_NPZ);

@@ -8,6 +8,19 @@ use std::{fs, io};
 /// The endings of the images that are read.
 pub(super) const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 
+/// The first file by name in `dir` with this ending. Hidden files do not count,
+/// nor do the files of a folder that cannot be read.
+pub(super) fn first_with_ending(dir: &Path, ending: &str) -> Option<PathBuf> {
+    let files = fs::read_dir(dir).into_iter().flatten().flatten();
+    let matches = |path: &PathBuf| {
+        path.extension()
+            .is_some_and(|found| found.eq_ignore_ascii_case(ending))
+            && !file_stem(path).starts_with('.')
+            && path.is_file()
+    };
+    files.map(|entry| entry.path()).filter(matches).min()
+}
+
 /// The images in a folder, sorted by file name. Hidden files are no images.
 pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let read_error = |source: io::Error| {
@@ -67,6 +80,42 @@ pub(super) fn with_existing_ending(image: PathBuf) -> PathBuf {
     others.find(|other| other.exists()).unwrap_or(image)
 }
 
+/// Folders above an image that are looked at, from the image upward.
+const MAX_FOLDERS: usize = 15;
+
+/// The image that the file of poses `path` calls `name`, in one of the folders
+/// `dirs`, of which the first is the one that the format means.
+///
+/// Such files come from other machines, with absolute paths, drive letters or
+/// `..`. No file outside the scene is opened: only what follows the last of these
+/// counts, and its leading folders are left out one by one until an image is
+/// found.
+pub(super) fn locate(path: &Path, dirs: &[PathBuf], name: &str) -> Result<PathBuf, SceneError> {
+    let mut parts: Vec<&str> = name.split(['/', '\\']).collect();
+    let leads_out = |part: &&str| *part == ".." || part.contains(':');
+    let start = parts.iter().rposition(leads_out).map_or(0, |at| at + 1);
+    parts.drain(..start);
+    parts.retain(|part| !part.is_empty() && *part != ".");
+    if parts.is_empty() {
+        return Err(SceneError::ViewName {
+            path: path.into(),
+            view: name.into(),
+            reason: "names no image: write the file again",
+        });
+    }
+    let shortened = (0..parts.len()).skip(parts.len().saturating_sub(MAX_FOLDERS + 1));
+    let candidates = shortened.flat_map(|from| {
+        let relative: PathBuf = parts[from..].iter().collect();
+        dirs.iter()
+            .map(move |dir| with_existing_ending(dir.join(&relative)))
+    });
+    let meant = dirs
+        .iter()
+        .map(|dir| dir.join(parts.iter().collect::<PathBuf>()));
+    let found = candidates.into_iter().find(|image| image.is_file());
+    Ok(found.or(meant.into_iter().next()).unwrap_or_default())
+}
+
 /// Decodes an image; transparent pixels are blended with `background`.
 pub(super) fn read_rgb(path: &Path, background: [u8; 3]) -> Result<RgbImage, SceneError> {
     // By its first bytes: endings of converted data sets are not to be trusted.
@@ -117,6 +166,38 @@ mod tests {
         rgba.save(&path).unwrap();
         let rgb = read_rgb(&path, [10, 20, 30]).unwrap();
         assert_eq!(rgb.into_raw(), [200, 100, 50, 10, 20, 30, 59, 67, 75]);
+    }
+
+    #[test]
+    fn images_are_located_below_the_scene_only() {
+        let dir = tempfile::tempdir().unwrap();
+        let scene = dir.path().join("scene");
+        fs::create_dir_all(scene.join("images/left")).unwrap();
+        for file in [
+            "a.png",
+            "scene/b.png",
+            "scene/images/c.png",
+            "scene/images/left/d.jpg",
+        ] {
+            fs::write(dir.path().join(file), b"x").unwrap();
+        }
+        let dirs = [scene.clone(), scene.join("images")];
+        let found = |name| locate(Path::new("model"), &dirs, name).unwrap();
+        for (name, expected) in [
+            ("b.png", "b.png"),
+            ("c.png", "images/c.png"),
+            ("/home/someone/photos/images/c.png", "images/c.png"),
+            (r"C:\photos\left\d.png", "images/left/d.jpg"),
+            ("../elsewhere/b.png", "b.png"),
+            // Not there: where the format means it, never above the scene.
+            ("../a.png", "a.png"),
+            ("./left/../none.png", "none.png"),
+        ] {
+            assert_eq!(found(name), scene.join(expected), "{name}");
+        }
+        for name in ["", "/", "..", "C:"] {
+            assert!(locate(Path::new("model"), &dirs, name).is_err(), "{name}");
+        }
     }
 
     #[test]

@@ -4,15 +4,24 @@
 //! poses. Images and wireframes are read alike for all of them, by this file.
 
 pub mod abc;
+mod binary_reader;
+pub mod bundler;
 pub mod cameras_json;
 pub mod colmap;
 pub mod dtu;
 mod images;
 mod masks;
+pub mod meta_data_json;
+pub mod nvm;
+pub mod openmvg;
+pub mod openmvs;
 mod pixel_center;
 mod point_files;
 mod poses;
+mod reconstruction;
 mod sphere;
+pub mod strecha;
+mod text_lines;
 pub mod transforms_json;
 
 pub use abc::HAWP_DIR;
@@ -36,26 +45,61 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// `images/`, `hawp/`, and `cameras.npz` with stacked `intrinsics` and
-    /// `extrinsics`: the ABC objects of the published code.
+    /// `extrinsics`: the ABC objects of the published code. See [`abc`].
     Abc,
-    /// `image/`, `hawp/`, and `cameras.npz` with `world_mat_i` and
-    /// `scale_mat_i`: DTU and BlendedMVS, as IDR, VolSDF and NeuS store them.
+    /// `image/`, `hawp/`, and `cameras_sphere.npz` or `cameras.npz` with
+    /// `world_mat_i` and `scale_mat_i`: DTU and BlendedMVS, as IDR, VolSDF and
+    /// NeuS store them. See [`dtu`].
     Dtu,
     /// `cameras.json` that names every image with its intrinsics and pose, and
-    /// `hawp/`.
+    /// `hawp/`. See [`cameras_json`].
     CamerasJson,
     /// `transforms.json` or `transforms_train.json` that names every image with
-    /// its pose, and `hawp/`: Blender's NeRF scenes, instant-ngp, nerfstudio.
+    /// its pose, and `hawp/`: Blender's NeRF scenes, instant-ngp, nerfstudio. See
+    /// [`transforms_json`].
     TransformsJson,
-    /// `images/`, `hawp/`, and a COLMAP model of undistorted images in
-    /// `sparse/0/`, `sparse/` or the folder itself, binary or text.
+    /// `images/`, `hawp/`, and a COLMAP model in `sparse/0/`, `sparse/` or the
+    /// folder itself, binary or text. See [`colmap`].
     Colmap,
+    /// `meta_data.json` that names every image with its pose, and `hawp/`:
+    /// sdfstudio and EMAP. See [`meta_data_json`].
+    MetaDataJson,
+    /// `sfm_data.json` of OpenMVG, and `hawp/`. See [`openmvg`].
+    OpenMvg,
+    /// A `.mvs` scene in OpenMVS's interface format, and `hawp/`. See [`openmvs`].
+    OpenMvs,
+    /// A `.nvm` file of VisualSfM, and `hawp/`. See [`nvm`].
+    VisualSfm,
+    /// `bundle.out` and `list.txt` of Bundler, and `hawp/`. See [`bundler`].
+    Bundler,
+    /// One `NAME.jpg.camera` per image, and `hawp/`: the benchmark of Strecha and
+    /// others. See [`strecha`].
+    Strecha,
+}
+
+impl fmt::Display for Layout {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Abc => "ABC (cameras.npz with intrinsics and extrinsics)",
+            Self::Dtu => "DTU (cameras.npz or cameras_sphere.npz with world_mat and scale_mat)",
+            Self::CamerasJson => "cameras.json",
+            Self::TransformsJson => "transforms.json (OpenGL axes)",
+            Self::Colmap => "COLMAP (cameras and images of a sparse model)",
+            Self::MetaDataJson => "meta_data.json (sdfstudio, EMAP)",
+            Self::OpenMvg => "OpenMVG (sfm_data.json)",
+            Self::OpenMvs => "OpenMVS (scene.mvs)",
+            Self::VisualSfm => "VisualSfM (N-View Match file, .nvm)",
+            Self::Bundler => "Bundler (bundle.out and list.txt)",
+            Self::Strecha => "Strecha (one .camera file per image)",
+        })
+    }
 }
 
 impl Layout {
-    /// Tells the layout of the folder `dir` by its files. `cameras.npz` is
-    /// looked at first, then `cameras.json`, then `transforms.json`, then a COLMAP
-    /// model.
+    /// Tells the layout of the folder `dir` by its files, looked for in the order
+    /// `cameras_sphere.npz`, `cameras.npz`, `cameras.json`, `transforms.json`, a
+    /// COLMAP model, `meta_data.json`, `sfm_data.json`, `.mvs`, `.nvm`,
+    /// `bundle.out`, `.camera`.
     ///
     /// # Errors
     /// If the folder does not exist or follows no known layout.
@@ -66,26 +110,38 @@ impl Layout {
                 remedy: "give the folder of a scene".into(),
             });
         }
-        let npz_path = dir.join(poses::CAMERAS_NPZ);
-        if npz_path.exists() {
-            let npz = NpzReader::open(&npz_path, poses::NPZ_REMEDY)?;
-            if npz.contains(abc::INTRINSICS) && npz.contains(abc::EXTRINSICS) {
-                return Ok(Self::Abc);
+        for npz_path in dtu::candidates(dir) {
+            if npz_path.exists() {
+                let npz = NpzReader::open(&npz_path, poses::NPZ_REMEDY)?;
+                if abc::is_in(&npz) && npz_path.ends_with(poses::CAMERAS_NPZ) {
+                    return Ok(Self::Abc);
+                }
+                if dtu::is_in(&npz) {
+                    return Ok(Self::Dtu);
+                }
             }
-            if npz.contains(&dtu::world_mat(0)) && npz.contains(&dtu::scale_mat(0)) {
-                return Ok(Self::Dtu);
-            }
         }
-        if dir.join(cameras_json::FILE_NAME).exists() {
-            return Ok(Self::CamerasJson);
+        let is_in: [(Self, bool); 9] = [
+            (
+                Self::CamerasJson,
+                dir.join(cameras_json::FILE_NAME).exists(),
+            ),
+            (Self::TransformsJson, transforms_json::find(dir).is_some()),
+            (Self::Colmap, colmap::is_in(dir)),
+            (
+                Self::MetaDataJson,
+                dir.join(meta_data_json::FILE_NAME).exists(),
+            ),
+            (Self::OpenMvg, openmvg::find(dir).is_some()),
+            (Self::OpenMvs, openmvs::find(dir).is_some()),
+            (Self::VisualSfm, nvm::find(dir).is_some()),
+            (Self::Bundler, bundler::find(dir).is_some()),
+            (Self::Strecha, strecha::find(dir).is_some()),
+        ];
+        match is_in.into_iter().find(|(_, found)| *found) {
+            Some((layout, _)) => Ok(layout),
+            None => Err(SceneError::UnknownLayout { path: dir.into() }),
         }
-        if transforms_json::find(dir).is_some() {
-            return Ok(Self::TransformsJson);
-        }
-        if colmap::is_in(dir) {
-            return Ok(Self::Colmap);
-        }
-        Err(SceneError::UnknownLayout { path: dir.into() })
     }
 
     fn read_poses(self, dir: &Path) -> Result<Poses, SceneError> {
@@ -95,6 +151,12 @@ impl Layout {
             Self::CamerasJson => cameras_json::read_poses(dir),
             Self::TransformsJson => transforms_json::read_poses(dir),
             Self::Colmap => colmap::read_poses(dir),
+            Self::MetaDataJson => meta_data_json::read_poses(dir),
+            Self::OpenMvg => openmvg::read_poses(dir),
+            Self::OpenMvs => openmvs::read_poses(dir),
+            Self::VisualSfm => nvm::read_poses(dir),
+            Self::Bundler => bundler::read_poses(dir),
+            Self::Strecha => strecha::read_poses(dir),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::npz::NpyArray;
 use crate::{CameraError, Distortion, Intrinsics, SceneError, Similarity, SparsePoint, ViewError};
-use nalgebra::{Matrix3, Matrix4};
+use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 
 /// The poses of a whole scene.
@@ -70,6 +70,40 @@ pub(super) fn view_error(path: &Path, view: &str, problem: impl Into<ViewError>)
         view: view.into(),
         problem: problem.into(),
     }
+}
+
+/// A file that breaks the rules of its format.
+pub(super) fn malformed(path: &Path, reason: String) -> SceneError {
+    SceneError::Malformed {
+        path: path.into(),
+        reason,
+    }
+}
+
+/// The rotation of a quaternion w, x, y, z of any length, as file and view have it.
+pub(super) fn rotation_of(
+    quaternion: [f64; 4],
+    path: &Path,
+    view: &str,
+) -> Result<UnitQuaternion<f64>, SceneError> {
+    let [w, x, y, z] = quaternion;
+    if quaternion.iter().any(|x| !x.is_finite()) {
+        return Err(view_error(path, view, CameraError::NotFinite));
+    }
+    let quaternion = Quaternion::new(w, x, y, z);
+    // Not zero, and neither so small nor so large that it cannot be divided by.
+    if !quaternion.norm().is_normal() {
+        let reason =
+            format!("the quaternion ({w}, {x}, {y}, {z}) of view `{view}` is not a rotation");
+        return Err(malformed(path, reason));
+    }
+    Ok(UnitQuaternion::from_quaternion(quaternion))
+}
+
+/// The 4×4 camera-to-world pose of a rotation camera-from-world and a centre.
+pub(super) fn pose_of(camera_from_world: &Matrix3<f64>, center: &Vector3<f64>) -> Matrix4<f64> {
+    let rotation = camera_from_world.transpose().to_homogeneous();
+    rotation.append_translation(center)
 }
 
 /// The upper left 3×3 of a matrix.
