@@ -121,11 +121,6 @@ impl CornerEvidence {
         Self { views }
     }
 
-    /// The corners of all views.
-    pub fn len(&self) -> usize {
-        self.views.iter().map(|view| view.corners.len()).sum()
-    }
-
     /// The share of corners that belong to a point of space which the trusted
     /// views confirm. Corners of other views count only where they are asked
     /// for one by one.

@@ -19,6 +19,7 @@ pub(crate) struct Keypoint {
 pub(crate) type Descriptor = [u64; 4];
 
 /// How many bits differ.
+#[inline(always)]
 pub(crate) fn distance(a: &Descriptor, b: &Descriptor) -> u32 {
     (0..4).map(|i| (a[i] ^ b[i]).count_ones()).sum()
 }

@@ -2,7 +2,7 @@
 
 use crate::agreement::Evidence;
 use crate::corner_consensus::{CornerEvidence, MAX_CORNERS, ViewCorners};
-use crate::corners::{Corner, corners, refined};
+use crate::corners::{corners, refined};
 use crate::descriptor::keypoints;
 use crate::gray_image::GrayImage;
 use crate::tracks::{ViewKeypoints, matching};
@@ -13,6 +13,9 @@ use rayon::prelude::*;
 /// Images with more corners than this show texture, which tells points apart.
 const TEXTURE: usize = 120;
 
+/// Corners that are refined; some are dropped then.
+const CANDIDATES: usize = 2 * MAX_CORNERS;
+
 /// What the images of some views show.
 pub(crate) struct Gathered {
     /// Indices of those views.
@@ -22,30 +25,27 @@ pub(crate) struct Gathered {
     pub likeness: Vec<f64>,
 }
 
-/// Corners of the given views, as many as tell texture.
-fn coarse_corners(working: &[(GrayImage, u32)], views: &[usize]) -> Vec<Vec<Corner>> {
-    (views.par_iter())
-        .map(|&view| corners(&working[view].0, TEXTURE + 1))
-        .collect()
-}
-
-fn median_count(found: &[Vec<Corner>]) -> usize {
-    let mut counts: Vec<usize> = found.iter().map(Vec::len).collect();
-    counts.sort_unstable();
-    counts.get(counts.len() / 2).copied().unwrap_or(0)
-}
-
 /// Whether most of the given views show texture.
 pub(crate) fn is_textured(working: &[(GrayImage, u32)], views: &[usize]) -> bool {
     // A few views tell; the first and the last are often the worst.
     let few: Vec<usize> = views.iter().copied().skip(1).step_by(6).collect();
-    median_count(&coarse_corners(working, &few)) > TEXTURE
+    let mut counts: Vec<usize> = (few.par_iter())
+        .map(|&view| corners(&working[view].0, TEXTURE + 1).len())
+        .collect();
+    counts.sort_unstable();
+    counts
+        .get(counts.len() / 2)
+        .is_some_and(|&count| count > TEXTURE)
 }
 
-/// Looks at the given views.
-pub(crate) fn gather(scene: &Scene, working: &[(GrayImage, u32)], views: Vec<usize>) -> Gathered {
-    let found = coarse_corners(working, &views);
-    if median_count(&found) > TEXTURE {
+/// Looks at the given views for points of texture or for corners.
+pub(crate) fn gather(
+    scene: &Scene,
+    working: &[(GrayImage, u32)],
+    views: Vec<usize>,
+    textured: bool,
+) -> Gathered {
+    if textured {
         let keypoints: Vec<_> = views
             .par_iter()
             .map(|&view| ViewKeypoints {
@@ -66,14 +66,14 @@ pub(crate) fn gather(scene: &Scene, working: &[(GrayImage, u32)], views: Vec<usi
                 .collect(),
         };
     }
-    let corners: Vec<_> = (views.par_iter().zip(found))
-        .map(|(&view, found)| {
+    let corners: Vec<_> = (views.par_iter())
+        .map(|&view| {
             let (image, factor) = &working[view];
             let gradients = image.blurred(1).gradients();
             let full = |working: f32| {
                 (f64::from(working) + 0.5) * f64::from(*factor) - 0.5 + scene.pixel_center
             };
-            let corners = found
+            let corners = corners(image, CANDIDATES)
                 .iter()
                 .filter_map(|corner| refined(&gradients, corner))
                 .take(MAX_CORNERS)

@@ -19,7 +19,7 @@ pub enum Depth {
     /// At some views; thoroughly only if their cameras do not agree with them.
     /// A second or two.
     Quick,
-    /// At up to 60 views, each with all others.
+    /// At up to 60 photographs or 300 images of things without texture.
     #[default]
     Full,
 }
@@ -46,8 +46,10 @@ pub struct ExamineOptions {
     pub pose_convention: Option<PoseConvention>,
 }
 
-/// Views that are looked at.
-const FULL_VIEWS: usize = 60;
+/// Views that are looked at: photographs, of which each is matched with all
+/// others, and images without texture.
+const FULL_PHOTOGRAPHS: usize = 60;
+const FULL_VIEWS: usize = 300;
 const QUICK_VIEWS: usize = 30;
 /// Photographs take longer: two runs of neighbours, by their names.
 const QUICK_RUN: usize = 6;
@@ -98,24 +100,31 @@ fn pose_findings(
 ) -> Vec<Finding> {
     let read_as = options.pose_convention.unwrap_or_default();
     let count = scene.views.len();
+    let textured = is_textured(working, &evenly(count, QUICK_VIEWS));
     if options.depth == Depth::Quick {
-        let mut views = evenly(count, QUICK_VIEWS);
-        if is_textured(working, &views) && count > 2 * QUICK_RUN {
+        let views = if textured && count > 2 * QUICK_RUN {
             let second = count / 2;
-            views = (0..QUICK_RUN).chain(second..second + QUICK_RUN).collect();
-        }
-        let gathered = gather(scene, working, views);
+            (0..QUICK_RUN).chain(second..second + QUICK_RUN).collect()
+        } else {
+            evenly(count, QUICK_VIEWS)
+        };
+        let gathered = gather(scene, working, views, textured);
         let diagnosis = Diagnosis::new(scene, &gathered, read_as, mirrored);
         if diagnosis.is_plainly_good() {
             return diagnosis.agreeing_findings();
         }
     }
-    let gathered = gather(scene, working, evenly(count, FULL_VIEWS));
+    let limit = if textured {
+        FULL_PHOTOGRAPHS
+    } else {
+        FULL_VIEWS
+    };
+    let gathered = gather(scene, working, evenly(count, limit), textured);
     Diagnosis::new(scene, &gathered, read_as, mirrored).findings()
 }
 
 /// At most `limit` of `count` views, evenly spread.
-fn evenly(count: usize, limit: usize) -> Vec<usize> {
+pub(crate) fn evenly(count: usize, limit: usize) -> Vec<usize> {
     let step = count.div_ceil(limit).max(1);
     (0..count).step_by(step).collect()
 }

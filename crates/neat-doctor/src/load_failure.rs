@@ -3,6 +3,7 @@
 use crate::examination::{Cause, Check, Finding, Level};
 use neat_core::{CameraError, SceneError, ViewError, Wireframe2dError};
 use std::error::Error;
+use std::path::Path;
 
 /// The finding for a scene that cannot be read: its cause and the error's own
 /// sentence, which names file, view and remedy.
@@ -31,14 +32,25 @@ fn cause(error: &SceneError) -> (Cause, &'static str) {
             (Cause::MissingFile, "files are missing")
         }
         SceneError::CountMismatch { .. } => (Cause::CountMismatch, "images or poses are missing"),
+        SceneError::Json { path, .. } if holds_nan(path) => (
+            Cause::NotFinite,
+            "a file holds NaN or infinity, which JSON has not",
+        ),
         SceneError::Empty { .. }
         | SceneError::Json { .. }
         | SceneError::Malformed { .. }
         | SceneError::WrongShape { .. }
         | SceneError::Image { .. } => (Cause::DamagedFile, "a file is damaged or truncated"),
+        SceneError::NotFinite { .. } => (Cause::NotFinite, "a file holds NaN or infinity"),
         SceneError::View { problem, .. } => cause_in_view(problem),
         _ => (Cause::Other, "the scene cannot be read"),
     }
+}
+
+/// Whether a JSON file has the words that Python writes for such numbers.
+fn holds_nan(path: &Path) -> bool {
+    std::fs::read_to_string(path)
+        .is_ok_and(|text| ["NaN", "Infinity"].iter().any(|word| text.contains(word)))
 }
 
 fn cause_in_view(problem: &ViewError) -> (Cause, &'static str) {

@@ -3,6 +3,7 @@
 use crate::agreement::{Agreement, Evidence};
 use crate::evidence::Gathered;
 use crate::examination::{Cause, Check, Finding, Level, Repair, counted, listed, percent};
+use crate::examine::evenly;
 use crate::hypothesis::{Hypothesis, PoseOrder, conventions};
 use crate::likeness::poses_follow_likeness;
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
@@ -13,6 +14,8 @@ use rayon::prelude::*;
 const CLEARLY: f64 = 1.3;
 /// Explanations whose scores differ less are equally good: the simpler holds.
 const EQUALLY: f64 = 0.95;
+/// Views among whose corners better cameras are searched for.
+const SEARCHED_VIEWS: usize = 60;
 /// A focal length further off than this, as a factor, spoils every result.
 const BAD_FOCAL_FACTOR: f64 = 1.08;
 
@@ -54,7 +57,7 @@ impl Limits {
             },
             // Curved things have few real corners among those that are found.
             Evidence::Corners(_) => Self {
-                min_total: 5 * views.max(8),
+                min_total: 5 * views.clamp(8, SEARCHED_VIEWS / 2),
                 good_share: 0.15,
                 bad_share: 0.05,
             },
@@ -92,6 +95,15 @@ impl<'a> Diagnosis<'a> {
         trusted
     }
 
+    /// Trusts as many of these as a search among hundreds of hypotheses needs.
+    fn some_trusted(&self) -> Vec<bool> {
+        let mut trusted = vec![false; self.scene.views.len()];
+        for index in evenly(self.gathered.views.len(), SEARCHED_VIEWS) {
+            trusted[self.gathered.views[index]] = true;
+        }
+        trusted
+    }
+
     /// Whether the given cameras explain what they should, and nothing has to be
     /// searched for.
     pub fn is_plainly_good(&self) -> bool {
@@ -112,7 +124,7 @@ impl<'a> Diagnosis<'a> {
 
     /// What is found about the poses.
     pub fn findings(&self) -> Vec<Finding> {
-        let trusted = self.all_trusted();
+        let trusted = self.some_trusted();
         let given = self.evidence().agreement(&self.cameras, &trusted);
         let limits = Limits::of(self.evidence(), self.gathered.views.len());
         if given.all.total < limits.min_total {
@@ -124,7 +136,7 @@ impl<'a> Diagnosis<'a> {
         if self.mirrored {
             return vec![self.mirrored_without_repair()];
         }
-        let trusted = self.without_bad_views(trusted);
+        let trusted = self.without_bad_views(self.all_trusted());
         let rest = self.evidence().agreement(&self.cameras, &trusted);
         if rest.share() < limits.bad_share {
             return vec![self.disagreement(&given)];

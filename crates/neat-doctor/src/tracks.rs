@@ -81,7 +81,10 @@ pub(crate) fn matching(views: &[ViewKeypoints]) -> Matching {
         .collect();
     let partners: Vec<Vec<u16>> = pairs
         .par_iter()
-        .map(|&[i, j]| partners(&views[i].keypoints, &views[j].keypoints))
+        // With the processor's own instructions for counting bits.
+        .map(|&[i, j]| {
+            pulp::Arch::new().dispatch(|| partners(&views[i].keypoints, &views[j].keypoints))
+        })
         .collect();
     let common = (partners.iter())
         .map(|partners| partners.iter().filter(|&&partner| partner != NONE).count())
@@ -131,6 +134,7 @@ fn motion(views: &[ViewKeypoints], corners: &[(usize, u16); 3]) -> f32 {
 
 /// For each keypoint of `a` the one of `b` that looks most like it, if that is
 /// mutual and no other place of `b` looks nearly as alike.
+#[inline(always)]
 fn partners(a: &[Keypoint], b: &[Keypoint]) -> Vec<u16> {
     let mut of_a = vec![Nearest::NONE; a.len()];
     let mut of_b = vec![Nearest::NONE; b.len()];
@@ -164,6 +168,7 @@ impl Nearest {
         next_distance: u32::MAX,
     };
 
+    #[inline(always)]
     fn offer(&mut self, distance: u32, index: usize, keypoints: &[Keypoint]) {
         if distance >= self.next_distance {
             return;
