@@ -68,6 +68,16 @@ pub enum SceneError {
         /// Which rule it breaks.
         reason: String,
     },
+    /// NaN or an infinite number where only numbers make sense.
+    #[error("{path} cannot be used: {element} is {value}; write it again")]
+    NotFinite {
+        /// The file, or the array in it.
+        path: PathBuf,
+        /// Which one.
+        element: String,
+        /// What it is instead of a number.
+        value: f64,
+    },
     /// An array of another shape than its layout asks for.
     #[error("array `{array}` of {path} has shape {found:?}, expected {expected}")]
     WrongShape {

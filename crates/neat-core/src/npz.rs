@@ -135,10 +135,11 @@ pub fn parse_npy(bytes: &[u8], path: &Path) -> Result<NpyArray, SceneError> {
         npyz::Order::Fortran => c_order_from_fortran(&shape, &values),
     };
     match values.iter().position(|value| !value.is_finite()) {
-        Some(index) => Err(malformed(
-            path,
-            format!("element {index} (in C order) is {}", values[index]),
-        )),
+        Some(index) => Err(SceneError::NotFinite {
+            path: path.into(),
+            element: format!("element {index} (in C order)"),
+            value: values[index],
+        }),
         None => Ok(NpyArray { shape, values }),
     }
 }

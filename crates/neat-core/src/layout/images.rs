@@ -1,7 +1,8 @@
 //! Images on disk.
 
 use crate::{SceneError, hawp_json::file_stem};
-use image::{DynamicImage, ImageDecoder, ImageReader, RgbImage};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -118,19 +119,56 @@ pub(super) fn locate(path: &Path, dirs: &[PathBuf], name: &str) -> Result<PathBu
 
 /// Decodes an image; transparent pixels are blended with `background`.
 pub(super) fn read_rgb(path: &Path, background: [u8; 3]) -> Result<RgbImage, SceneError> {
+    let read_error = |source| crate::file::read_error(path, REMEDY, source);
+    let image_error = |source| SceneError::Image {
+        path: path.into(),
+        source,
+    };
+    let bytes = fs::read(path).map_err(read_error)?;
     // By its first bytes: endings of converted data sets are not to be trusted.
-    let image = ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|source| crate::file::read_error(path, REMEDY, source))?
-        .decode()
-        .map_err(|source| SceneError::Image {
-            path: path.into(),
-            source,
-        })?;
+    let reader = ImageReader::new(Cursor::new(&bytes))
+        .with_guessed_format()
+        .map_err(read_error)?;
+    // The decoder makes up what is missing.
+    if reader.format() == Some(ImageFormat::Jpeg) && !jpeg_is_complete(&bytes) {
+        let error = io::Error::new(io::ErrorKind::UnexpectedEof, "the file is truncated");
+        return Err(image_error(ImageError::IoError(error)));
+    }
+    let image = reader.decode().map_err(image_error)?;
     if image.color().has_alpha() {
         return Ok(blend(&image, background));
     }
     Ok(image.into_rgb8())
+}
+
+/// Whether a JPEG file goes on to its end marker (ITU-T T.81, annex B). What
+/// follows is nobody's business.
+fn jpeg_is_complete(bytes: &[u8]) -> bool {
+    const END: u8 = 0xd9;
+    const START_OF_SCAN: u8 = 0xda;
+    let mut at = 0;
+    let mut in_scan = false;
+    while let Some(&[first, marker]) = bytes.get(at..at + 2).and_then(|b| b.first_chunk()) {
+        match (first, marker) {
+            (0xff, END) => return true,
+            // Zeros are stuffed, and markers of restarts put, into scans only;
+            // 0xd8 starts the image, and any number of 0xff fills.
+            (0xff, 0x00 | 0xd0..=0xd8) => at += 2,
+            (0xff, 0xff) => at += 1,
+            (0xff, marker) => {
+                let Some(&length) = bytes.get(at + 2..).and_then(|b| b.first_chunk()) else {
+                    return false;
+                };
+                in_scan = marker == START_OF_SCAN;
+                at += 2 + usize::from(u16::from_be_bytes(length)).max(2);
+            }
+            // Decoders differ in what they take between segments; none may be
+            // refused that they take.
+            _ if !in_scan => return true,
+            _ => at += 1,
+        }
+    }
+    false
 }
 
 fn blend(image: &DynamicImage, background: [u8; 3]) -> RgbImage {
@@ -198,6 +236,24 @@ mod tests {
         for name in ["", "/", "..", "C:"] {
             assert!(locate(Path::new("model"), &dirs, name).is_err(), "{name}");
         }
+    }
+
+    #[test]
+    fn truncated_jpegs_are_errors_and_trailing_bytes_are_not() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.jpg");
+        let noise = |x: u32, y: u32| (x * 7919 + y * 104_729).wrapping_mul(2_654_435_761) >> 24;
+        let image = RgbImage::from_fn(64, 48, |x, y| image::Rgb([noise(x, y) as u8; 3]));
+        image.save(&path).unwrap();
+        let mut bytes = fs::read(&path).unwrap();
+        for share in [4, 2] {
+            fs::write(&path, &bytes[..bytes.len() - bytes.len() / share]).unwrap();
+            let error = read_rgb(&path, [0; 3]).unwrap_err();
+            assert!(matches!(error, SceneError::Image { .. }), "{error}");
+        }
+        bytes.extend_from_slice(b"more \xff\xda than an image");
+        fs::write(&path, &bytes).unwrap();
+        assert_eq!(read_rgb(&path, [0; 3]).unwrap().dimensions(), (64, 48));
     }
 
     #[test]

@@ -17,6 +17,7 @@ pub mod openmvg;
 pub mod openmvs;
 mod pixel_center;
 mod point_files;
+mod pose_convention;
 mod poses;
 mod reconstruction;
 mod sphere;
@@ -26,13 +27,14 @@ pub mod transforms_json;
 
 pub use abc::HAWP_DIR;
 pub use pixel_center::PixelCenter;
+pub use pose_convention::{CameraAxes, PoseConvention, PoseConventionError, PoseDirection};
 
 use crate::npz::NpzReader;
 use crate::scene::{check_image_size, check_names};
 use crate::scene_sphere::SphereSource;
 use crate::{
-    Camera, Observation, Scene, SceneError, SceneSphere, SparsePoint, SphereChoice, View,
-    ViewError, Wireframe2d, hawp_json,
+    Camera, Intrinsics, Observation, Scene, SceneError, SceneSphere, SparsePoint, SphereChoice,
+    View, ViewError, Wireframe2d, hawp_json,
 };
 use image::RgbImage;
 use poses::{PosedImage, Poses};
@@ -179,6 +181,15 @@ pub struct LoadOptions {
     pub background: [u8; 3],
     /// What places the scene sphere, whose centre becomes the world's origin.
     pub sphere: SphereChoice,
+    /// What the poses really are, where they are not what their layout says:
+    /// applied to what the layout's reader returns.
+    pub pose_convention: Option<PoseConvention>,
+    /// Multiplies the focal lengths.
+    pub focal_scale: Option<f64>,
+    /// Multiplies focal lengths and principal points, and the image size where
+    /// the layout gives one: 0.5 for intrinsics made before the images were
+    /// scaled down to half. The origin is taken to be the corner of the image.
+    pub intrinsics_scale: Option<f64>,
 }
 
 impl Default for LoadOptions {
@@ -190,6 +201,45 @@ impl Default for LoadOptions {
             require_wireframes: true,
             background: [0; 3],
             sphere: SphereChoice::Auto,
+            pose_convention: None,
+            focal_scale: None,
+            intrinsics_scale: None,
+        }
+    }
+}
+
+impl LoadOptions {
+    /// Makes poses, intrinsics and points what these options say they are.
+    fn correct(&self, poses: &mut Poses) {
+        let convention = self.pose_convention.unwrap_or_default();
+        let scale = self.intrinsics_scale.unwrap_or(1.0);
+        let focal_scale = scale * self.focal_scale.unwrap_or(1.0);
+        for view in &mut poses.views {
+            view.world_from_camera = convention.world_from_camera(&view.world_from_camera);
+            let stored = view.intrinsics;
+            view.intrinsics = Intrinsics {
+                fx: stored.fx * focal_scale,
+                fy: stored.fy * focal_scale,
+                cx: stored.cx * scale,
+                cy: stored.cy * scale,
+                skew: stored.skew * focal_scale,
+            };
+            if self.intrinsics_scale.is_some() {
+                // Saturates where the factor makes no sense.
+                let scaled = |pixels: u32| (f64::from(pixels) * scale).round() as u32;
+                view.size = view.size.map(|(w, h)| (scaled(w), scaled(h)));
+            }
+        }
+        for point in &mut poses.points {
+            for observation in &mut point.observations {
+                observation.pixel *= scale;
+            }
+            if convention.mirrored_world {
+                point.position_in_world.z *= -1.0;
+            }
+        }
+        if convention.mirrored_world {
+            poses.original_from_world.translation.z *= -1.0;
         }
     }
 }
@@ -272,7 +322,8 @@ impl fmt::Display for SceneWarning {
 pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
     let dir = dir.as_ref();
     let layout = options.layout.map_or_else(|| Layout::detect(dir), Ok)?;
-    let poses = layout.read_poses(dir)?;
+    let mut poses = layout.read_poses(dir)?;
+    options.correct(&mut poses);
     if poses.views.is_empty() {
         return Err(SceneError::NoView { path: dir.into() });
     }
