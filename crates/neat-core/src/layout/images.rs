@@ -1,6 +1,6 @@
 //! Images on disk.
 
-use crate::{SceneError, hawp_json::file_stem};
+use crate::{SceneError, file, hawp_json::file_stem};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ pub(super) fn first_with_ending(dir: &Path, ending: &str) -> Option<PathBuf> {
 /// The images in a folder, sorted by file name. Hidden files are no images.
 pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let read_error = |source: io::Error| {
-        crate::file::read_error(dir, "a scene needs this folder with its images", source)
+        file::read_error(dir, "a scene needs this folder with its images", source)
     };
     let mut images = Vec::new();
     for entry in fs::read_dir(dir).map_err(read_error)? {
@@ -57,7 +57,7 @@ const REMEDY: &str = "put the image there or remove its pose";
 pub(super) fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
     ImageReader::open(path)
         .and_then(ImageReader::with_guessed_format)
-        .map_err(|source| crate::file::read_error(path, REMEDY, source))?
+        .map_err(|source| file::read_error(path, REMEDY, source))?
         .into_dimensions()
         .map_err(|source| SceneError::Image {
             path: path.into(),
@@ -117,20 +117,28 @@ pub(super) fn locate(path: &Path, dirs: &[PathBuf], name: &str) -> Result<PathBu
     Ok(found.or(meant.into_iter().next()).unwrap_or_default())
 }
 
-/// Decodes an image; transparent pixels are blended with `background`.
-pub(super) fn read_rgb(path: &Path, background: [u8; 3]) -> Result<RgbImage, SceneError> {
-    let read_error = |source| crate::file::read_error(path, REMEDY, source);
+/// The bytes of an image's file.
+pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
+    file::read(path, REMEDY)
+}
+
+/// Decodes the bytes of an image; transparent pixels are blended with
+/// `background`. `path` is for messages.
+pub(super) fn decode_rgb(
+    bytes: &[u8],
+    path: &Path,
+    background: [u8; 3],
+) -> Result<RgbImage, SceneError> {
     let image_error = |source| SceneError::Image {
         path: path.into(),
         source,
     };
-    let bytes = fs::read(path).map_err(read_error)?;
     // By its first bytes: endings of converted data sets are not to be trusted.
-    let reader = ImageReader::new(Cursor::new(&bytes))
+    let reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
-        .map_err(read_error)?;
+        .map_err(|source| image_error(source.into()))?;
     // The decoder makes up what is missing.
-    if reader.format() == Some(ImageFormat::Jpeg) && !jpeg_is_complete(&bytes) {
+    if reader.format() == Some(ImageFormat::Jpeg) && !jpeg_is_complete(bytes) {
         let error = io::Error::new(io::ErrorKind::UnexpectedEof, "the file is truncated");
         return Err(image_error(ImageError::IoError(error)));
     }
@@ -202,7 +210,8 @@ mod tests {
         rgba.put_pixel(1, 0, image::Rgba([200, 100, 50, 0]));
         rgba.put_pixel(2, 0, image::Rgba([255, 255, 255, 51]));
         rgba.save(&path).unwrap();
-        let rgb = read_rgb(&path, [10, 20, 30]).unwrap();
+        let bytes = read_bytes(&path).unwrap();
+        let rgb = decode_rgb(&bytes, &path, [10, 20, 30]).unwrap();
         assert_eq!(rgb.into_raw(), [200, 100, 50, 10, 20, 30, 59, 67, 75]);
     }
 
@@ -247,13 +256,13 @@ mod tests {
         image.save(&path).unwrap();
         let mut bytes = fs::read(&path).unwrap();
         for share in [4, 2] {
-            fs::write(&path, &bytes[..bytes.len() - bytes.len() / share]).unwrap();
-            let error = read_rgb(&path, [0; 3]).unwrap_err();
+            let part = &bytes[..bytes.len() - bytes.len() / share];
+            let error = decode_rgb(part, &path, [0; 3]).unwrap_err();
             assert!(matches!(error, SceneError::Image { .. }), "{error}");
         }
         bytes.extend_from_slice(b"more \xff\xda than an image");
-        fs::write(&path, &bytes).unwrap();
-        assert_eq!(read_rgb(&path, [0; 3]).unwrap().dimensions(), (64, 48));
+        let image = decode_rgb(&bytes, &path, [0; 3]).unwrap();
+        assert_eq!(image.dimensions(), (64, 48));
     }
 
     #[test]

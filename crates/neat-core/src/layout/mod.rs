@@ -10,36 +10,36 @@ pub mod cameras_json;
 pub mod colmap;
 pub mod dtu;
 mod images;
+mod load;
+mod load_options;
 mod masks;
 pub mod meta_data_json;
 pub mod nvm;
 pub mod openmvg;
 pub mod openmvs;
+mod photograph;
 mod pixel_center;
 mod point_files;
 mod pose_convention;
 mod poses;
 mod reconstruction;
+mod rectify;
 mod sphere;
 pub mod strecha;
 mod text_lines;
 pub mod transforms_json;
+mod warning;
 
 pub use abc::HAWP_DIR;
+pub use load::{LoadedScene, load_scene};
+pub use load_options::LoadOptions;
 pub use pixel_center::PixelCenter;
 pub use pose_convention::{CameraAxes, PoseConvention, PoseConventionError, PoseDirection};
+pub use warning::SceneWarning;
 
+use crate::SceneError;
 use crate::npz::NpzReader;
-use crate::scene::{check_image_size, check_names};
-use crate::scene_sphere::SphereSource;
-use crate::{
-    Camera, Intrinsics, Observation, Scene, SceneError, SceneSphere, SparsePoint, SphereChoice,
-    View, ViewError, Wireframe2d, hawp_json,
-};
-use image::RgbImage;
-use poses::{PosedImage, Poses};
-use rayon::prelude::*;
-use sphere::Evidence;
+use poses::Poses;
 use std::fmt;
 use std::path::Path;
 
@@ -161,315 +161,4 @@ impl Layout {
             Self::Strecha => strecha::read_poses(dir),
         }
     }
-}
-
-/// How [`load_scene`] reads a scene.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LoadOptions {
-    /// The layout; `None` tells it by the files.
-    pub layout: Option<Layout>,
-    /// Where the centre of a pixel lies in the coordinates of the intrinsics.
-    pub pixel_center: PixelCenter,
-    /// A view is usable if a segment has a score above this. The published code
-    /// uses 0.05 for training.
-    pub min_segment_score: f64,
-    /// Whether views need 2D wireframes: if so, a missing wireframe is an error
-    /// and views without a usable segment are dropped. If not, every view is
-    /// kept, and one without a file has an empty wireframe.
-    pub require_wireframes: bool,
-    /// The colour behind transparent pixels.
-    pub background: [u8; 3],
-    /// What places the scene sphere, whose centre becomes the world's origin.
-    pub sphere: SphereChoice,
-    /// What the poses really are, where they are not what their layout says:
-    /// applied to what the layout's reader returns.
-    pub pose_convention: Option<PoseConvention>,
-    /// Multiplies the focal lengths.
-    pub focal_scale: Option<f64>,
-    /// Multiplies focal lengths and principal points, and the image size where
-    /// the layout gives one: 0.5 for intrinsics made before the images were
-    /// scaled down to half. The origin is taken to be the corner of the image.
-    pub intrinsics_scale: Option<f64>,
-}
-
-impl Default for LoadOptions {
-    fn default() -> Self {
-        Self {
-            layout: None,
-            pixel_center: PixelCenter::Auto,
-            min_segment_score: 0.05,
-            require_wireframes: true,
-            background: [0; 3],
-            sphere: SphereChoice::Auto,
-            pose_convention: None,
-            focal_scale: None,
-            intrinsics_scale: None,
-        }
-    }
-}
-
-impl LoadOptions {
-    /// Makes poses, intrinsics and points what these options say they are.
-    fn correct(&self, poses: &mut Poses) {
-        let convention = self.pose_convention.unwrap_or_default();
-        let scale = self.intrinsics_scale.unwrap_or(1.0);
-        let focal_scale = scale * self.focal_scale.unwrap_or(1.0);
-        for view in &mut poses.views {
-            view.world_from_camera = convention.world_from_camera(&view.world_from_camera);
-            let stored = view.intrinsics;
-            view.intrinsics = Intrinsics {
-                fx: stored.fx * focal_scale,
-                fy: stored.fy * focal_scale,
-                cx: stored.cx * scale,
-                cy: stored.cy * scale,
-                skew: stored.skew * focal_scale,
-            };
-            if self.intrinsics_scale.is_some() {
-                // Saturates where the factor makes no sense.
-                let scaled = |pixels: u32| (f64::from(pixels) * scale).round() as u32;
-                view.size = view.size.map(|(w, h)| (scaled(w), scaled(h)));
-            }
-        }
-        for point in &mut poses.points {
-            for observation in &mut point.observations {
-                observation.pixel *= scale;
-            }
-            if convention.mirrored_world {
-                point.position_in_world.z *= -1.0;
-            }
-        }
-        if convention.mirrored_world {
-            poses.original_from_world.translation.z *= -1.0;
-        }
-    }
-}
-
-/// A scene with what a person should know about how it was read.
-#[derive(Clone, Debug)]
-pub struct LoadedScene {
-    /// The scene: validated, its views sorted by name.
-    pub scene: Scene,
-    /// The layout that it was read by.
-    pub layout: Layout,
-    /// The scene sphere, in the frame and unit of the files.
-    pub sphere: SceneSphere,
-    /// In the order of the views.
-    pub warnings: Vec<SceneWarning>,
-}
-
-/// Something that does not stop a scene from being read.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum SceneWarning {
-    /// The principal point does not tell where pixel centres are.
-    PixelCenterAssumed {
-        /// The value taken.
-        pixel_center: f64,
-    },
-    /// Nothing tells where the scene is: its sphere lies around the origin of the
-    /// poses.
-    SphereUnknown,
-    /// A view was dropped because nothing was detected in it.
-    ViewWithoutSegments {
-        /// Name of the view.
-        view: String,
-        /// No segment's score is above this.
-        min_segment_score: f64,
-    },
-}
-
-impl fmt::Display for SceneWarning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::PixelCenterAssumed { pixel_center } => write!(
-                f,
-                "the intrinsics do not tell where pixel centres are: {pixel_center} is assumed"
-            ),
-            Self::SphereUnknown => f.write_str(
-                "neither sparse points nor the cameras tell where the scene is: its sphere is put around the origin of the poses; give --scene-sphere x,y,z,radius if that is not the object",
-            ),
-            Self::ViewWithoutSegments {
-                view,
-                min_segment_score,
-            } => write!(
-                f,
-                "view `{view}` is left out: no segment has a score above {min_segment_score}"
-            ),
-        }
-    }
-}
-
-/// Reads the scene in the folder `dir`.
-///
-/// Images and poses belong together by the order of the sorted file names, as in
-/// the published code, or by name where the layout gives names. Wireframes
-/// belong to images by name. Images are decoded in parallel; the result does not
-/// depend on the number of threads.
-///
-/// # Errors
-/// Everything that [`SceneError`] lists; the first view in order decides.
-///
-/// # Example
-/// ```no_run
-/// use neat_core::{LoadOptions, load_scene};
-/// let loaded = load_scene("data/abc-00075213", &LoadOptions::default())?;
-/// for warning in &loaded.warnings {
-///     eprintln!("{warning}");
-/// }
-/// assert!(!loaded.scene.views.is_empty());
-/// # Ok::<(), neat_core::SceneError>(())
-/// ```
-pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<LoadedScene, SceneError> {
-    let dir = dir.as_ref();
-    let layout = options.layout.map_or_else(|| Layout::detect(dir), Ok)?;
-    let mut poses = layout.read_poses(dir)?;
-    options.correct(&mut poses);
-    if poses.views.is_empty() {
-        return Err(SceneError::NoView { path: dir.into() });
-    }
-    check_names(poses.views.iter().map(|view| view.name.as_str()), dir)?;
-    let hawp_dir = dir.join(abc::HAWP_DIR);
-    // Before the images, which take seconds to decode.
-    if options.require_wireframes && !hawp_dir.is_dir() {
-        return Err(SceneError::Missing {
-            path: hawp_dir,
-            remedy: hawp_json::REMEDY.into(),
-        });
-    }
-
-    let photos = try_par_map(&poses.views, |posed| {
-        let image = images::read_rgb(&posed.image, options.background)?;
-        Ok((camera_of(posed, &image, &poses.path)?, image))
-    })?;
-    let mut warnings = Vec::new();
-    let told = match options.pixel_center {
-        PixelCenter::Integer => Some(0.0),
-        PixelCenter::Half => Some(0.5),
-        PixelCenter::Auto => poses
-            .pixel_center
-            .or_else(|| pixel_center::infer(photos.iter().map(|(camera, _)| camera))),
-    };
-    let pixel_center = told.unwrap_or(pixel_center::PUBLISHED);
-    if told.is_none() {
-        warnings.push(SceneWarning::PixelCenterAssumed { pixel_center });
-    }
-    let wireframes = try_par_map(&poses.views, |posed| {
-        let path = hawp_dir.join(format!("{}.json", posed.name));
-        let absent = !options.require_wireframes && !path.exists();
-        (!absent)
-            .then(|| hawp_json::read(&path, pixel_center))
-            .transpose()
-    })?;
-
-    let mut views = Vec::new();
-    // Where each view of the files is in `views`, if it is kept.
-    let mut kept = Vec::new();
-    for ((posed, (camera, image)), wireframe) in poses.views.iter().zip(photos).zip(wireframes) {
-        let view = View {
-            name: posed.name.clone(),
-            camera,
-            wireframe: wireframe.unwrap_or_else(|| Wireframe2d::empty(camera.width, camera.height)),
-            image,
-        };
-        view.validate()
-            .map_err(|problem| poses::view_error(&hawp_dir, &view.name, problem))?;
-        let segments = view.wireframe.segments(options.min_segment_score);
-        if options.require_wireframes && segments.is_empty() {
-            warnings.push(SceneWarning::ViewWithoutSegments {
-                view: view.name,
-                min_segment_score: options.min_segment_score,
-            });
-            kept.push(None);
-        } else {
-            kept.push(Some(views.len()));
-            views.push(view);
-        }
-    }
-    if views.is_empty() {
-        return Err(SceneError::NoUsableView {
-            path: dir.into(),
-            views: poses.views.len(),
-            min_segment_score: options.min_segment_score,
-        });
-    }
-    let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
-    let points = match poses.points.is_empty() {
-        true => point_files::read(dir, &cameras, &poses.original_from_world)?,
-        false => observed_by(poses.points, &kept),
-    };
-    let images: Vec<PosedImage> = (poses.views.into_iter().zip(&kept))
-        .filter_map(|(image, kept)| kept.map(|_| image))
-        .collect();
-    let sphere = Evidence {
-        dir,
-        images: &images,
-        cameras: &cameras,
-        points: &points,
-        declared_radius: poses.declared_radius,
-    }
-    .sphere(options.sphere, &poses.original_from_world)?;
-    if sphere.source == SphereSource::Unknown {
-        warnings.push(SceneWarning::SphereUnknown);
-    }
-    let scene = Scene {
-        name: scene_name(dir),
-        views,
-        original_from_world: poses.original_from_world,
-        pixel_center,
-        sphere_radius: sphere.radius,
-        sparse_points: points,
-    }
-    .centered_at(&sphere.center);
-    Ok(LoadedScene {
-        sphere: SceneSphere {
-            center: poses.original_from_world.apply(&sphere.center),
-            radius: poses.original_from_world.scale * sphere.radius,
-            ..sphere
-        },
-        scene,
-        layout,
-        warnings,
-    })
-}
-
-/// `points` with the observations of the views that are kept, under their new
-/// indices.
-fn observed_by(mut points: Vec<SparsePoint>, kept: &[Option<usize>]) -> Vec<SparsePoint> {
-    for point in &mut points {
-        point.observations = (point.observations.iter())
-            .filter_map(|&Observation { view, pixel }| {
-                let view = *kept.get(view)?;
-                view.map(|view| Observation { view, pixel })
-            })
-            .collect();
-    }
-    points
-}
-
-/// The camera of `posed`, for its decoded `image`. `path` is that of the poses.
-fn camera_of(posed: &PosedImage, image: &RgbImage, path: &Path) -> Result<Camera, SceneError> {
-    let (width, height) = image.dimensions();
-    let size = posed.size.unwrap_or((width, height));
-    check_image_size("camera", size, (width, height))
-        .and_then(|()| {
-            Camera::try_from_matrices(posed.intrinsics, &posed.world_from_camera, width, height)
-                .map_err(ViewError::Camera)
-        })
-        .map_err(|problem| poses::view_error(path, &posed.name, problem))
-}
-
-/// The folder's name, also for `.` and `scene/..`.
-fn scene_name(dir: &Path) -> String {
-    let canonical = dir.canonicalize().unwrap_or_else(|_| dir.into());
-    let name = canonical.file_name().unwrap_or(canonical.as_os_str());
-    name.to_string_lossy().into_owned()
-}
-
-/// Maps in parallel; of several errors the first in order is returned.
-fn try_par_map<T: Sync, U: Send>(
-    items: &[T],
-    f: impl Fn(&T) -> Result<U, SceneError> + Sync + Send,
-) -> Result<Vec<U>, SceneError> {
-    let results: Vec<_> = items.par_iter().map(f).collect();
-    results.into_iter().collect()
 }

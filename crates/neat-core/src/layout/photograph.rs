@@ -1,0 +1,88 @@
+//! The image of a view: its photograph, decoded and rectified, or what an earlier
+//! run has kept of that.
+
+use super::images;
+use super::poses::{PosedImage, view_error};
+use super::rectify::Rectification;
+use crate::SceneError;
+use crate::file_cache::{CacheKey, FileCache};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ImageFormat, RgbImage};
+
+/// The kind of the results in the cache.
+const KIND: &str = "undistorted";
+/// To be raised whenever the same photograph and lens give another image.
+const VERSION: u32 = 1;
+
+/// An image, and why it is not in the cache though it should be.
+pub(super) struct Photograph {
+    pub image: RgbImage,
+    pub not_cached: Option<SceneError>,
+}
+
+/// Reads and rectifies the photograph of `posed`. Transparent pixels show
+/// `background`. Images that are undistorted are looked for in `cache`, and kept
+/// there; decoding others is as fast as that.
+///
+/// # Errors
+/// If the photograph cannot be read.
+pub(super) fn read(
+    posed: &PosedImage,
+    rectification: &Rectification,
+    background: [u8; 3],
+    cache: Option<&FileCache>,
+) -> Result<Photograph, SceneError> {
+    let bytes = images::read_bytes(&posed.image)?;
+    let rectify = || {
+        let photograph = images::decode_rgb(&bytes, &posed.image, background)?;
+        rectification
+            .image(photograph)
+            .map_err(|problem| view_error(&posed.image, &posed.name, problem))
+    };
+    let cache = cache.filter(|_| rectification.lens().is_some());
+    let Some(cache) = cache else {
+        return Ok(Photograph {
+            image: rectify()?,
+            not_cached: None,
+        });
+    };
+
+    let key = key(&bytes, rectification, background);
+    if let Some(image) = cached(cache, &key, rectification.size()) {
+        return Ok(Photograph {
+            image,
+            not_cached: None,
+        });
+    }
+    let image = rectify()?;
+    let not_cached = png(&image)
+        .map_err(|source| SceneError::Image {
+            path: cache.dir().into(),
+            source,
+        })
+        .and_then(|png| cache.put(&key, &png))
+        .err();
+    Ok(Photograph { image, not_cached })
+}
+
+/// The key of the image that `rectification` makes of the file `bytes`.
+pub(super) fn key(bytes: &[u8], rectification: &Rectification, background: [u8; 3]) -> CacheKey {
+    CacheKey::new(KIND, VERSION, &[bytes, &background, &rectification.key()])
+}
+
+/// The cached image, if it is one of this size.
+fn cached(cache: &FileCache, key: &CacheKey, size: (u32, u32)) -> Option<RgbImage> {
+    let png = cache.get(key)?;
+    let image = image::load_from_memory_with_format(&png, ImageFormat::Png).ok()?;
+    (image.width(), image.height())
+        .eq(&size)
+        .then(|| image.into_rgb8())
+}
+
+/// A PNG that is quick to write and to read.
+pub(super) fn png(image: &RgbImage) -> image::ImageResult<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Up);
+    image.write_with_encoder(encoder)?;
+    Ok(bytes)
+}

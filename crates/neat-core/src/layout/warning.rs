@@ -1,0 +1,85 @@
+//! What a person should know about how a scene was read.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// Something that does not stop a scene from being read.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum SceneWarning {
+    /// The principal point does not tell where pixel centres are.
+    PixelCenterAssumed {
+        /// The value taken.
+        pixel_center: f64,
+    },
+    /// Photographs were undistorted: the scene's cameras are the pinholes that
+    /// took their place.
+    Undistorted {
+        /// Models of the lenses, sorted.
+        lenses: Vec<&'static str>,
+        /// How many views.
+        views: usize,
+    },
+    /// Photographs were scaled down.
+    ScaledDown {
+        /// The longest side asked for, in pixels.
+        max_image_size: u32,
+        /// How many views.
+        views: usize,
+    },
+    /// Undistorted images could not be kept for the next time.
+    NotCached {
+        /// The folder of the cache.
+        dir: PathBuf,
+        /// What the system said first.
+        reason: String,
+    },
+    /// Nothing tells where the scene is: its sphere lies around the origin of the
+    /// poses.
+    SphereUnknown,
+    /// A view was dropped because nothing was detected in it.
+    ViewWithoutSegments {
+        /// Name of the view.
+        view: String,
+        /// No segment's score is above this.
+        min_segment_score: f64,
+    },
+}
+
+impl fmt::Display for SceneWarning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PixelCenterAssumed { pixel_center } => write!(
+                f,
+                "the intrinsics do not tell where pixel centres are: {pixel_center} is assumed"
+            ),
+            Self::Undistorted { lenses, views } => write!(
+                f,
+                "{views} views were undistorted to pinhole images (lens model: {})",
+                lenses.join(", ")
+            ),
+            Self::ScaledDown {
+                max_image_size,
+                views,
+            } => write!(
+                f,
+                "{views} views were scaled down to {max_image_size} pixels on their longer side"
+            ),
+            Self::NotCached { dir, reason } => write!(
+                f,
+                "undistorted images cannot be kept in {}: {reason}; the next run makes them again",
+                dir.display()
+            ),
+            Self::SphereUnknown => f.write_str(
+                "neither sparse points nor the cameras tell where the scene is: its sphere is put around the origin of the poses; give --scene-sphere x,y,z,radius if that is not the object",
+            ),
+            Self::ViewWithoutSegments {
+                view,
+                min_segment_score,
+            } => write!(
+                f,
+                "view `{view}` is left out: no segment has a score above {min_segment_score}"
+            ),
+        }
+    }
+}
