@@ -12,8 +12,8 @@
 
 use super::images;
 use super::poses::{
-    CAMERAS_NPZ, NPZ_REMEDY, PosedImage, Poses, check_counts, intrinsics_of, matrix4,
-    similarity_of, view_error, wrong_shape,
+    CAMERAS_NPZ, NPZ_REMEDY, PIXEL_CENTER, PosedImage, Poses, check_counts, intrinsics_of, matrix4,
+    pixel_center_array, read_pixel_center, similarity_of, view_error, wrong_shape,
 };
 use crate::npz::{NpyArray, NpzReader, write_npz};
 use crate::{Distortion, Scene, SceneError, Similarity, ViewError, file, hawp_json};
@@ -25,10 +25,9 @@ use std::path::Path;
 pub(super) const INTRINSICS: &str = "intrinsics";
 pub(super) const EXTRINSICS: &str = "extrinsics";
 const SCALE_MAT: &str = "scale_mat";
-const PIXEL_CENTER: &str = "pixel_center";
 const IMAGES_DIR: &str = "images";
 /// The folder of 2D wireframes, in every layout.
-pub(super) const HAWP_DIR: &str = "hawp";
+pub(crate) const HAWP_DIR: &str = "hawp";
 
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let path = dir.join(CAMERAS_NPZ);
@@ -87,19 +86,6 @@ fn read_scale_mat(npz: &mut NpzReader, path: &Path) -> Result<Similarity, SceneE
     similarity_of(path, &matrix4(path, SCALE_MAT, &npz.array(SCALE_MAT)?)?)
 }
 
-fn read_pixel_center(npz: &mut NpzReader, path: &Path) -> Result<Option<f64>, SceneError> {
-    if !npz.contains(PIXEL_CENTER) {
-        return Ok(None);
-    }
-    match npz.array(PIXEL_CENTER)?.values.as_slice() {
-        [value] if [0.0, 0.5].contains(value) => Ok(Some(*value)),
-        other => Err(SceneError::Malformed {
-            path: path.into(),
-            reason: format!("`{PIXEL_CENTER}` is {other:?}, not 0 or 0.5"),
-        }),
-    }
-}
-
 /// Writes a scene into the folder `dir`, which is created where needed. Reading
 /// it gives the same views, to the rounding that [`hawp_json::write`] names.
 ///
@@ -123,7 +109,10 @@ pub fn write_scene(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
 }
 
 fn write_cameras(scene: &Scene, path: &Path) -> Result<(), SceneError> {
-    let cameras = || scene.views.iter().map(|view| &view.camera);
+    // In the order of the files: `a-b.png` is before `a.png`.
+    let mut views: Vec<_> = scene.views.iter().collect();
+    views.sort_by_key(|view| format!("{}.png", view.name));
+    let cameras = || views.iter().map(|view| &view.camera);
     let arrays = BTreeMap::from([
         (
             INTRINSICS,
@@ -150,13 +139,7 @@ fn write_cameras(scene: &Scene, path: &Path) -> Result<(), SceneError> {
                 values: row_major(&scene.original_from_world.matrix()),
             },
         ),
-        (
-            PIXEL_CENTER,
-            NpyArray {
-                shape: vec![],
-                values: vec![scene.pixel_center],
-            },
-        ),
+        (PIXEL_CENTER, pixel_center_array(scene.pixel_center)),
     ]);
     write_npz(path, &arrays)
 }

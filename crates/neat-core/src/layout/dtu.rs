@@ -4,12 +4,13 @@
 //! - `hawp/NAME.json`, see [`crate::hawp_json`]
 //! - `cameras.npz`: for the i-th image by sorted name, `world_mat_i` [4, 4], the
 //!   projection of the original frame, and `scale_mat_i` [4, 4], which leads from
-//!   the normalised world to the original frame.
+//!   the normalised world to the original frame; where it is, `pixel_center` [],
+//!   as in [`super::abc`].
 
 use super::images;
 use super::poses::{
-    CAMERAS_NPZ, NPZ_REMEDY, PosedImage, Poses, check_counts, matrix4, similarity_of, upper_left,
-    view_error,
+    CAMERAS_NPZ, NPZ_REMEDY, PosedImage, Poses, check_counts, matrix4, read_pixel_center,
+    similarity_of, upper_left, view_error,
 };
 use crate::hawp_json::file_stem;
 use crate::npz::NpzReader;
@@ -19,11 +20,11 @@ use std::path::Path;
 
 const IMAGES_DIRS: [&str; 2] = ["image", "images"];
 
-pub(super) fn world_mat(index: usize) -> String {
+pub(crate) fn world_mat(index: usize) -> String {
     format!("world_mat_{index}")
 }
 
-pub(super) fn scale_mat(index: usize) -> String {
+pub(crate) fn scale_mat(index: usize) -> String {
     format!("scale_mat_{index}")
 }
 
@@ -66,6 +67,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     }
     views.sort_by(|a, b| a.name.cmp(&b.name));
 
+    let pixel_center = read_pixel_center(&mut npz, &path)?;
     let original_from_world = similarity_of(
         &path,
         &original_from_world.unwrap_or_else(Matrix4::identity),
@@ -74,7 +76,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         path,
         views,
         original_from_world,
-        pixel_center: None,
+        pixel_center,
         points: Vec::new(),
     })
 }

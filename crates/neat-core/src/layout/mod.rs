@@ -10,7 +10,7 @@ pub mod dtu;
 mod images;
 mod photograph;
 mod pixel_center;
-mod poses;
+pub(crate) mod poses;
 mod rectify;
 pub mod transforms_json;
 mod warning;

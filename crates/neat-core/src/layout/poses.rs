@@ -1,6 +1,6 @@
 //! What every layout says about its images: file, intrinsics and pose.
 
-use crate::npz::NpyArray;
+use crate::npz::{NpyArray, NpzReader};
 use crate::{CameraError, Distortion, Intrinsics, SceneError, Similarity, SparsePoint, ViewError};
 use nalgebra::{Matrix3, Matrix4};
 use std::path::{Path, PathBuf};
@@ -37,10 +37,39 @@ pub(super) struct PosedImage {
 }
 
 /// The archive of poses in the layouts of the published code.
-pub(super) const CAMERAS_NPZ: &str = "cameras.npz";
+pub(crate) const CAMERAS_NPZ: &str = "cameras.npz";
 
 /// What to do about a missing [`CAMERAS_NPZ`].
 pub(super) const NPZ_REMEDY: &str = "provide the poses of the images";
+
+/// The array of [`CAMERAS_NPZ`] that says which image coordinates the centre of the
+/// first pixel has. It is ours: other programs ignore it.
+pub(crate) const PIXEL_CENTER: &str = "pixel_center";
+
+/// The array [`PIXEL_CENTER`].
+pub(crate) fn pixel_center_array(pixel_center: f64) -> NpyArray {
+    NpyArray {
+        shape: vec![],
+        values: vec![pixel_center],
+    }
+}
+
+/// The pixel centre that the archive at `path` names, if it does.
+pub(super) fn read_pixel_center(
+    npz: &mut NpzReader,
+    path: &Path,
+) -> Result<Option<f64>, SceneError> {
+    if !npz.contains(PIXEL_CENTER) {
+        return Ok(None);
+    }
+    match npz.array(PIXEL_CENTER)?.values.as_slice() {
+        [value] if [0.0, 0.5].contains(value) => Ok(Some(*value)),
+        other => Err(SceneError::Malformed {
+            path: path.into(),
+            reason: format!("`{PIXEL_CENTER}` is {other:?}, not 0 or 0.5"),
+        }),
+    }
+}
 
 /// Errs unless there is one pose per image.
 pub(super) fn check_counts(

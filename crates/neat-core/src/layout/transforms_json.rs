@@ -39,6 +39,8 @@ const PIXEL_CENTER_OF_MIDDLE: f64 = 0.5;
 struct TransformsJson {
     #[serde(flatten)]
     lens: Lens,
+    /// Ours, as in `cameras.npz`: other programs ignore it.
+    pixel_center: Option<f64>,
     frames: Vec<Frame>,
 }
 
@@ -109,13 +111,21 @@ fn parse(bytes: &[u8], path: PathBuf, dir: &Path) -> Result<Poses, SceneError> {
         middle_for_all &= !given(|lens| lens.cx) && !given(|lens| lens.cy);
         views.push(context.posed_image(dir)?);
     }
+    let pixel_center = match json.pixel_center {
+        None => middle_for_all.then_some(PIXEL_CENTER_OF_MIDDLE),
+        Some(value) if [0.0, 0.5].contains(&value) => Some(value),
+        Some(value) => {
+            let reason = format!("`pixel_center` is {value}, not 0 or 0.5");
+            return Err(SceneError::Malformed { path, reason });
+        }
+    };
     views.sort_by(|a, b| a.name.cmp(&b.name));
     check_names(views.iter().map(|view| view.name.as_str()), &path)?;
     Ok(Poses {
         path,
         views,
         original_from_world: Similarity::identity(),
-        pixel_center: middle_for_all.then_some(PIXEL_CENTER_OF_MIDDLE),
+        pixel_center,
         points: Vec::new(),
     })
 }
