@@ -5,7 +5,9 @@
 //! `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`. Poses are camera-to-world in OpenGL axes
 //! (x right, y up, looking along −z) and are turned into OpenCV axes here. The
 //! world of the file is kept: nerfstudio's `applied_transform` and
-//! `applied_scale` have been applied to the poses already. Other keys are ignored.
+//! `applied_scale` have been applied to the poses already. `pixel_center`, which
+//! [`crate::convert`] writes, says which image coordinates the centre of the first
+//! pixel has. Other keys are ignored.
 
 use super::images::{ENDINGS, has_known_ending, read_size, with_existing_ending};
 use super::poses::{PosedImage, Poses, upper_left, view_error};
