@@ -1,7 +1,8 @@
-//! What a distorted photograph costs before it is a pinhole's image, on one
-//! thread. `cargo bench -p neat-core --bench undistortion`
+//! What a distorted or large photograph costs before it is the image of a view, on
+//! one thread. `cargo bench -p neat-core --bench undistortion`
 
 use image::{Rgb, RgbImage};
+use neat_core::downscaling::Downscaling;
 use neat_core::undistortion::Undistortion;
 use neat_core::{Distortion, Intrinsics};
 use rayon::ThreadPoolBuilder;
@@ -59,6 +60,14 @@ fn resample(bencher: divan::Bencher, name: &str, size: (u32, u32)) {
     let photograph = photograph(size);
     let one_thread = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     bencher.bench(|| one_thread.install(|| undistortion.resample(&photograph)));
+}
+
+#[divan::bench(sample_count = 5, sample_size = 1)]
+fn scale_3072x2048_to_1600(bencher: divan::Bencher) {
+    let scaling = Downscaling::new(SIZES[0], 1600, 0.5).unwrap();
+    let photograph = photograph(SIZES[0]);
+    let one_thread = ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    bencher.bench(|| one_thread.install(|| scaling.resample(&photograph)));
 }
 
 #[divan::bench(args = ["brown", "fisheye"])]

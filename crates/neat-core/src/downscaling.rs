@@ -20,8 +20,8 @@ pub struct Downscaling {
 
 impl Downscaling {
     /// For an image of `size` (width, height) whose longer side is to have at
-    /// most `max_image_size` pixels; `None` where it has not more. Each side
-    /// keeps at least one pixel.
+    /// most `max_image_size` pixels; `None` where it has not more, or where there
+    /// are no pixels. Each side keeps at least one pixel.
     pub fn new(size: (u32, u32), max_image_size: u32, pixel_center: f64) -> Option<Self> {
         let longer = size.0.max(size.1);
         let scaled = |pixels: u32| {
@@ -30,7 +30,8 @@ impl Downscaling {
             // At most `max_image_size`.
             rounded.max(1) as u32
         };
-        (longer > max_image_size.max(1)).then(|| Self {
+        let shrinks = longer > max_image_size.max(1) && size.0.min(size.1) > 0;
+        shrinks.then(|| Self {
             from: size,
             to: (scaled(size.0), scaled(size.1)),
             pixel_center,
@@ -155,6 +156,7 @@ mod tests {
         assert_eq!(size((10_000, 3), 100), Some((100, 1)));
         assert_eq!(size((7, 5), 0), Some((1, 1)));
         assert_eq!(size((1, 1), 0), None);
+        assert_eq!(size((0, 9), 3), None);
         assert_eq!(size((u32::MAX, 1), u32::MAX - 1), Some((u32::MAX - 1, 1)));
     }
 

@@ -50,6 +50,22 @@ pub enum SceneError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A folder to be written that has files already.
+    #[error("{path} is a file or has files in it: give a new or an empty folder")]
+    NotEmpty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A view that a format has no words for.
+    #[error("view `{view}` cannot be written to {path}: {reason}")]
+    Inexpressible {
+        /// The file to be written.
+        path: PathBuf,
+        /// Name of the view.
+        view: String,
+        /// What is missing in the format, and the remedy.
+        reason: String,
+    },
     /// JSON that does not follow its grammar or lacks a field.
     #[error("{path} is not a valid {format}: it may be truncated; write it again")]
     Json {

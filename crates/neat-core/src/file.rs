@@ -79,6 +79,41 @@ pub fn create_dir(path: &Path) -> Result<(), SceneError> {
     })
 }
 
+/// Fills a new folder under a temporary name beside `dir`, then renames it to
+/// `dir`: it appears complete or not at all.
+///
+/// # Errors
+/// If `dir` is a file or a folder that is not empty, `fill` errs, or the system
+/// refuses; the temporary folder is then removed.
+pub fn write_dir_atomically(
+    dir: &Path,
+    fill: impl FnOnce(&Path) -> Result<(), SceneError>,
+) -> Result<(), SceneError> {
+    let write_error = |source| SceneError::Write {
+        path: dir.into(),
+        source,
+    };
+    let exists = dir.symlink_metadata().is_ok();
+    if exists && (!dir.is_dir() || fs::read_dir(dir).map_err(write_error)?.next().is_some()) {
+        return Err(SceneError::NotEmpty { path: dir.into() });
+    }
+    let temporary = temporary_name(dir);
+    let result = create_dir(&temporary)
+        .and_then(|()| fill(&temporary))
+        .and_then(|()| {
+            // Not every system renames to a folder that exists.
+            let removed = if exists { fs::remove_dir(dir) } else { Ok(()) };
+            removed
+                .and_then(|()| fs::rename(&temporary, dir))
+                .map_err(write_error)
+        });
+    if result.is_err() {
+        // The first error is the one to report.
+        let _ = fs::remove_dir_all(&temporary);
+    }
+    result
+}
+
 /// `.name.PID.N.tmp` beside `path`: hidden, so that no reader lists it, and
 /// another one each time, so that two writers of one file do not meet.
 fn temporary_name(path: &Path) -> PathBuf {
@@ -115,6 +150,31 @@ mod tests {
         write_atomically(&path, b"new").unwrap();
         assert_eq!(read(&path, "").unwrap(), b"new");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn folders_appear_complete_or_not_at_all() {
+        let parent = tempfile::tempdir().unwrap();
+        let dir = parent.path().join("a/b");
+        let fill = |dir: &Path| write_atomically(&dir.join("file"), b"x");
+        let names = |dir: &Path| fs::read_dir(dir).unwrap().count();
+        let fails = |dir: &Path| {
+            fill(dir)?;
+            Err(SceneError::NoView { path: dir.into() })
+        };
+        assert!(write_dir_atomically(&dir, fails).is_err());
+        assert_eq!(names(&parent.path().join("a")), 0);
+        fs::create_dir(&dir).unwrap();
+        write_dir_atomically(&dir, fill).unwrap();
+        assert_eq!((names(&dir), names(&parent.path().join("a"))), (1, 1));
+        for occupied in [dir.clone(), dir.join("file")] {
+            let error = write_dir_atomically(&occupied, fill).unwrap_err();
+            assert!(matches!(error, SceneError::NotEmpty { .. }), "{error}");
+        }
+        assert!(matches!(
+            write_dir_atomically(&dir.join("file/below"), fill),
+            Err(SceneError::Write { .. })
+        ));
     }
 
     #[test]

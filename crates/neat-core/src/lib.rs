@@ -15,6 +15,7 @@
 
 pub mod assignment;
 pub mod camera;
+pub mod convert;
 pub mod distortion;
 pub mod downscaling;
 pub mod error;

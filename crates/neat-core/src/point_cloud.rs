@@ -1,4 +1,4 @@
-//! Point clouds in PLY files: the vertices, nothing else.
+//! Point clouds in PLY files: the vertices and, in those written, their colours.
 
 use crate::{SceneError, file};
 use nalgebra::Vector3;
@@ -82,6 +82,36 @@ pub fn parse_ply(bytes: &[u8], path: &Path) -> Result<Vec<Vector3<f64>>, SceneEr
         path: path.into(),
         reason,
     })
+}
+
+/// Writes points and their colours as a PLY file: binary, little-endian, with
+/// `double` x, y, z and `uchar` red, green, blue.
+///
+/// # Errors
+/// If the file cannot be written.
+///
+/// # Panics
+/// If there is not one colour per point.
+pub fn write_ply(
+    path: &Path,
+    points: &[Vector3<f64>],
+    colors: &[[u8; 3]],
+) -> Result<(), SceneError> {
+    assert_eq!(points.len(), colors.len(), "write_ply: a colour per point");
+    let mut bytes = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\n\
+         property double x\nproperty double y\nproperty double z\n\
+         property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+        points.len()
+    )
+    .into_bytes();
+    for (point, color) in points.iter().zip(colors) {
+        for coordinate in point {
+            bytes.extend(coordinate.to_le_bytes());
+        }
+        bytes.extend(color);
+    }
+    file::write_atomically(path, &bytes)
 }
 
 fn parse(bytes: &[u8]) -> Result<Vec<Vector3<f64>>, String> {
@@ -265,6 +295,15 @@ mod tests {
         let expected = [Vector3::new(1.0, 2.0, 3.0), Vector3::new(-4.0, 0.5, 6.0)];
         assert_eq!(parse(ASCII.as_bytes()).unwrap(), expected);
         assert_eq!(parse(&binary()).unwrap(), expected);
+    }
+
+    #[test]
+    fn what_is_written_reads_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("points.ply");
+        let points = [Vector3::new(1.0 / 3.0, -2e9, 0.1), Vector3::zeros()];
+        write_ply(&path, &points, &[[10, 13, 255], [0; 3]]).unwrap();
+        assert_eq!(read_ply(&path).unwrap(), points);
     }
 
     #[test]

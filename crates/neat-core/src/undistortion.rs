@@ -1,7 +1,7 @@
 //! Undistortion: from a photograph taken through a lens to the image that a
 //! pinhole camera at the same place would have taken.
 
-use crate::{Distortion, Intrinsics, ViewError};
+use crate::{CameraError, Distortion, Intrinsics, ViewError};
 use image::RgbImage;
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -60,7 +60,8 @@ impl Undistortion {
     ///
     /// # Errors
     /// If no such pinhole image lies within the photograph, as with coefficients
-    /// in a wrong order or with a principal point outside the photograph.
+    /// in a wrong order or with a principal point outside the photograph, or if
+    /// that has no pixels.
     pub fn new(
         intrinsics: &Intrinsics,
         distortion: &Distortion,
@@ -74,6 +75,9 @@ impl Undistortion {
             size,
             pixel_center,
         };
+        if size.0 == 0 || size.1 == 0 {
+            return Err(CameraError::NoPixels.into());
+        }
         let border = undistortion.border();
         let corners = undistortion.corners();
         let mut fits = |factor: f64| {
@@ -455,6 +459,7 @@ mod tests {
             ..INTRINSICS
         };
         assert!(Undistortion::new(&beside, &brown(-0.1, 0.0), SIZE, 0.5).is_err());
+        assert!(Undistortion::new(&INTRINSICS, &brown(-0.1, 0.0), (0, 80), 0.5).is_err());
     }
 
     proptest! {

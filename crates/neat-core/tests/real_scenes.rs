@@ -1,7 +1,8 @@
 //! Every real scene that is at hand loads. The data are not part of the
 //! repository: set `NEAT_DATA`, or keep them in `../shared/data`.
 
-use nalgebra::{Matrix3, Matrix4, Vector3};
+use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
+use neat_core::convert::{SceneFormat, convert};
 use neat_core::ground_truth::{read_ground_truth, read_wireframe};
 use neat_core::layout::Layout;
 use neat_core::point_cloud::read_ply;
@@ -176,6 +177,51 @@ fn blenders_transforms_agree_with_the_cameras_made_from_them() {
         // The rotations of `cameras.json` were made orthogonal to the last digit.
         let difference = (view.camera.matrix_world_from_camera() - pose).amax();
         assert!(difference < 1e-6, "{}: {difference:e}", view.name);
+    }
+}
+
+/// Scaled down, so that it is quick, and then written in every format.
+#[test]
+fn real_scenes_are_written_in_every_format_and_read_back() {
+    for name in ["abc-00001776", "dtu-scan24", "strecha-entry-P10"] {
+        let Some(dir) = real(name) else {
+            continue;
+        };
+        let options = LoadOptions {
+            require_wireframes: false,
+            max_image_size: Some(160),
+            ..LoadOptions::default()
+        };
+        let scene = load_scene(&dir, &options).unwrap().scene;
+        for format in [
+            SceneFormat::Abc,
+            SceneFormat::Colmap,
+            SceneFormat::CamerasNpz,
+            SceneFormat::TransformsJson,
+        ] {
+            let parent = tempfile::tempdir().unwrap();
+            let target = parent.path().join("scene");
+            convert(&scene, format, &target).unwrap();
+            let back = load_scene(&target, &options).unwrap().scene;
+            assert_eq!(back.views.len(), scene.views.len());
+            let back_from_world = |point: &Vector3<f64>| {
+                let original = scene.original_from_world.apply(point);
+                back.original_from_world.inverse().apply(&original)
+            };
+            for (found, expected) in back.views.iter().zip(&scene.views) {
+                assert_eq!(found.name, expected.name);
+                assert_eq!(found.image, expected.image);
+                let shift = back.pixel_center - scene.pixel_center;
+                for pixel in [Vector2::zeros(), Vector2::new(100.0, 70.0)] {
+                    let ray = expected.camera.ray_through(&pixel);
+                    let point = back_from_world(&(ray.origin + 2.0 * ray.direction));
+                    let off = found.camera.project(&point).pixel - pixel.add_scalar(shift);
+                    // Poses in the files are orthogonal to seven digits, and traces
+                    // of skew are left out.
+                    assert!(off.norm() < 0.01, "{name}, {format:?}: {off}");
+                }
+            }
+        }
     }
 }
 

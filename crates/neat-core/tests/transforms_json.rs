@@ -121,6 +121,14 @@ fn both_styles_of_intrinsics_are_read_and_frames_win() {
     // `applied_transform` is in the poses already.
     assert_eq!(a.center_in_world, Vector3::new(0.0, 0.0, 4.0));
 
+    // The file may tell it.
+    json["pixel_center"] = 0.5.into();
+    let loaded = load(&json).unwrap();
+    assert_eq!((loaded.scene.pixel_center, loaded.warnings.len()), (0.5, 0));
+    json["pixel_center"] = 0.25.into();
+    let message = load(&json).unwrap_err().to_string();
+    assert!(message.contains("`pixel_center` is 0.25"), "{message}");
+
     // One side of the size is completed by the image; both angles count.
     let mut json = blender();
     json["camera_angle_y"] = (2.0 * 0.5_f64.atan()).into();

@@ -12,8 +12,9 @@
 
 use super::images;
 use super::poses::{
-    CAMERAS_NPZ, NPZ_REMEDY, PosedImage, Poses, check_counts, intrinsics_of, matrix4,
-    similarity_of, view_error, wrong_shape,
+    CAMERAS_NPZ, NPZ_REMEDY, PIXEL_CENTER, PosedImage, Poses, SPHERE_RADIUS, check_counts,
+    intrinsics_of, matrix4, number_array, read_pixel_center, read_sphere_radius, similarity_of,
+    view_error, wrong_shape,
 };
 use crate::npz::{NpyArray, NpzReader, write_npz};
 use crate::{Distortion, Scene, SceneError, Similarity, ViewError, file, hawp_json};
@@ -25,8 +26,6 @@ use std::path::Path;
 const INTRINSICS: &str = "intrinsics";
 const EXTRINSICS: &str = "extrinsics";
 const SCALE_MAT: &str = "scale_mat";
-const PIXEL_CENTER: &str = "pixel_center";
-const SPHERE_RADIUS: &str = "sphere_radius";
 const IMAGES_DIR: &str = "images";
 /// The folder of 2D wireframes, in every layout.
 pub const HAWP_DIR: &str = "hawp";
@@ -94,38 +93,6 @@ fn read_scale_mat(npz: &mut NpzReader, path: &Path) -> Result<Similarity, SceneE
     similarity_of(path, &matrix4(path, SCALE_MAT, &npz.array(SCALE_MAT)?)?)
 }
 
-fn read_pixel_center(npz: &mut NpzReader, path: &Path) -> Result<Option<f64>, SceneError> {
-    number(npz, path, PIXEL_CENTER, "0 or 0.5", |x| {
-        [0.0, 0.5].contains(&x)
-    })
-}
-
-fn read_sphere_radius(npz: &mut NpzReader, path: &Path) -> Result<Option<f64>, SceneError> {
-    number(npz, path, SPHERE_RADIUS, "a number above 0", |x| {
-        x.is_finite() && x > 0.0
-    })
-}
-
-/// The array `name` of one number, where there is one, which must be `expected`.
-fn number(
-    npz: &mut NpzReader,
-    path: &Path,
-    name: &str,
-    expected: &str,
-    is_good: impl Fn(f64) -> bool,
-) -> Result<Option<f64>, SceneError> {
-    if !npz.contains(name) {
-        return Ok(None);
-    }
-    match npz.array(name)?.values.as_slice() {
-        [value] if is_good(*value) => Ok(Some(*value)),
-        other => Err(SceneError::Malformed {
-            path: path.into(),
-            reason: format!("`{name}` holds {other:?}, not {expected}"),
-        }),
-    }
-}
-
 /// Writes a scene into the folder `dir`, which is created where needed. Reading
 /// it gives the same views, to the rounding that [`hawp_json::write`] names.
 ///
@@ -149,7 +116,10 @@ pub fn write_scene(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
 }
 
 fn write_cameras(scene: &Scene, path: &Path) -> Result<(), SceneError> {
-    let cameras = || scene.views.iter().map(|view| &view.camera);
+    // In the order of the files: `a-b.png` is before `a.png`.
+    let mut views: Vec<_> = scene.views.iter().collect();
+    views.sort_by_key(|view| format!("{}.png", view.name));
+    let cameras = || views.iter().map(|view| &view.camera);
     let arrays = BTreeMap::from([
         (
             INTRINSICS,
@@ -176,18 +146,10 @@ fn write_cameras(scene: &Scene, path: &Path) -> Result<(), SceneError> {
                 values: row_major(&scene.original_from_world.matrix()),
             },
         ),
-        (PIXEL_CENTER, scalar(scene.pixel_center)),
-        (SPHERE_RADIUS, scalar(scene.sphere_radius)),
+        (PIXEL_CENTER, number_array(scene.pixel_center)),
+        (SPHERE_RADIUS, number_array(scene.sphere_radius)),
     ]);
     write_npz(path, &arrays)
-}
-
-/// An array of shape [].
-fn scalar(value: f64) -> NpyArray {
-    NpyArray {
-        shape: vec![],
-        values: vec![value],
-    }
 }
 
 /// The elements of a matrix, row by row.

@@ -6,12 +6,13 @@
 //!   projection of the original frame, and `scale_mat_i` [4, 4], which leads from
 //!   the normalised world to the original frame. Where both files are there, the
 //!   first is read, as NeuS does: its world is normalised to a sphere around the
-//!   object. Other arrays, such as `camera_mat_i`, are ignored.
+//!   object. `pixel_center` [] is read as in [`super::abc`]; other arrays, such as
+//!   `camera_mat_i`, are ignored.
 
 use super::images;
 use super::poses::{
-    CAMERAS_NPZ, NPZ_REMEDY, PosedImage, Poses, check_counts, matrix4, similarity_of, upper_left,
-    view_error,
+    CAMERAS_NPZ, NPZ_REMEDY, PosedImage, Poses, check_counts, matrix4, read_pixel_center,
+    similarity_of, upper_left, view_error,
 };
 use crate::hawp_json::file_stem;
 use crate::npz::NpzReader;
@@ -25,11 +26,11 @@ const DECLARED_RADIUS: f64 = 1.0;
 const FILE_NAMES: [&str; 2] = ["cameras_sphere.npz", CAMERAS_NPZ];
 const IMAGES_DIRS: [&str; 2] = ["image", "images"];
 
-fn world_mat(index: usize) -> String {
+pub(crate) fn world_mat(index: usize) -> String {
     format!("world_mat_{index}")
 }
 
-fn scale_mat(index: usize) -> String {
+pub(crate) fn scale_mat(index: usize) -> String {
     format!("scale_mat_{index}")
 }
 
@@ -83,6 +84,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     }
     views.sort_by(|a, b| a.name.cmp(&b.name));
 
+    let pixel_center = read_pixel_center(&mut npz, &path)?;
     let original_from_world = similarity_of(
         &path,
         &original_from_world.unwrap_or_else(Matrix4::identity),
@@ -91,7 +93,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         path,
         views,
         original_from_world,
-        pixel_center: None,
+        pixel_center,
         points: Vec::new(),
         declared_radius: Some(DECLARED_RADIUS),
     })

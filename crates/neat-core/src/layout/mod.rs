@@ -21,7 +21,7 @@ mod photograph;
 mod pixel_center;
 mod point_files;
 mod pose_convention;
-mod poses;
+pub(crate) mod poses;
 mod reconstruction;
 mod rectify;
 mod sphere;

@@ -1,6 +1,6 @@
 //! What every layout says about its images: file, intrinsics and pose.
 
-use crate::npz::NpyArray;
+use crate::npz::{NpyArray, NpzReader};
 use crate::{CameraError, Distortion, Intrinsics, SceneError, Similarity, SparsePoint, ViewError};
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
@@ -40,10 +40,64 @@ pub(super) struct PosedImage {
 }
 
 /// The archive of poses in the layouts of the published code.
-pub(super) const CAMERAS_NPZ: &str = "cameras.npz";
+pub(crate) const CAMERAS_NPZ: &str = "cameras.npz";
 
 /// What to do about a missing [`CAMERAS_NPZ`].
 pub(super) const NPZ_REMEDY: &str = "provide the poses of the images";
+
+/// The array of [`CAMERAS_NPZ`] that says which image coordinates the centre of the
+/// first pixel has. It is ours: other programs ignore it.
+pub(crate) const PIXEL_CENTER: &str = "pixel_center";
+/// Likewise, the radius of the scene sphere around the origin.
+pub(crate) const SPHERE_RADIUS: &str = "sphere_radius";
+
+/// An array of one number.
+pub(crate) fn number_array(value: f64) -> NpyArray {
+    NpyArray {
+        shape: vec![],
+        values: vec![value],
+    }
+}
+
+/// The pixel centre that the archive at `path` names, if it does.
+pub(super) fn read_pixel_center(
+    npz: &mut NpzReader,
+    path: &Path,
+) -> Result<Option<f64>, SceneError> {
+    read_number(npz, path, PIXEL_CENTER, "0 or 0.5", |x| {
+        [0.0, 0.5].contains(&x)
+    })
+}
+
+/// The radius of the scene sphere that the archive at `path` names, if it does.
+pub(super) fn read_sphere_radius(
+    npz: &mut NpzReader,
+    path: &Path,
+) -> Result<Option<f64>, SceneError> {
+    read_number(npz, path, SPHERE_RADIUS, "a number above 0", |x| {
+        x.is_finite() && x > 0.0
+    })
+}
+
+/// The array `name` of one number, where there is one, which must be `expected`.
+fn read_number(
+    npz: &mut NpzReader,
+    path: &Path,
+    name: &str,
+    expected: &str,
+    is_good: impl Fn(f64) -> bool,
+) -> Result<Option<f64>, SceneError> {
+    if !npz.contains(name) {
+        return Ok(None);
+    }
+    match npz.array(name)?.values.as_slice() {
+        [value] if is_good(*value) => Ok(Some(*value)),
+        other => Err(SceneError::Malformed {
+            path: path.into(),
+            reason: format!("`{name}` holds {other:?}, not {expected}"),
+        }),
+    }
+}
 
 /// Errs unless there is one pose per image.
 pub(super) fn check_counts(

@@ -5,7 +5,9 @@
 //! `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`. Poses are camera-to-world in OpenGL axes
 //! (x right, y up, looking along −z) and are turned into OpenCV axes here. The
 //! world of the file is kept: nerfstudio's `applied_transform` and
-//! `applied_scale` have been applied to the poses already. Other keys are ignored.
+//! `applied_scale` have been applied to the poses already. `pixel_center`, which
+//! [`crate::convert`] writes, says which image coordinates the centre of the first
+//! pixel has. Other keys are ignored.
 //!
 //! Lenses are perspective (`k1 k2 k3 p1 p2`, [`Distortion::Brown`]) unless
 //! `camera_model` is `OPENCV_FISHEYE` or `is_fisheye` is set (`k1 … k4`,
@@ -48,6 +50,8 @@ const PIXEL_CENTER_OF_MIDDLE: f64 = 0.5;
 struct TransformsJson {
     #[serde(flatten)]
     lens: Lens,
+    /// Ours, as in `cameras.npz`: other programs ignore it.
+    pixel_center: Option<f64>,
     frames: Vec<Frame>,
     ply_file_path: Option<String>,
 }
@@ -119,6 +123,14 @@ fn parse(bytes: &[u8], path: PathBuf, dir: &Path) -> Result<Poses, SceneError> {
         middle_for_all &= !given(|lens| lens.cx) && !given(|lens| lens.cy);
         views.push(context.posed_image(dir)?);
     }
+    let pixel_center = match json.pixel_center {
+        None => middle_for_all.then_some(PIXEL_CENTER_OF_MIDDLE),
+        Some(value) if [0.0, 0.5].contains(&value) => Some(value),
+        Some(value) => {
+            let reason = format!("`pixel_center` is {value}, not 0 or 0.5");
+            return Err(SceneError::Malformed { path, reason });
+        }
+    };
     views.sort_by(|a, b| a.name.cmp(&b.name));
     check_names(views.iter().map(|view| view.name.as_str()), &path)?;
     Ok(Poses {
@@ -126,7 +138,7 @@ fn parse(bytes: &[u8], path: PathBuf, dir: &Path) -> Result<Poses, SceneError> {
         path,
         views,
         original_from_world: Similarity::identity(),
-        pixel_center: middle_for_all.then_some(PIXEL_CENTER_OF_MIDDLE),
+        pixel_center,
         declared_radius: None,
     })
 }

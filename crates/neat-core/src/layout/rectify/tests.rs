@@ -296,3 +296,73 @@ fn lenses_that_cannot_be_undistorted_name_file_and_view() {
     let message = error.to_string();
     assert!(message.contains("poses") && message.contains("`a`") && message.contains("Brown"));
 }
+
+/// One view of 3072×2048 pixels. `cargo test --release -p neat-core --lib -- \
+/// --ignored --nocapture rectify::tests::times`
+#[test]
+#[ignore = "prints times"]
+#[allow(clippy::print_stderr)]
+fn times_of_a_first_and_a_second_load() {
+    let dir = tempfile::tempdir().unwrap();
+    let size = (3072, 2048);
+    let photograph = RgbImage::from_fn(size.0, size.1, |x, y| {
+        let noise = x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(40_503);
+        let smooth = 100.0 + 90.0 * (f64::from(x) / 40.0).sin() * (f64::from(y) / 55.0).cos();
+        Rgb([smooth as u8, (smooth as u8) / 2, (noise >> 28) as u8])
+    });
+    let image = dir.path().join("a.jpg");
+    photograph.save(&image).unwrap();
+    let intrinsics = Intrinsics {
+        fx: 2760.0,
+        fy: 2765.0,
+        cx: 1520.0,
+        cy: 1007.0,
+        skew: 0.0,
+    };
+    let load = |options: &LoadOptions| {
+        let view = PosedImage {
+            name: "a".into(),
+            image: image.clone(),
+            intrinsics,
+            distortion: BARREL,
+            world_from_camera: pose(),
+            size: Some(size),
+        };
+        let poses = Poses {
+            path: dir.path().join("poses"),
+            views: vec![view],
+            original_from_world: Similarity::identity(),
+            pixel_center: Some(0.5),
+            points: Vec::new(),
+            declared_radius: Some(1.0),
+        };
+        let options = LoadOptions {
+            require_wireframes: false,
+            ..options.clone()
+        };
+        let start = std::time::Instant::now();
+        load_posed(dir.path(), Layout::CamerasJson, poses, &options).unwrap();
+        start.elapsed().as_millis()
+    };
+    let one_thread = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
+    one_thread.install(|| {
+        for max_image_size in [None, Some(1600)] {
+            let options = LoadOptions {
+                max_image_size,
+                ..cached_in(dir.path().join("cache"))
+            };
+            let uncached = load(&LoadOptions {
+                cache_dir: None,
+                ..options.clone()
+            });
+            let (first, second) = (load(&options), load(&options));
+            eprintln!(
+                "longest side {max_image_size:?}: {uncached} ms without a cache, \
+                 {first} ms the first time, {second} ms the second"
+            );
+        }
+    });
+}
