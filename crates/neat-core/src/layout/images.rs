@@ -52,6 +52,10 @@ pub(super) fn has_known_ending(path: &Path) -> bool {
 /// What to do about a missing image.
 const REMEDY: &str = "put the image there or remove its pose";
 
+/// How a reader learns width and height of an image: [`read_size`], but for tests
+/// without files.
+pub(super) type ReadSize = fn(&Path) -> Result<(u32, u32), SceneError>;
+
 /// Width and height, from the first bytes of an image.
 pub(super) fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
     ImageReader::open(path)

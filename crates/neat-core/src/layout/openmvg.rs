@@ -129,7 +129,7 @@ fn parse(bytes: &[u8], path: &Path, dirs: &[PathBuf]) -> Result<Poses, SceneErro
             continue;
         };
         let context = Context {
-            path: path,
+            path,
             root_path: &json.root_path,
             dirs,
             key: *key,
