@@ -156,7 +156,8 @@ pub fn write_npz(path: &Path, arrays: &BTreeMap<&str, NpyArray>) -> Result<(), S
     file::write_atomically(path, &bytes)
 }
 
-fn npz_bytes(arrays: &BTreeMap<&str, NpyArray>) -> io::Result<Vec<u8>> {
+/// [`write_npz`] to memory.
+pub(crate) fn npz_bytes(arrays: &BTreeMap<&str, NpyArray>) -> io::Result<Vec<u8>> {
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, array) in arrays {

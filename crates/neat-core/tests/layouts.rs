@@ -199,6 +199,21 @@ fn the_dtu_layout_is_decomposed() {
         expected.original_from_world
     );
 
+    // NeuS's file is preferred to the other one; further arrays do not matter.
+    let plain = dir.path().join("cameras.npz");
+    let sphere = dir.path().join("cameras_sphere.npz");
+    let mut with_more = arrays.clone();
+    with_more.insert("camera_mat_0", matrix4(Matrix4::identity()));
+    with_more.insert("scale_mat_inv_0", matrix4(Matrix4::identity()));
+    write_npz(&sphere, &with_more).unwrap();
+    fs::write(&plain, "no archive").unwrap();
+    let from_sphere = load(&dir).unwrap();
+    assert_eq!(from_sphere.layout, Layout::Dtu);
+    assert_same_views(&from_sphere.scene, &loaded.scene, 0.0);
+    fs::remove_file(&plain).unwrap();
+    assert_same_views(&load(&dir).unwrap().scene, &loaded.scene, 0.0);
+    fs::remove_file(&sphere).unwrap();
+
     arrays.insert("scale_mat_2", matrix4(Matrix4::identity()));
     write_npz(&dir.path().join("cameras.npz"), &arrays).unwrap();
     assert!(message(&dir).contains("`scale_mat_2` differs"));

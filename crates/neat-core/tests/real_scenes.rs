@@ -1,16 +1,17 @@
 //! Every real scene that is at hand loads. The data are not part of the
 //! repository: set `NEAT_DATA`, or keep them in `../shared/data`.
 
+use image::RgbImage;
 use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
 use neat_core::convert::{SceneFormat, convert};
 use neat_core::ground_truth::{read_ground_truth, read_wireframe};
 use neat_core::layout::Layout;
 use neat_core::point_cloud::read_ply;
 use neat_core::scene_sphere::SphereSource;
-use neat_core::{LoadOptions, SceneError, SphereChoice, load_scene};
+use neat_core::{Camera, LoadOptions, Scene, SceneError, SphereChoice, View, load_scene};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The folder of a real scene, or `None`, said aloud, where there is none.
 #[expect(clippy::print_stderr, reason = "a skipped test must be seen")]
@@ -221,6 +222,254 @@ fn real_scenes_are_written_in_every_format_and_read_back() {
                     assert!(off.norm() < 0.01, "{name}, {format:?}: {off}");
                 }
             }
+        }
+    }
+}
+
+/// `cameras.json` as it is: per file name of the original image K and the pose.
+fn json_cameras(dir: &Path) -> BTreeMap<String, (Matrix3<f64>, Matrix4<f64>)> {
+    let text = fs::read_to_string(dir.join("cameras.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let frames = json["frames"].as_array().unwrap();
+    let camera = |frame: &serde_json::Value| {
+        let number = |key: &str, i: usize, j: usize| frame[key][i][j].as_f64().unwrap();
+        let name = frame["source_name"].as_str().or(frame["file"].as_str());
+        let stem = Path::new(name.unwrap()).file_stem().unwrap();
+        let k = Matrix3::from_fn(|i, j| number("K", i, j));
+        let pose = Matrix4::from_fn(|i, j| number("c2w", i, j));
+        (stem.to_str().unwrap().to_owned(), (k, pose))
+    };
+    frames.iter().map(camera).collect()
+}
+
+/// Largest differences of K and pose over the views of `scene`, relative to the
+/// focal length and to the largest coordinate of a centre.
+fn differences(
+    scene: &Scene,
+    cameras: &BTreeMap<String, (Matrix3<f64>, Matrix4<f64>)>,
+) -> (f64, f64) {
+    let mut largest = (0.0_f64, 0.0_f64);
+    for (name, (k, pose)) in cameras {
+        let view = scene.views.iter().find(|view| &view.name == name).unwrap();
+        let k = (view.camera.intrinsics.matrix() - k).amax() / k[(0, 0)];
+        let pose = (view.camera.matrix_world_from_camera() - pose).amax() / pose.amax();
+        largest = (largest.0.max(k), largest.1.max(pose));
+    }
+    largest
+}
+
+fn load_as(dir: &Path, layout: Layout) -> Scene {
+    let options = LoadOptions {
+        layout: Some(layout),
+        require_wireframes: false,
+        sphere: SphereChoice::File,
+        ..LoadOptions::default()
+    };
+    load_scene(dir, &options).unwrap().scene
+}
+
+/// Whether the camera sees the point within its image, give or take two pixels.
+fn sees(camera: &Camera, point: &Vector3<f64>) -> bool {
+    let seen = camera.project(point);
+    let inside = |x: f64, size: u32| (-2.0..=f64::from(size) + 2.0).contains(&x);
+    seen.depth > 0.0 && inside(seen.pixel.x, camera.width) && inside(seen.pixel.y, camera.height)
+}
+
+/// The scene that OpenMVS gives away, with poses and points as they were written.
+#[test]
+fn the_castle_agrees_with_the_cameras_and_tracks_made_from_it() {
+    let Some(dir) = real("sceaux-castle") else {
+        return;
+    };
+    let castle = tempfile::tempdir().unwrap();
+    let images = castle.path().join("images");
+    fs::create_dir(&images).unwrap();
+    fs::copy(dir.join("scene.mvs"), castle.path().join("scene.mvs")).unwrap();
+    for index in 0..10 {
+        let name = format!("{index:05}.jpg");
+        fs::copy(dir.join("images").join(&name), images.join(&name)).unwrap();
+    }
+    assert_eq!(Layout::detect(castle.path()).unwrap(), Layout::OpenMvs);
+    // The eleventh photograph was not passed on with its pose.
+    let options = LoadOptions {
+        require_wireframes: false,
+        sphere: SphereChoice::File,
+        ..LoadOptions::default()
+    };
+    let missing = load_scene(castle.path(), &options).unwrap_err();
+    assert!(missing.to_string().contains("00010.jpg"), "{missing}");
+    RgbImage::new(2832, 2128)
+        .save(images.join("00010.jpg"))
+        .unwrap();
+
+    let scene = load_as(castle.path(), Layout::OpenMvs);
+    assert_eq!((scene.views.len(), scene.pixel_center), (11, 0.0));
+    let (k, pose) = differences(&scene, &json_cameras(&dir));
+    assert!(k < 1e-12 && pose < 1e-12, "{k:e} {pose:e}");
+
+    let tracks = fs::read_to_string(dir.join("sparse_tracks.json")).unwrap();
+    let tracks: serde_json::Value = serde_json::from_str(&tracks).unwrap();
+    let (positions, views) = (&tracks["points"], &tracks["views"]);
+    assert_eq!(
+        scene.sparse_points.len(),
+        positions.as_array().unwrap().len()
+    );
+    let (mut listed, mut seen) = (0, 0);
+    for (index, point) in scene.sparse_points.iter().enumerate() {
+        let expected = Vector3::from_fn(|axis, _| positions[index][axis].as_f64().unwrap());
+        assert!((point.position_in_world - expected).amax() < 1e-6);
+        let expected: Vec<_> = views[index].as_array().unwrap().iter().collect();
+        let found = point.observations.iter().map(|seen| seen.view as u64);
+        // All but those that a point far off puts behind a camera.
+        assert!(
+            found
+                .clone()
+                .all(|view| expected.iter().any(|other| **other == view))
+        );
+        listed += expected.len();
+        let visible = |view: &&usize| sees(&scene.views[**view].camera, &point.position_in_world);
+        let found: Vec<_> = found.map(|view| view as usize).collect();
+        seen += found.iter().filter(visible).count();
+    }
+    // Structure from motion leaves a few points far off.
+    let share = seen as f64 / listed as f64;
+    assert!(share > 0.995, "{share}");
+}
+
+#[test]
+fn strechas_cameras_agree_with_the_cameras_made_from_them() {
+    let Some(dir) = real("strecha-entry-P10") else {
+        return;
+    };
+    let scene = load_as(&dir, Layout::Strecha);
+    assert_eq!(scene.views.len(), 10);
+    let (k, pose) = differences(&scene, &json_cameras(&dir));
+    assert!(k < 1e-12 && pose < 1e-12, "{k:e} {pose:e}");
+    for point in read_ply(&dir.join("sparse_points.ply")).unwrap() {
+        let seen = scene.views.iter().filter(|view| sees(&view.camera, &point));
+        assert!(
+            seen.count() >= 3,
+            "points were triangulated from three views or more"
+        );
+    }
+}
+
+#[test]
+fn sparse_points_of_dtu_are_seen() {
+    let Some(dir) = real("dtu-scan24") else {
+        return;
+    };
+    let scene = load_as(&dir, Layout::Dtu);
+    for point in read_ply(&dir.join("sparse_points.ply")).unwrap() {
+        let seen = scene.views.iter().filter(|view| sees(&view.camera, &point));
+        assert!(seen.count() >= 3);
+    }
+}
+
+#[test]
+fn the_meta_data_of_emap_agree_with_the_cameras_made_from_them() {
+    let Some(dir) = real("abcnef-00004926") else {
+        return;
+    };
+    // The images have got other names since; those of EMAP are made again.
+    let text = fs::read_to_string(dir.join("cameras.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let emap = tempfile::tempdir().unwrap();
+    fs::copy(
+        dir.join("meta_data.json"),
+        emap.path().join("meta_data.json"),
+    )
+    .unwrap();
+    for frame in json["frames"].as_array().unwrap() {
+        let [from, to] = ["file", "source_name"].map(|key| frame[key].as_str().unwrap());
+        fs::copy(dir.join(from), emap.path().join(to)).unwrap();
+    }
+    // One image was not passed on with its pose.
+    let missing = emap.path().join("21_colors.png");
+    RgbImage::new(800, 800).save(missing).unwrap();
+    assert_eq!(Layout::detect(emap.path()).unwrap(), Layout::MetaDataJson);
+    let scene = load_as(emap.path(), Layout::MetaDataJson);
+    assert_eq!((scene.views.len(), scene.pixel_center), (50, 0.0));
+    // The rotations of `cameras.json` were made orthogonal to the last digit.
+    let (k, pose) = differences(&scene, &json_cameras(&dir));
+    assert!(k < 1e-12 && pose < 1e-6, "{k:e} {pose:e}");
+}
+
+/// The offset across a projected edge, in pixels, at which the image changes most,
+/// or `None` where it hardly changes: the edge is hidden, or leaves the image.
+fn offset_of_edge(view: &View, middle: &Vector2<f64>, normal: &Vector2<f64>) -> Option<f64> {
+    const REACH: i32 = 12;
+    const STEP: f64 = 0.25;
+    let brightness = |at: Vector2<f64>| {
+        // Between the centres of four pixels.
+        let at = at.add_scalar(-0.5);
+        let (x, y) = (at.x.floor(), at.y.floor());
+        let (dx, dy) = (at.x - x, at.y - y);
+        let pixel = |x: f64, y: f64| {
+            let inside = x >= 0.0 && y >= 0.0;
+            let pixel = view
+                .image
+                .get_pixel_checked(x as u32, y as u32)
+                .filter(|_| inside)?;
+            Some(pixel.0.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0)
+        };
+        let top = pixel(x, y)? * (1.0 - dx) + pixel(x + 1.0, y)? * dx;
+        let bottom = pixel(x, y + 1.0)? * (1.0 - dx) + pixel(x + 1.0, y + 1.0)? * dx;
+        Some(top * (1.0 - dy) + bottom * dy)
+    };
+    let mut strongest = (0.0, 0.0);
+    for step in -REACH..=REACH {
+        let offset = f64::from(step) * STEP;
+        let at = middle + normal * offset;
+        let change = (brightness(at + normal * 0.5)? - brightness(at - normal * 0.5)?).abs();
+        if change > strongest.0 {
+            strongest = (change, offset);
+        }
+    }
+    (strongest.0 > 15.0).then_some(strongest.1)
+}
+
+/// Edges of the truth lie on edges of the images: poses, intrinsics and pixel
+/// centres all agree. Half a pixel of a wrong pixel centre would be seen.
+#[test]
+fn true_edges_lie_on_edges_of_the_images() {
+    for name in [
+        "abc-00075213",
+        "abc-00001776",
+        "abc-00003173",
+        "cad-0406",
+        "cad-three-concave",
+        "abcnef-00000952",
+        "abcnef-00004926",
+    ] {
+        let Some(dir) = real(name) else {
+            continue;
+        };
+        let scene = load_as(&dir, Layout::CamerasJson);
+        let truth = read_wireframe(&dir.join("gt_wireframe.json")).unwrap();
+        // Along the axes of the image, signed: to the right and down.
+        let mut offsets = [Vec::new(), Vec::new()];
+        for view in scene.views.iter().step_by(5) {
+            for segment in truth.segments() {
+                let [a, b] = segment.ends().map(|end| view.camera.project(&end).pixel);
+                // To where the corner of the image is the origin.
+                let [a, b] = [a, b].map(|end| end.add_scalar(0.5 - scene.pixel_center));
+                let along = b - a;
+                if along.norm() < 20.0 {
+                    continue;
+                }
+                let axis = usize::from(along.x.abs() > along.y.abs());
+                let mut normal = Vector2::new(-along.y, along.x) / along.norm();
+                normal *= normal[axis].signum();
+                let samples = (1..10).map(|i| a + along * (f64::from(i) / 10.0));
+                offsets[axis].extend(samples.filter_map(|at| offset_of_edge(view, &at, &normal)));
+            }
+        }
+        for offsets in &mut offsets {
+            assert!(offsets.len() > 100, "{name}: {}", offsets.len());
+            offsets.sort_by(f64::total_cmp);
+            let median = offsets[offsets.len() / 2];
+            assert!(median.abs() <= 0.25, "{name}: {median}");
         }
     }
 }

@@ -3,7 +3,6 @@
 use crate::error::CliError;
 use crate::output;
 use clap::Args;
-use neat_core::layout::Layout;
 use neat_core::{LoadOptions, LoadedScene, View, load_scene};
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -12,16 +11,21 @@ use std::path::PathBuf;
 /// Say what is in the folder of a scene, and what is wrong with it
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Layouts that are read:
-  images/NAME.png, hawp/NAME.json, cameras.npz with `intrinsics` and `extrinsics`       (ABC)
-  image/NAME.png, hawp/NAME.json, cameras.npz with `world_mat_i` and `scale_mat_i`      (DTU)
-  cameras.json naming images with `K` and `c2w`, hawp/NAME.json
-  transforms.json or transforms_train.json (Blender, nerfstudio), hawp/NAME.json
-  images/, hawp/NAME.json, cameras, images and points3D (.bin or .txt) in sparse/0/   (COLMAP)
+Layouts that are read, looked for in this order; all with hawp/NAME.json:
+  image/NAME.png, cameras_sphere.npz or cameras.npz with `world_mat_i`, `scale_mat_i`  (DTU)
+  images/NAME.png, cameras.npz with `intrinsics` and `extrinsics`                       (ABC)
+  cameras.json naming images with `K` and `c2w`
+  transforms.json or transforms_train.json                     (Blender, nerfstudio)
+  cameras, images and points3D (.bin or .txt) in sparse/0/, images/                  (COLMAP)
+  meta_data.json naming images with `rgb_path`                           (sdfstudio, EMAP)
+  sfm_data.json                                                                     (OpenMVG)
+  scene.mvs in the interface format                                                 (OpenMVS)
+  NAME.nvm                                                                        (VisualSfM)
+  bundle.out or bundle/bundle.out, and list.txt                                     (Bundler)
+  gt_dense_cameras/NAME.jpg.camera                                                  (Strecha)
 
-Poses are camera-to-world in OpenCV axes: x right, y down, z forward; in transforms.json
-in OpenGL axes: x right, y up, z backward. Those of COLMAP are read as it writes them. Images
-must be undistorted.")]
+Poses are those that each program writes; they are turned into camera-to-world in OpenCV
+axes: x right, y down, z forward.")]
 pub struct InfoArgs {
     /// Folder of the scene
     #[arg(value_name = "SCENE")]
@@ -49,13 +53,7 @@ impl InfoArgs {
 
 fn describe(loaded: &LoadedScene, min_score: f64) -> String {
     let scene = &loaded.scene;
-    let layout = match loaded.layout {
-        Layout::Abc => "ABC (cameras.npz with intrinsics and extrinsics)",
-        Layout::Dtu => "DTU (cameras.npz with world_mat and scale_mat)",
-        Layout::CamerasJson => "cameras.json",
-        Layout::TransformsJson => "transforms.json (OpenGL axes)",
-        Layout::Colmap => "COLMAP (cameras and images of a sparse model)",
-    };
+    let layout = loaded.layout;
     let sizes: BTreeSet<(u32, u32)> = scene
         .views
         .iter()

@@ -21,7 +21,7 @@ use crate::{Distortion, Scene, SceneError, Similarity, ViewError, file, hawp_jso
 use nalgebra::{Matrix3, Matrix4, SMatrix};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 const INTRINSICS: &str = "intrinsics";
 const EXTRINSICS: &str = "extrinsics";
@@ -37,13 +37,23 @@ pub(super) fn is_in(npz: &NpzReader) -> bool {
 
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let path = dir.join(CAMERAS_NPZ);
-    let mut npz = NpzReader::open(&path, NPZ_REMEDY)?;
-    let intrinsics = stack(&path, INTRINSICS, &npz.array(INTRINSICS)?)?;
-    let extrinsics = stack(&path, EXTRINSICS, &npz.array(EXTRINSICS)?)?;
+    let npz = NpzReader::open(&path, NPZ_REMEDY)?;
     let images_dir = dir.join(IMAGES_DIR);
     let images = images::list(&images_dir)?;
+    parse(npz, path, &images_dir, images)
+}
+
+/// The poses of `images`, which are those of the folder `images_dir`.
+fn parse(
+    mut npz: NpzReader,
+    path: PathBuf,
+    images_dir: &Path,
+    images: Vec<PathBuf>,
+) -> Result<Poses, SceneError> {
+    let intrinsics = stack(&path, INTRINSICS, &npz.array(INTRINSICS)?)?;
+    let extrinsics = stack(&path, EXTRINSICS, &npz.array(EXTRINSICS)?)?;
     for poses in [&intrinsics, &extrinsics] {
-        check_counts(&path, poses.len(), &images_dir, images.len())?;
+        check_counts(&path, poses.len(), images_dir, images.len())?;
     }
 
     let mut views = Vec::with_capacity(images.len());
@@ -155,4 +165,34 @@ fn write_cameras(scene: &Scene, path: &Path) -> Result<(), SceneError> {
 /// The elements of a matrix, row by row.
 fn row_major<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Vec<f64> {
     matrix.transpose().as_slice().to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mutation::{CASES, awkward_array};
+    use crate::npz::npz_bytes;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(CASES))]
+        #[test]
+        fn arrays_of_any_shape_and_value_never_panic(
+            intrinsics in awkward_array(vec![1, 3, 3]), extrinsics in awkward_array(vec![1, 4, 4]),
+            scale_mat in awkward_array(vec![4, 4]), pixel_center in awkward_array(vec![]),
+        ) {
+            let arrays = BTreeMap::from([
+                (INTRINSICS, intrinsics),
+                (EXTRINSICS, extrinsics),
+                (SCALE_MAT, scale_mat),
+                (PIXEL_CENTER, pixel_center),
+            ]);
+            let path = Path::new("scene/cameras.npz");
+            let npz = NpzReader::from_bytes(npz_bytes(&arrays).unwrap(), path).unwrap();
+            let poses = parse(npz, path.into(), Path::new("images"), vec!["a.png".into()]);
+            if let Ok(poses) = poses {
+                prop_assert!(poses.views.iter().all(|view| view.intrinsics.validate().is_ok()));
+            }
+        }
+    }
 }

@@ -15,7 +15,7 @@
 //! image is taken for the origin: the principal point is (W/2, H/2) and the first
 //! pixel has its centre at (0.5, 0.5).
 
-use super::images;
+use super::images::{self, ReadSize};
 use super::poses::{PosedImage, Poses, malformed, pose_of};
 use super::reconstruction::Reconstruction;
 use super::text_lines::{Line, Records, expected_records, records};
@@ -48,7 +48,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let list = file::read(list_path, LIST_REMEDY)?;
     let images = image_names(list_path, &list)?;
     let dirs = [dir.into(), dir.join("images")];
-    parse(&bytes, &path, &images, &dirs, &images::read_size)
+    parse(&bytes, &path, &images, &dirs, images::read_size)
 }
 
 /// The names of a list, without `0 focal_length`.
@@ -77,7 +77,7 @@ fn parse(
     path: &Path,
     names: &[String],
     dirs: &[PathBuf],
-    size_of: &dyn Fn(&Path) -> Result<(u32, u32), SceneError>,
+    size_of: ReadSize,
 ) -> Result<Poses, SceneError> {
     check_version(path, bytes)?;
     let mut records = expected_records(path, bytes)?;
@@ -226,7 +226,7 @@ mod tests {
     fn parse_text(bytes: &[u8]) -> Result<Poses, SceneError> {
         let dirs = ["scene".into()];
         let path = Path::new("scene/bundle.out");
-        parse(bytes, path, &names(), &dirs, &|_| Ok((12, 8)))
+        parse(bytes, path, &names(), &dirs, |_| Ok((12, 8)))
     }
 
     #[test]

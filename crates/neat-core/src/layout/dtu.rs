@@ -47,10 +47,20 @@ pub(super) fn is_in(npz: &NpzReader) -> bool {
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let [sphere, plain] = candidates(dir);
     let path = if sphere.is_file() { sphere } else { plain };
-    let mut npz = NpzReader::open(&path, NPZ_REMEDY)?;
+    let npz = NpzReader::open(&path, NPZ_REMEDY)?;
     let dirs = IMAGES_DIRS.map(|name| dir.join(name));
     let images_dir = dirs.iter().find(|dir| dir.is_dir()).unwrap_or(&dirs[0]);
     let images = images::list(images_dir)?;
+    parse(npz, path, images_dir, images)
+}
+
+/// The poses of `images`, which are those of the folder `images_dir`.
+fn parse(
+    mut npz: NpzReader,
+    path: PathBuf,
+    images_dir: &Path,
+    images: Vec<PathBuf>,
+) -> Result<Poses, SceneError> {
     let poses = (0..)
         .take_while(|&index| npz.contains(&world_mat(index)))
         .count();
@@ -152,8 +162,27 @@ pub fn decompose_projection(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mutation::{CASES, awkward_array};
+    use crate::npz::npz_bytes;
     use nalgebra::{Rotation3, Vector3};
     use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(CASES))]
+        #[test]
+        fn arrays_of_any_shape_and_value_never_panic(
+            world_mat in awkward_array(vec![4, 4]), scale_mat in awkward_array(vec![4, 4]),
+        ) {
+            let arrays = BTreeMap::from([("world_mat_0", world_mat), ("scale_mat_0", scale_mat)]);
+            let path = Path::new("scene/cameras.npz");
+            let npz = NpzReader::from_bytes(npz_bytes(&arrays).unwrap(), path).unwrap();
+            let poses = parse(npz, path.into(), Path::new("image"), vec!["a.png".into()]);
+            if let Ok(poses) = poses {
+                prop_assert!(poses.views.iter().all(|view| view.intrinsics.validate().is_ok()));
+            }
+        }
+    }
 
     proptest! {
         #[test]

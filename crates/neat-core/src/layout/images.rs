@@ -53,6 +53,10 @@ pub(super) fn has_known_ending(path: &Path) -> bool {
 /// What to do about a missing image.
 const REMEDY: &str = "put the image there or remove its pose";
 
+/// How a reader learns width and height of an image: [`read_size`], but for tests
+/// without files.
+pub(super) type ReadSize = fn(&Path) -> Result<(u32, u32), SceneError>;
+
 /// Width and height, from the first bytes of an image.
 pub(super) fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
     ImageReader::open(path)
@@ -90,31 +94,37 @@ const MAX_FOLDERS: usize = 15;
 /// Such files come from other machines, with absolute paths, drive letters or
 /// `..`. No file outside the scene is opened: only what follows the last of these
 /// counts, and its leading folders are left out one by one until an image is
-/// found.
+/// found. Where there is none, the path is that of the place to put it: for a name
+/// from elsewhere the last of `dirs`.
 pub(super) fn locate(path: &Path, dirs: &[PathBuf], name: &str) -> Result<PathBuf, SceneError> {
     let mut parts: Vec<&str> = name.split(['/', '\\']).collect();
     let leads_out = |part: &&str| *part == ".." || part.contains(':');
     let start = parts.iter().rposition(leads_out).map_or(0, |at| at + 1);
+    let is_from_elsewhere = start > 0 || name.starts_with(['/', '\\']);
     parts.drain(..start);
     parts.retain(|part| !part.is_empty() && *part != ".");
-    if parts.is_empty() {
+    let (Some(file_name), Some(first_dir), Some(last_dir)) =
+        (parts.last(), dirs.first(), dirs.last())
+    else {
         return Err(SceneError::ViewName {
             path: path.into(),
             view: name.into(),
             reason: "names no image: write the file again",
         });
-    }
-    let shortened = (0..parts.len()).skip(parts.len().saturating_sub(MAX_FOLDERS + 1));
-    let candidates = shortened.flat_map(|from| {
+    };
+    for from in parts.len().saturating_sub(MAX_FOLDERS + 1)..parts.len() {
         let relative: PathBuf = parts[from..].iter().collect();
-        dirs.iter()
-            .map(move |dir| with_existing_ending(dir.join(&relative)))
-    });
-    let meant = dirs
-        .iter()
-        .map(|dir| dir.join(parts.iter().collect::<PathBuf>()));
-    let found = candidates.into_iter().find(|image| image.is_file());
-    Ok(found.or(meant.into_iter().next()).unwrap_or_default())
+        let mut images = dirs
+            .iter()
+            .map(|dir| with_existing_ending(dir.join(&relative)));
+        if let Some(image) = images.find(|image| image.is_file()) {
+            return Ok(image);
+        }
+    }
+    Ok(match is_from_elsewhere {
+        true => last_dir.join(file_name),
+        false => first_dir.join(parts.iter().collect::<PathBuf>()),
+    })
 }
 
 /// The bytes of an image's file.
@@ -236,9 +246,10 @@ mod tests {
             ("/home/someone/photos/images/c.png", "images/c.png"),
             (r"C:\photos\left\d.png", "images/left/d.jpg"),
             ("../elsewhere/b.png", "b.png"),
-            // Not there: where the format means it, never above the scene.
-            ("../a.png", "a.png"),
-            ("./left/../none.png", "none.png"),
+            // Not there: where it should be put, never above the scene.
+            ("left/none.png", "left/none.png"),
+            ("../a.png", "images/a.png"),
+            ("/home/someone/none.png", "images/none.png"),
         ] {
             assert_eq!(found(name), scene.join(expected), "{name}");
         }

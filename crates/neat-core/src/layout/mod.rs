@@ -123,27 +123,28 @@ impl Layout {
                 }
             }
         }
-        let is_in: [(Self, bool); 9] = [
-            (
-                Self::CamerasJson,
-                dir.join(cameras_json::FILE_NAME).exists(),
-            ),
-            (Self::TransformsJson, transforms_json::find(dir).is_some()),
-            (Self::Colmap, colmap::is_in(dir)),
-            (
-                Self::MetaDataJson,
-                dir.join(meta_data_json::FILE_NAME).exists(),
-            ),
-            (Self::OpenMvg, openmvg::find(dir).is_some()),
-            (Self::OpenMvs, openmvs::find(dir).is_some()),
-            (Self::VisualSfm, nvm::find(dir).is_some()),
-            (Self::Bundler, bundler::find(dir).is_some()),
-            (Self::Strecha, strecha::find(dir).is_some()),
+        type IsIn = fn(&Path) -> bool;
+        let checks: [(Self, IsIn); 9] = [
+            (Self::CamerasJson, |dir| {
+                dir.join(cameras_json::FILE_NAME).exists()
+            }),
+            (Self::TransformsJson, |dir| {
+                transforms_json::find(dir).is_some()
+            }),
+            (Self::Colmap, colmap::is_in),
+            (Self::MetaDataJson, |dir| {
+                dir.join(meta_data_json::FILE_NAME).exists()
+            }),
+            (Self::OpenMvg, |dir| openmvg::find(dir).is_some()),
+            (Self::OpenMvs, |dir| openmvs::find(dir).is_some()),
+            (Self::VisualSfm, |dir| nvm::find(dir).is_some()),
+            (Self::Bundler, |dir| bundler::find(dir).is_some()),
+            (Self::Strecha, |dir| strecha::find(dir).is_some()),
         ];
-        match is_in.into_iter().find(|(_, found)| *found) {
-            Some((layout, _)) => Ok(layout),
-            None => Err(SceneError::UnknownLayout { path: dir.into() }),
-        }
+        let found = checks.into_iter().find(|(_, is_in)| is_in(dir));
+        found
+            .map(|(layout, _)| layout)
+            .ok_or_else(|| SceneError::UnknownLayout { path: dir.into() })
     }
 
     fn read_poses(self, dir: &Path) -> Result<Poses, SceneError> {

@@ -20,7 +20,7 @@
 //! A file can hold several models, of which nothing relates the frames. The one
 //! of most cameras is read, of several the first.
 
-use super::images;
+use super::images::{self, ReadSize};
 use super::poses::{PosedImage, Poses, malformed, pose_of, rotation_of};
 use super::reconstruction::Reconstruction;
 use super::text_lines::{Line, Records, expected_records};
@@ -41,7 +41,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let path = find(dir).unwrap_or_else(|| dir.join("reconstruction.nvm"));
     let bytes = file::read(&path, REMEDY)?;
     let dirs = [dir.into(), dir.join("images")];
-    parse(&bytes, &path, &dirs, &images::read_size)
+    parse(&bytes, &path, &dirs, images::read_size)
 }
 
 /// The calibration that all images share, if the first line gives one.
@@ -89,7 +89,7 @@ fn parse(
     bytes: &[u8],
     path: &Path,
     dirs: &[PathBuf],
-    size_of: &dyn Fn(&Path) -> Result<(u32, u32), SceneError>,
+    size_of: ReadSize,
 ) -> Result<Poses, SceneError> {
     let mut records = expected_records(path, bytes)?;
     let header = header(records.expect("its first line, NVM_V3")?)?;
@@ -245,7 +245,7 @@ fn posed_image(
     header: &Header,
     path: &Path,
     dirs: &[PathBuf],
-    size_of: &dyn Fn(&Path) -> Result<(u32, u32), SceneError>,
+    size_of: ReadSize,
 ) -> Result<PosedImage, SceneError> {
     let image = camera.name.trim_matches('"').replace('"', " ");
     let image = images::locate(path, dirs, &image)?;
@@ -308,7 +308,7 @@ mod tests {
 
     fn parse_text(bytes: &[u8]) -> Result<Poses, SceneError> {
         let dirs = ["scene".into()];
-        parse(bytes, Path::new("scene/a.nvm"), &dirs, &|_| Ok((12, 8)))
+        parse(bytes, Path::new("scene/a.nvm"), &dirs, |_| Ok((12, 8)))
     }
 
     #[test]

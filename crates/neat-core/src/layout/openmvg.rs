@@ -129,7 +129,7 @@ fn parse(bytes: &[u8], path: &Path, dirs: &[PathBuf]) -> Result<Poses, SceneErro
             continue;
         };
         let context = Context {
-            path: path,
+            path,
             root_path: &json.root_path,
             dirs,
             key: *key,
@@ -219,8 +219,9 @@ impl Context<'_> {
         if file_name.is_empty() {
             return Err(self.error("has an empty `filename`"));
         }
-        let whole = format!("{}/{local_path}/{file_name}", self.root_path);
-        let image = images::locate(self.path, self.dirs, &whole)?;
+        let mut folders_and_name = vec![self.root_path, &local_path, &file_name];
+        folders_and_name.retain(|part| !part.is_empty());
+        let image = images::locate(self.path, self.dirs, &folders_and_name.join("/"))?;
         let (intrinsics, distortion) = self.lens(camera)?;
         let size = member(&view.data, "width").zip(member(&view.data, "height"));
         // `From` takes the inner arrays for columns.

@@ -16,7 +16,7 @@
 //! views see it and nothing about the error of the reconstruction.
 
 use super::binary_reader::BinaryReader;
-use super::images;
+use super::images::{self, ReadSize};
 use super::poses::{PosedImage, Poses, malformed, pose_of, view_error};
 use super::reconstruction::Reconstruction;
 use crate::hawp_json::file_stem;
@@ -50,7 +50,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let path = find(dir).unwrap_or_else(|| dir.join(FILE_NAME));
     let bytes = file::read(&path, REMEDY)?;
     let dirs = [dir.into(), dir.join("images")];
-    parse(&bytes, &path, &dirs, &images::read_size)
+    parse(&bytes, &path, &dirs, images::read_size)
 }
 
 struct Platform {
@@ -82,7 +82,7 @@ fn parse(
     bytes: &[u8],
     path: &Path,
     dirs: &[PathBuf],
-    size_of: &dyn Fn(&Path) -> Result<(u32, u32), SceneError>,
+    size_of: ReadSize,
 ) -> Result<Poses, SceneError> {
     let mut reader = BinaryReader::new(path, bytes);
     let version = version(&mut reader, path)?;
@@ -239,7 +239,7 @@ fn posed_image(
     platforms: &[Platform],
     path: &Path,
     dirs: &[PathBuf],
-    size_of: &dyn Fn(&Path) -> Result<(u32, u32), SceneError>,
+    size_of: ReadSize,
 ) -> Result<PosedImage, SceneError> {
     let located = images::locate(path, dirs, &image.name)?;
     let name = file_stem(&located);
@@ -356,7 +356,7 @@ mod tests {
 
     fn parse_bytes(bytes: &[u8]) -> Result<Poses, SceneError> {
         let dirs = ["scene".into()];
-        parse(bytes, Path::new("scene/scene.mvs"), &dirs, &|_| Ok((8, 16)))
+        parse(bytes, Path::new("scene/scene.mvs"), &dirs, |_| Ok((8, 16)))
     }
 
     #[test]
