@@ -39,7 +39,7 @@ fn twenty_steps() {
         ..SyntheticScene::default()
     };
     let scene = generate(&synthetic).expect("a valid scene").scene;
-    let radius = scene.bounding_ball_radius();
+    let radius = scene.sphere_radius;
     let scene = scene.scaled(1.0 / radius);
     let mut backends = tested(&Backend::built());
     // The reference; the others are compared with it.

@@ -45,6 +45,7 @@ impl Progress {
             Event::StageFinished { stage, seconds } => {
                 self.line(&format!("{stage:<10} {}", duration::display(seconds)));
             }
+            Event::Note(note) => self.line(&note),
             Event::Warning(warning) => self.print(&format!("warning: {warning}")),
             Event::FileWritten(path) => tracing::info!("wrote {}", path.display()),
         }

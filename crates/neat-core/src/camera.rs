@@ -70,6 +70,18 @@ impl Intrinsics {
         }
     }
 
+    /// Square pixels, and the principal point in the middle of an image of
+    /// `size` = (width, height) whose corner is the origin.
+    pub fn centered(focal_length: f64, (width, height): (u32, u32)) -> Self {
+        Self {
+            fx: focal_length,
+            fy: focal_length,
+            cx: f64::from(width) / 2.0,
+            cy: f64::from(height) / 2.0,
+            skew: 0.0,
+        }
+    }
+
     /// As a matrix.
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::new(
@@ -280,6 +292,13 @@ impl Camera {
             calibrated,
             depth: p.z,
         }
+    }
+
+    /// Whether a world point lies in front of the camera and within the image.
+    pub fn sees(&self, point_in_world: &Vector3<f64>) -> bool {
+        let Projection { pixel, depth, .. } = self.project(point_in_world);
+        let within = |x: f64, size: u32| (0.0..f64::from(size)).contains(&x);
+        depth > 0.0 && within(pixel.x, self.width) && within(pixel.y, self.height)
     }
 
     /// The ray through a point given in image coordinates.

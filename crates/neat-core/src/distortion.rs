@@ -34,6 +34,19 @@ pub enum Distortion {
         /// s1 … s4.
         thin_prism: [f64; 4],
     },
+    /// COLMAP's thin-prism fisheye, in which tangential and prism terms act before
+    /// the radial ones: with θ = atan r and `(u, v) = (x, y) · θ/r`, it is
+    /// `(u, v) · (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` plus
+    /// `(2 p1 u v + p2 (θ² + 2u²), p1 (θ² + 2v²) + 2 p2 u v)` and
+    /// `(s1 θ², s2 θ²)`.
+    ThinPrismFisheye {
+        /// k1 … k4.
+        radial: [f64; 4],
+        /// p1, p2.
+        tangential: [f64; 2],
+        /// s1, s2.
+        thin_prism: [f64; 2],
+    },
     /// Field of view: `(x, y) · atan(2 r tan(ω/2)) / (r ω)`.
     Fov {
         /// ω, in radians.
@@ -57,7 +70,7 @@ impl Distortion {
             Self::Brown { radial, tangential } => {
                 radial.iter().chain(tangential).all(|&x| x == 0.0)
             }
-            Self::Fisheye { .. } => false,
+            Self::Fisheye { .. } | Self::ThinPrismFisheye { .. } => false,
             Self::Fov { omega } => *omega == 0.0,
             Self::Division { k } => *k == 0.0,
         }
@@ -69,6 +82,7 @@ impl Distortion {
             Self::None => "pinhole",
             Self::Brown { .. } => "Brown",
             Self::Fisheye { .. } => "fisheye",
+            Self::ThinPrismFisheye { .. } => "thin prism fisheye",
             Self::Fov { .. } => "field of view",
             Self::Division { .. } => "division",
         }
@@ -96,6 +110,16 @@ impl Distortion {
                 let bent = point * scale;
                 bent + decentering(tangential, &bent) + prism(thin_prism, &bent)
             }
+            Self::ThinPrismFisheye {
+                radial,
+                tangential,
+                thin_prism: [s1, s2],
+            } => {
+                let (scale, _) = fisheye_scale(&[0.0; 6], point.norm());
+                let bent = point * scale;
+                let (outer, _) = series(radial, bent.norm_squared());
+                bent * outer + decentering(tangential, &bent) + prism(&[*s1, 0.0, *s2, 0.0], &bent)
+            }
             Self::Fov { omega } => point * fov_scale(*omega, point.norm()),
             Self::Division { k } => point * division_scale(*k, point.norm()),
         }
@@ -110,7 +134,9 @@ impl Distortion {
         }
         match self {
             Self::None => Some(*distorted),
-            Self::Brown { .. } | Self::Fisheye { .. } => self.undistort_by_newton(distorted),
+            Self::Brown { .. } | Self::Fisheye { .. } | Self::ThinPrismFisheye { .. } => {
+                self.undistort_by_newton(distorted)
+            }
             Self::Fov { omega } => {
                 let half_tangent = (omega / 2.0).tan();
                 let radius = distorted.norm();
@@ -134,11 +160,13 @@ impl Distortion {
     pub fn is_one_to_one_to(&self, calibrated: &Vector2<f64>) -> bool {
         match self {
             Self::None | Self::Fov { .. } => true,
-            Self::Brown { .. } | Self::Fisheye { .. } => (1..=FOLD_SAMPLES).all(|sample| {
-                let share = f64::from(sample) / f64::from(FOLD_SAMPLES);
-                self.with_jacobian(&(calibrated * share))
-                    .is_some_and(|(_, jacobian)| jacobian.determinant() > 0.0)
-            }),
+            Self::Brown { .. } | Self::Fisheye { .. } | Self::ThinPrismFisheye { .. } => {
+                (1..=FOLD_SAMPLES).all(|sample| {
+                    let share = f64::from(sample) / f64::from(FOLD_SAMPLES);
+                    self.with_jacobian(&(calibrated * share))
+                        .is_some_and(|(_, jacobian)| jacobian.determinant() > 0.0)
+                })
+            }
             Self::Division { .. } => self.distort(calibrated).iter().all(|x| x.is_finite()),
         }
     }
@@ -173,7 +201,7 @@ impl Distortion {
         None
     }
 
-    /// [`Self::distort`] and its derivative by the point, of the two models that
+    /// [`Self::distort`] and its derivative by the point, of the models that
     /// are inverted with it; `None` where they are not finite or have turned the
     /// point through the axis.
     fn with_jacobian(&self, point: &Vector2<f64>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
@@ -202,6 +230,24 @@ impl Distortion {
                     bent + decentering(tangential, &bent) + prism(thin_prism, &bent),
                     outer * radial_jacobian(point, scale, slope_by_radius),
                     scale,
+                )
+            }
+            Self::ThinPrismFisheye {
+                radial,
+                tangential,
+                thin_prism: [s1, s2],
+            } => {
+                let prisms = [*s1, 0.0, *s2, 0.0];
+                let (scale, slope_by_radius) = fisheye_scale(&[0.0; 6], point.norm());
+                let bent = point * scale;
+                let (outer_scale, slope) = series(radial, bent.norm_squared());
+                let outer = radial_jacobian(&bent, outer_scale, 2.0 * slope)
+                    + decentering_jacobian(tangential, &bent)
+                    + prism_jacobian(&prisms, &bent);
+                (
+                    bent * outer_scale + decentering(tangential, &bent) + prism(&prisms, &bent),
+                    outer * radial_jacobian(point, scale, slope_by_radius),
+                    outer_scale,
                 )
             }
             Self::None | Self::Fov { .. } | Self::Division { .. } => return None,

@@ -199,9 +199,10 @@ mod tests {
                 sum += off;
                 prop_assert_eq!(rgb[2], 99);
             }
-            // Most of that cancels.
+            // Only rounding can be on one side more than on the other: half a level
+            // of four per pixel. Half a pixel at the wrong place would be more.
             let pixels = f64::from(scaled.width() * scaled.height());
-            prop_assert!((sum / pixels).amax() < 0.13, "{}", sum / pixels);
+            prop_assert!((sum / pixels).amax() < 0.1, "{}", sum / pixels);
         }
 
         #[test]

@@ -84,6 +84,16 @@ pub enum SceneError {
         /// Which rule it breaks.
         reason: String,
     },
+    /// NaN or an infinite number where only numbers make sense.
+    #[error("{path} cannot be used: {element} is {value}; write it again")]
+    NotFinite {
+        /// The file, or the array in it.
+        path: PathBuf,
+        /// Which one.
+        element: String,
+        /// What it is instead of a number.
+        value: f64,
+    },
     /// An array of another shape than its layout asks for.
     #[error("array `{array}` of {path} has shape {found:?}, expected {expected}")]
     WrongShape {
@@ -114,9 +124,9 @@ pub enum SceneError {
         /// What is wrong with it.
         problem: ViewError,
     },
-    /// A camera that is not a pinhole without distortion.
+    /// A camera of a model that cannot be turned into a pinhole here.
     #[error(
-        "{path}: camera {camera} of model {model} is not a pinhole without distortion: run `colmap image_undistorter` and give its images and model"
+        "{path}: camera {camera} has the model {model}, which is not read: run `colmap image_undistorter` and give its images and model"
     )]
     NotPinhole {
         /// The file with the camera.
@@ -168,9 +178,19 @@ pub enum SceneError {
         /// The minimum score.
         min_segment_score: f64,
     },
+    /// A scene sphere that cannot be placed as asked for.
+    #[error(
+        "the scene sphere of {path} cannot be placed: there is {evidence}; choose another with --scene-sphere, such as cameras, points, or x,y,z,radius"
+    )]
+    NoSphere {
+        /// The scene.
+        path: PathBuf,
+        /// What it lacks.
+        evidence: &'static str,
+    },
     /// A folder that follows none of the known layouts.
     #[error(
-        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics` or with `world_mat_0` and `scale_mat_0`, or cameras.json, or transforms.json, or a COLMAP model (cameras and images, .bin or .txt) in sparse/0, sparse or the folder itself"
+        "{path} is not a scene: expected cameras.npz with `intrinsics` and `extrinsics`, cameras.npz or cameras_sphere.npz with `world_mat_0` and `scale_mat_0`, cameras.json, transforms.json, a COLMAP model (cameras and images, .bin or .txt) in sparse/0, sparse or the folder itself, meta_data.json, sfm_data.json (OpenMVG), scene.mvs (OpenMVS), a .nvm file (VisualSfM), bundle.out with list.txt (Bundler), or NAME.jpg.camera files (Strecha)"
     )]
     UnknownLayout {
         /// The folder.

@@ -1,6 +1,6 @@
 //! A scene: posed images, each with its 2D wireframe.
 
-use crate::{Camera, SceneError, ViewError, Wireframe2d};
+use crate::{Camera, SceneError, ViewError, Wireframe2d, scene_sphere};
 use image::RgbImage;
 use nalgebra::{Matrix4, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -86,14 +86,13 @@ pub struct Scene {
     /// Image coordinates of the centre of pixel (0, 0), on both axes: 0.5 where
     /// the intrinsics' origin is the image corner, 0 where it is that centre.
     pub pixel_center: f64,
+    /// Radius of the scene sphere: the ball around the world origin that is
+    /// modelled.
+    pub sphere_radius: f64,
     /// Points of the reconstruction that the poses come from, where the files
     /// hold them.
     pub sparse_points: Vec<SparsePoint>,
 }
-
-/// Every object of a scene should lie within this share of the space that all
-/// cameras see: with exactly 1 its corners can fall on the border.
-const BALL_MARGIN: f64 = 1.2;
 
 impl View {
     /// Checks the camera, the wireframe, and that both are made for this image.
@@ -154,19 +153,26 @@ impl Scene {
         check_names(self.views.iter().map(|view| view.name.as_str()), &path)
     }
 
-    /// Radius of the ball around the world origin that holds the object: 1.2
-    /// times the largest origin-centred ball that every camera sees whole,
-    /// which is |c| · sin(atan(min(W, H) / 2 / f)) for a camera at c that looks
-    /// at the origin. Infinite for a scene without views.
-    pub fn bounding_ball_radius(&self) -> f64 {
-        let seen = |camera: &Camera| {
-            let half_tangent = (f64::from(camera.width) / camera.intrinsics.fx)
-                .min(f64::from(camera.height) / camera.intrinsics.fy)
-                / 2.0;
-            camera.center_in_world.norm() * half_tangent.atan().sin()
-        };
-        let nearest = self.views.iter().map(|view| seen(&view.camera));
-        BALL_MARGIN * nearest.fold(f64::INFINITY, f64::min)
+    /// Keeps the views for which `keep` is true; sparse points lose what the others
+    /// observed.
+    pub fn retain_views(&mut self, mut keep: impl FnMut(&View) -> bool) {
+        let kept: Vec<bool> = self.views.iter().map(&mut keep).collect();
+        // Where each view is among those that are kept.
+        let new_index: Vec<usize> = (kept.iter())
+            .scan(0, |next, &kept| {
+                let index = *next;
+                *next += usize::from(kept);
+                Some(index)
+            })
+            .collect();
+        for point in &mut self.sparse_points {
+            point.observations.retain(|seen| kept[seen.view]);
+            for seen in &mut point.observations {
+                seen.view = new_index[seen.view];
+            }
+        }
+        let mut kept = kept.into_iter();
+        self.views.retain(|_| kept.next() == Some(true));
     }
 
     /// The same scene in a world whose lengths are `factor` times as large;
@@ -178,8 +184,28 @@ impl Scene {
         for point in &mut self.sparse_points {
             point.position_in_world *= factor;
         }
+        self.sphere_radius *= factor;
         self.original_from_world.scale /= factor;
         self
+    }
+
+    /// The same scene in a world whose origin is at `center` of this one.
+    pub fn centered_at(mut self, center: &Vector3<f64>) -> Self {
+        for view in &mut self.views {
+            view.camera.center_in_world -= center;
+        }
+        for point in &mut self.sparse_points {
+            point.position_in_world -= center;
+        }
+        self.original_from_world.translation += center * self.original_from_world.scale;
+        self
+    }
+
+    /// Radius of the ball around the world origin that all cameras see: 1.2 times
+    /// the largest that each of them sees whole. Infinite for a scene without
+    /// views.
+    pub fn visible_radius(&self) -> f64 {
+        scene_sphere::visible_radius(self.views.iter().map(|view| &view.camera))
     }
 }
 
@@ -238,16 +264,9 @@ mod tests {
             views,
             original_from_world: Similarity::identity(),
             pixel_center: 0.5,
+            sphere_radius: 1.5,
             sparse_points: Vec::new(),
         }
-    }
-
-    #[test]
-    fn the_ball_is_the_largest_that_the_nearest_camera_sees() {
-        // Half of the smaller side over the focal length is 3/4: sine 3/5.
-        let two = scene(vec![view("a", 9.0, 150, 200), view("b", 5.0, 200, 150)]);
-        assert!((two.bounding_ball_radius() - 1.2 * 5.0 * 0.6).abs() < 1e-12);
-        assert_eq!(scene(vec![]).bounding_ball_radius(), f64::INFINITY);
     }
 
     #[test]
@@ -260,8 +279,40 @@ mod tests {
         assert!((seen - scaled).norm() < 1e-9);
         let back = after.original_from_world.apply(&(point * 0.25));
         assert!((back - before.original_from_world.apply(&point)).norm() < 1e-12);
-        let (large, small) = (before.bounding_ball_radius(), after.bounding_ball_radius());
+        let (large, small) = (before.visible_radius(), after.visible_radius());
         assert!((small - 0.25 * large).abs() < 1e-12);
+        assert_eq!(after.sphere_radius, 0.25 * before.sphere_radius);
+
+        let center = Vector3::new(0.1, 0.2, -0.3);
+        let moved = after.clone().centered_at(&center);
+        let shown = moved.views[0]
+            .camera
+            .project(&(point * 0.25 - center))
+            .pixel;
+        assert!((seen - shown).norm() < 1e-9);
+        let back = moved.original_from_world.apply(&(point * 0.25 - center));
+        assert!((back - point).norm() < 1e-12);
+    }
+
+    #[test]
+    fn points_follow_the_views_that_are_kept() {
+        let names = ["a", "b", "c", "d"];
+        let mut scene = scene(names.map(|name| view(name, 5.0, 4, 3)).to_vec());
+        let seen = |view| Observation {
+            view,
+            pixel: Vector2::new(view as f64, 0.0),
+        };
+        scene.sparse_points = vec![SparsePoint {
+            position_in_world: Vector3::zeros(),
+            observations: (0..4).map(seen).collect(),
+        }];
+        scene.retain_views(|view| view.name != "b" && view.name != "c");
+        let left: Vec<_> = scene.views.iter().map(|view| view.name.as_str()).collect();
+        assert_eq!(left, ["a", "d"]);
+        let observations: Vec<_> = (scene.sparse_points[0].observations.iter())
+            .map(|seen| (seen.view, seen.pixel.x))
+            .collect();
+        assert_eq!(observations, [(0, 0.0), (1, 3.0)]);
     }
 
     #[test]

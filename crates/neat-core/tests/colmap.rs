@@ -5,7 +5,8 @@ use image::{Rgb, RgbImage};
 use nalgebra::{Vector2, Vector3};
 use neat_core::layout::Layout;
 use neat_core::{
-    LoadOptions, LoadedScene, Scene, SceneError, Similarity, Wireframe2d, hawp_json, load_scene,
+    LoadOptions, LoadedScene, Observation, Scene, SceneError, Similarity, SphereChoice,
+    Wireframe2d, hawp_json, load_scene,
 };
 use std::fs;
 use std::path::Path;
@@ -33,8 +34,6 @@ const POINTS: &str = "\
 4 9 21 31 1 2 3 0.5
 2 5000 -9000 29 1 2 3 0.5 3 0
 ";
-/// The median of the points.
-const ORIGIN: Vector3<f64> = Vector3::new(10.0, 20.0, 30.0);
 
 /// Images and wireframes of the model.
 fn scene_dir() -> TempDir {
@@ -126,7 +125,7 @@ fn binary_files() -> [Vec<u8>; 3] {
     images.ints([2]).raw(b"view_0.png\0").longs([0]);
 
     points.longs([3]);
-    let track = [[0u32, 3].as_slice(), &[], &[3, 0]];
+    let track = [[1u32, 0, 3, 1].as_slice(), &[], &[3, 0]];
     let xyz = [[10.0, 20.0, 30.0], [9.0, 21.0, 31.0], [5e3, -9e3, 29.0]];
     for ((id, xyz), track) in [1, 4, 2].into_iter().zip(xyz).zip(track) {
         points.longs([id]).doubles(xyz).raw(&[1, 2, 3]);
@@ -148,11 +147,17 @@ fn write_binary(dir: &Path, [cameras, images, points]: &[Vec<u8>; 3]) {
 }
 
 fn load(dir: &TempDir) -> Result<LoadedScene, SceneError> {
-    load_scene(dir.path(), &LoadOptions::default())
+    // The sphere has its own tests: here the frame of the files counts.
+    let options = LoadOptions {
+        sphere: SphereChoice::File,
+        ..LoadOptions::default()
+    };
+    load_scene(dir.path(), &options)
 }
 
 fn assert_same(a: &Scene, b: &Scene) {
     assert_eq!(a.original_from_world, b.original_from_world);
+    assert_eq!(a.sparse_points, b.sparse_points);
     assert_eq!(a.views.len(), b.views.len());
     for (a, b) in a.views.iter().zip(&b.views) {
         assert_eq!((&a.name, &a.camera), (&b.name, &b.camera));
@@ -167,11 +172,7 @@ fn points_appear_where_the_formulas_of_colmap_put_them() {
     assert_eq!(loaded.layout, Layout::Colmap);
     assert_eq!(loaded.warnings, []);
     assert_eq!(scene.pixel_center, 0.5);
-    let origin = Similarity {
-        scale: 1.0,
-        translation: ORIGIN,
-    };
-    assert_eq!(scene.original_from_world, origin);
+    assert_eq!(scene.original_from_world, Similarity::identity());
     scene.validate().unwrap();
     let [first, second] = scene.views.as_slice() else {
         panic!("two views");
@@ -179,8 +180,7 @@ fn points_appear_where_the_formulas_of_colmap_put_them() {
     assert_eq!([&first.name, &second.name], ["view_0", "view_1"]);
     assert_eq!(second.image.get_pixel(0, 0), &Rgb([1; 3]));
 
-    let point = Vector3::new(2.0, 3.0, 5.0);
-    let in_world = scene.original_from_world.inverse().apply(&point);
+    let in_world = Vector3::new(2.0, 3.0, 5.0);
     // No rotation: the point is (2.5, 2.75, 9) in the camera.
     let found = first.camera.project(&in_world);
     let expected = Vector2::new(20.0 * 2.5 / 9.0 + 6.0, 20.0 * 2.75 / 9.0 + 4.0);
@@ -191,12 +191,23 @@ fn points_appear_where_the_formulas_of_colmap_put_them() {
     let expected = Vector2::new(20.0 * -2.0 / 8.0 + 6.5, 21.0 * 4.0 / 8.0 + 4.0);
     assert!((found.pixel - expected).amax() < 1e-9, "{found:?}");
     assert!((found.depth - 8.0).abs() < 1e-9);
+
+    let points = &scene.sparse_points;
+    let positions: Vec<_> = points.iter().map(|p| p.position_in_world.y).collect();
+    assert_eq!(positions, [20.0, 21.0, -9000.0]);
+    let seen: Vec<_> = points.iter().map(|p| p.observations.as_slice()).collect();
+    let by_second = |x, y| Observation {
+        view: 1,
+        pixel: Vector2::new(x, y),
+    };
+    let expected: [&[_]; 3] = [&[by_second(3.5, 4.5)], &[], &[by_second(1.5, 2.5)]];
+    assert_eq!(seen, expected);
 }
 
 #[test]
 fn text_and_binary_are_the_same_wherever_they_lie() {
     let expected = load(&text_scene(CAMERAS, IMAGES, POINTS)).unwrap().scene;
-    for below in ["sparse/0", "sparse", ""] {
+    for below in ["sparse/0", "sparse", "", "colmap/sparse/0"] {
         let text = scene_dir();
         write_text(&text.path().join(below), CAMERAS, IMAGES, POINTS);
         let binary = scene_dir();
@@ -207,6 +218,14 @@ fn text_and_binary_are_the_same_wherever_they_lie() {
             assert_eq!(Layout::detect(dir.path()).unwrap(), Layout::Colmap);
             assert_same(&load(&dir).unwrap().scene, &expected);
         }
+    }
+    // What the undistorter writes lies together.
+    for below in ["dense", "dense/0"] {
+        let dir = scene_dir();
+        let dense = dir.path().join(below);
+        write_text(&dense.join("sparse"), CAMERAS, IMAGES, POINTS);
+        fs::rename(dir.path().join("images"), dense.join("images")).unwrap();
+        assert_same(&load(&dir).unwrap().scene, &expected);
     }
 }
 
@@ -239,10 +258,10 @@ fn files_are_preferred_in_a_fixed_order() {
 }
 
 #[test]
-fn without_points_the_frame_is_that_of_the_files() {
+fn points_may_be_missing() {
     let dir = text_scene(CAMERAS, IMAGES, "");
     let empty = load(&dir).unwrap().scene;
-    assert_eq!(empty.original_from_world, Similarity::identity());
+    assert_eq!(empty.sparse_points, []);
     let center = empty.views[0].camera.center_in_world;
     assert_eq!(center, Vector3::new(-0.5, 0.25, -4.0));
     fs::write(dir.path().join("sparse/0/points3D.txt"), "# none\n").unwrap();
@@ -267,20 +286,25 @@ fn bad_models_are_named_with_file_and_view() {
     let in_cameras = |from, to| [edit(cameras, from, to), images.into(), points.into()];
     let in_images = |from, to| [cameras.into(), edit(images, from, to), points.into()];
     let in_points = |from, to| [cameras.into(), images.into(), edit(points, from, to)];
-    let distorted = "camera 2 of model SIMPLE_RADIAL is not a pinhole without distortion: \
-                     run `colmap image_undistorter`";
-    let bad: [([String; 3], &[&str]); 22] = [
-        (
-            in_cameras("6 4 0\n", "6 4 0.01\n"),
-            &["cameras.txt", distorted],
-        ),
-        (
-            in_cameras("RADIAL", "RADIAL_FISHEYE"),
-            &["camera 2", "image_undistorter"],
-        ),
+    let division = "camera 2 has the model SIMPLE_DIVISION, which is not read: \
+                    run `colmap image_undistorter`";
+    let bad: [([String; 3], &[&str]); 24] = [
+        (in_cameras("RADIAL", "DIVISION"), &["cameras.txt", division]),
         (
             in_cameras("PINHOLE", "SPHERE"),
-            &["cameras.txt", "camera 7 of model SPHERE"],
+            &["cameras.txt", "camera 7 has the model SPHERE"],
+        ),
+        (
+            in_images("\n1 1 0", "\n3 1 0"),
+            &["images.txt", "image 3 appears twice"],
+        ),
+        (
+            in_images("1.5 2.5 -1", "inf 2.5 -1"),
+            &["images.txt", "a point is not finite"],
+        ),
+        (
+            in_points("1 0 3 1", "1 0 3"),
+            &["points3D.txt", "line 1: it ends before POINT2D_IDX"],
         ),
         (
             in_cameras("20 6 4 0", "NaN 6 4 0"),
@@ -387,9 +411,12 @@ fn truncated_binary_files_are_named() {
         }
     }
     let mut unknown = files;
-    unknown[0][12..16].copy_from_slice(&12i32.to_le_bytes());
+    unknown[0][12..16].copy_from_slice(&18i32.to_le_bytes());
     let dir = scene_dir();
     write_binary(dir.path(), &unknown);
     let message = load(&dir).unwrap_err().to_string();
-    assert!(message.contains("camera 7 of model number 12"), "{message}");
+    assert!(
+        message.contains("camera 7 has the model number 18"),
+        "{message}"
+    );
 }

@@ -86,6 +86,7 @@ fn scene(pixel_center: f64) -> Scene {
             translation: Vector3::new(500.0, 7.5, -3.0),
         },
         pixel_center,
+        sphere_radius: 0.75,
         sparse_points,
     }
 }
@@ -139,6 +140,24 @@ fn every_format_reads_back() {
             assert_same(&load(&dir), &scene, &context);
             // No temporary folder is left.
             assert_eq!(fs::read_dir(dir.parent().unwrap()).unwrap().count(), 1);
+            let back = load(&dir);
+            assert_eq!(back.sparse_points.len(), 3, "{context}");
+            for (found, expected) in back.sparse_points.iter().zip(&scene.sparse_points) {
+                let original = |scene: &Scene, point: &SparsePoint| {
+                    scene.original_from_world.apply(&point.position_in_world)
+                };
+                let difference = original(&back, found) - original(&scene, expected);
+                assert!(difference.norm() < 1e-9, "{context}");
+                // Only COLMAP's files say where points were seen.
+                if format == SceneFormat::Colmap {
+                    let shift = 0.5 - pixel_center;
+                    assert_eq!(found.observations.len(), expected.observations.len());
+                    for (a, b) in found.observations.iter().zip(&expected.observations) {
+                        assert_eq!(a.view, b.view);
+                        assert!((a.pixel - b.pixel.add_scalar(shift)).norm() < 1e-9);
+                    }
+                }
+            }
             if format != SceneFormat::Colmap {
                 let points = read_ply(&dir.join(POINTS_FILE)).unwrap();
                 for (found, point) in points.iter().zip(&scene.sparse_points) {
@@ -334,7 +353,8 @@ fn idr_reads_projections_of_the_original_frame() {
         let point = scene.sparse_points[0].position_in_world;
         let expected = view.camera.project(&point);
         for homogeneous in [
-            world * scale * point.push(1.0),
+            // The scene sphere is the unit ball of the normalised world.
+            world * scale * (point / scene.sphere_radius).push(1.0),
             world * scene.original_from_world.apply(&point).push(1.0),
         ] {
             let found = Vector2::new(homogeneous.x, homogeneous.y) / homogeneous.z;

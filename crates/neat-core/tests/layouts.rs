@@ -2,11 +2,13 @@
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Matrix4, Rotation3, Vector2, Vector3};
-use neat_core::layout::{Layout, PixelCenter, SceneWarning, abc};
+use neat_core::layout::{
+    CameraAxes, Layout, PixelCenter, PoseConvention, PoseDirection, SceneWarning, abc,
+};
 use neat_core::npz::{NpyArray, write_npz};
 use neat_core::{
-    Camera, Intrinsics, LoadOptions, LoadedScene, Scene, SceneError, Similarity, View, Wireframe2d,
-    load_scene,
+    Camera, Intrinsics, LoadOptions, LoadedScene, Scene, SceneError, Similarity, SphereChoice,
+    View, Wireframe2d, load_scene,
 };
 use std::collections::BTreeMap;
 use std::fs;
@@ -60,6 +62,7 @@ fn scene() -> Scene {
             translation: Vector3::new(5.0, 7.5, 3.0),
         },
         pixel_center: 0.5,
+        sphere_radius: 0.75,
         sparse_points: Vec::new(),
     }
 }
@@ -128,6 +131,7 @@ fn the_abc_layout_round_trips_exactly() {
         scene().original_from_world
     );
     assert_eq!(loaded.scene.pixel_center, 0.5);
+    assert_eq!(loaded.scene.sphere_radius, 0.75);
     loaded.scene.validate().unwrap();
 }
 
@@ -295,7 +299,11 @@ fn an_undecided_pixel_center_is_the_published_one_with_a_warning() {
         ),
     ]);
     write_npz(&dir.path().join("cameras.npz"), &arrays).unwrap();
-    let loaded = load(&dir).unwrap();
+    let options = LoadOptions {
+        sphere: SphereChoice::File,
+        ..LoadOptions::default()
+    };
+    let loaded = load_scene(dir.path(), &options).unwrap();
     assert_eq!(loaded.scene.pixel_center, 0.0);
     assert_eq!(
         loaded.warnings,
@@ -449,4 +457,85 @@ fn scenes_that_could_not_be_read_back_are_not_written() {
         abc::write_scene(&scene(), &target),
         Err(SceneError::Write { .. })
     ));
+}
+
+/// Rewrites the arrays of `cameras.npz`, pose by pose and K by K.
+fn rewrite_cameras(dir: &TempDir, f: impl Fn(&mut Matrix4<f64>, &mut Matrix4<f64>)) {
+    let scene = load(dir).unwrap().scene;
+    let (mut poses, mut intrinsics) = (Vec::new(), Vec::new());
+    for view in &scene.views {
+        let mut pose = view.camera.matrix_world_from_camera();
+        let mut k = view.camera.intrinsics.matrix().to_homogeneous();
+        f(&mut pose, &mut k);
+        // Row by row: nalgebra stores columns.
+        poses.extend_from_slice(pose.transpose().as_slice());
+        intrinsics.extend_from_slice(k.transpose().as_slice());
+    }
+    let stack = |values| NpyArray {
+        shape: vec![scene.views.len(), 4, 4],
+        values,
+    };
+    let arrays = BTreeMap::from([
+        ("extrinsics", stack(poses)),
+        ("intrinsics", stack(intrinsics)),
+    ]);
+    write_npz(&dir.path().join("cameras.npz"), &arrays).unwrap();
+}
+
+#[test]
+fn poses_of_another_convention_are_read_by_saying_so() {
+    let dir = scene_dir();
+    let expected = load(&dir).unwrap().scene;
+    let flip = Matrix4::from_diagonal(&nalgebra::Vector4::new(1.0, -1.0, -1.0, 1.0));
+    // What an OpenGL program calls its view matrix, for images twice as large.
+    rewrite_cameras(&dir, |pose, k| {
+        *pose = (*pose * flip).try_inverse().unwrap();
+        for row in 0..2 {
+            for column in 0..3 {
+                k[(row, column)] *= 2.0;
+            }
+        }
+        k[(0, 0)] *= 1.5;
+        k[(1, 1)] *= 1.5;
+        k[(0, 1)] *= 1.5;
+    });
+    let options = LoadOptions {
+        pose_convention: Some(PoseConvention {
+            direction: PoseDirection::WorldToCamera,
+            axes: CameraAxes::OPENGL,
+            mirrored_world: false,
+        }),
+        focal_scale: Some(1.0 / 1.5),
+        intrinsics_scale: Some(0.5),
+        ..LoadOptions::default()
+    };
+    let loaded = load_scene(dir.path(), &options).unwrap().scene;
+    for (view, expected) in loaded.views.iter().zip(&expected.views) {
+        let pose = view.camera.matrix_world_from_camera();
+        assert!((pose - expected.camera.matrix_world_from_camera()).amax() < 1e-12);
+        let k = view.camera.intrinsics.matrix() - expected.camera.intrinsics.matrix();
+        assert!(k.amax() < 1e-12, "{k}");
+    }
+}
+
+#[test]
+fn a_mirrored_world_is_refused_and_read_by_saying_so() {
+    let dir = scene_dir();
+    let expected = load(&dir).unwrap().scene;
+    rewrite_cameras(&dir, |pose, _| {
+        let turned = -pose.row(2);
+        pose.set_row(2, &turned);
+    });
+    assert!(message(&dir).contains("mirrored"));
+    let options = LoadOptions {
+        pose_convention: Some(PoseConvention {
+            mirrored_world: true,
+            ..PoseConvention::default()
+        }),
+        ..LoadOptions::default()
+    };
+    let loaded = load_scene(dir.path(), &options).unwrap().scene;
+    for (view, expected) in loaded.views.iter().zip(&expected.views) {
+        assert_eq!(view.camera, expected.camera);
+    }
 }

@@ -6,7 +6,8 @@ use neat_core::convert::{SceneFormat, convert};
 use neat_core::ground_truth::{read_ground_truth, read_wireframe};
 use neat_core::layout::Layout;
 use neat_core::point_cloud::read_ply;
-use neat_core::{LoadOptions, SceneError, load_scene};
+use neat_core::scene_sphere::SphereSource;
+use neat_core::{LoadOptions, SceneError, SphereChoice, load_scene};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
@@ -44,7 +45,8 @@ fn the_toy_object_has_its_known_numbers() {
         let pixel = view.camera.project(&Vector3::zeros()).pixel;
         assert!((pixel.add_scalar(-256.0)).amax() < 1e-2);
     }
-    assert!((scene.bounding_ball_radius() - 1.0).abs() < 1e-2);
+    assert!((scene.sphere_radius - 1.0).abs() < 1e-2);
+    assert_eq!(loaded.sphere.source, SphereSource::File);
     assert_eq!(scene.views[0].wireframe.vertices.len(), 8);
     assert_eq!(scene.views[0].wireframe.segments(0.05).len(), 9);
     assert_eq!(
@@ -103,6 +105,7 @@ fn scenes_without_wireframes_name_the_remedy_and_load_without() {
             let options = LoadOptions {
                 layout: Some(layout),
                 require_wireframes: false,
+                sphere: SphereChoice::File,
                 ..LoadOptions::default()
             };
             let scene = load_scene(&dir, &options).unwrap().scene;
@@ -149,6 +152,7 @@ fn blenders_transforms_agree_with_the_cameras_made_from_them() {
 
     let options = LoadOptions {
         require_wireframes: false,
+        sphere: SphereChoice::File,
         ..LoadOptions::default()
     };
     let loaded = load_scene(blender.path(), &options).unwrap();
@@ -259,5 +263,63 @@ fn point_clouds_of_both_encodings_are_read() {
             continue;
         };
         assert_eq!(read_ply(&dir.join(file)).unwrap().len(), points, "{name}");
+    }
+}
+
+/// The sphere of every scene holds what is known of it, and little more.
+#[test]
+fn spheres_hold_their_scenes() {
+    use SphereSource::{Cameras, File, Masks, Points};
+    let scenes = [
+        ("abc-00001776", File),
+        ("abc-00003173", File),
+        ("cad-0406", File),
+        ("cad-three-concave", File),
+        // Transparent images; the origin is a corner of the object's cube.
+        ("abcnef-00000952", Masks),
+        ("abcnef-00004926", Masks),
+        ("dtu-scan24", File),
+        ("strecha-entry-P10", Points),
+        ("sceaux-castle", Points),
+    ];
+    for (name, source) in scenes {
+        let Some(dir) = real(name) else {
+            continue;
+        };
+        for choice in [SphereChoice::Auto, SphereChoice::Cameras] {
+            let options = LoadOptions {
+                layout: Some(Layout::CamerasJson),
+                require_wireframes: false,
+                sphere: choice,
+                ..LoadOptions::default()
+            };
+            let loaded = load_scene(&dir, &options).unwrap();
+            println!("{name}: {}", loaded.sphere);
+            if choice == SphereChoice::Cameras {
+                assert_eq!(loaded.sphere.source, Cameras);
+                continue;
+            }
+            assert_eq!(loaded.sphere.source, source, "{name}");
+            let truth = dir.join("gt_wireframe.json");
+            let scene = &loaded.scene;
+            let world_from_original = scene.original_from_world.inverse();
+            let mut shares: Vec<f64> = match truth.exists() {
+                true => (read_ground_truth(&truth)
+                    .unwrap()
+                    .wireframe
+                    .junctions
+                    .iter())
+                .map(|point| world_from_original.apply(point).norm())
+                .collect(),
+                false => (scene.sparse_points.iter())
+                    .map(|point| point.position_in_world.norm())
+                    .collect(),
+            };
+            shares.iter_mut().for_each(|x| *x /= scene.sphere_radius);
+            shares.sort_by(f64::total_cmp);
+            let [most, half] =
+                [0.97, 0.5].map(|q| shares[(q * (shares.len() - 1) as f64) as usize]);
+            assert!(most <= 1.0 && half > 0.2, "{name}: {half} {most}");
+        }
     }
 }

@@ -1,1 +1,35 @@
-//! Examines a posed scene: do poses, intrinsics and images agree?
+//! Examines a posed scene before hours are spent on it: do poses, intrinsics and
+//! images agree, and if not, why, and which flag repairs it?
+//!
+//! [`examine`] looks at a scene, [`examine_folder`] also at folders that do not
+//! even hold one that can be read, and [`explain`] says what a [`SceneError`]
+//! means. All give findings with a level, a cause, a sentence and a remedy.
+//!
+//! The check of the poses does not trust them. It first gathers evidence from
+//! the images alone: points of textured things, matched by their looks through
+//! three views, or corners of things without texture. Then it asks how much of
+//! this evidence the given cameras explain, and how much others would: in every
+//! convention of poses and axes, with other focal lengths, of scaled images, in
+//! another order. The explanation that is clearly best is the diagnosis.
+//!
+//! [`SceneError`]: neat_core::SceneError
+
+mod agreement;
+mod capture_checks;
+mod corner_consensus;
+mod corners;
+mod descriptor;
+mod evidence;
+mod examination;
+mod examine;
+mod gray_image;
+mod hypothesis;
+mod image_checks;
+mod likeness;
+mod load_failure;
+mod pose_diagnosis;
+mod tracks;
+
+pub use examination::{Cause, Check, Examination, Finding, Level, Repair, Verdict};
+pub use examine::{Depth, ExamineOptions, SceneSphere, examine, examine_folder};
+pub use load_failure::explain;

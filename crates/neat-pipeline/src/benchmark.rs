@@ -323,7 +323,7 @@ fn best_seconds(mut run: impl FnMut() -> Tensor<2>) -> f64 {
 }
 
 /// GFLOP/s of a large float32 matrix product.
-fn matrix_product_rate(side: usize, device: &Device) -> f64 {
+pub(crate) fn matrix_product_rate(side: usize, device: &Device) -> f64 {
     let device = device.clone().inner();
     let a = random_matrix(side, side, &device);
     let b = random_matrix(side, side, &device);

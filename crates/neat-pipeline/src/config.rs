@@ -3,6 +3,9 @@
 //! The tree is TOML on disk (`config.toml` of every run), starts from a preset,
 //! and takes `--set key.path=value` on top. Unknown keys are errors.
 
+use crate::background::Background;
+use neat_core::SphereChoice;
+use neat_detect::DetectorConfig;
 use neat_field::AttractionNetworkConfig;
 use neat_gjp::{CandidateConfig, MatchingConfig, PerceiverConfig};
 use neat_sdf::{DensityConfig, ImplicitNetworkConfig, RaySamplerConfig, RenderingNetworkConfig};
@@ -17,6 +20,9 @@ use serde::{Deserialize, Serialize};
 pub struct Config {
     /// How the scene is read.
     pub data: DataConfig,
+    /// How 2D wireframes are detected in scenes that come without.
+    #[serde(default)]
+    pub detect: DetectorConfig,
     /// The networks.
     pub model: ModelConfig,
     /// The optimisation.
@@ -37,8 +43,15 @@ pub struct DataConfig {
     /// Pixels nearer to a 2D segment than this belong to its attraction region
     /// (τ_d of the paper).
     pub attraction_distance: f64,
-    /// Radius of the modelled ball around the origin. `None` scales the world so
-    /// that the ball that all cameras see has radius 1.
+    /// What places the scene sphere: `auto`, `file`, `points`, `cameras`, `masks`,
+    /// or `x,y,z,radius` in the frame of the files.
+    #[serde(default)]
+    pub scene_sphere: SphereChoice,
+    /// What lies behind the object; `None` changes nothing.
+    #[serde(default)]
+    pub background: Option<Background>,
+    /// Radius of the modelled ball, in the unit of the poses. `None` takes that of
+    /// the scene sphere and scales the world so that it is 1.
     pub scene_radius: Option<f64>,
 }
 

@@ -14,6 +14,8 @@ pub enum Stage {
     Synthesise,
     /// Images, poses and 2D wireframes are read, and hashed for the manifest.
     Load,
+    /// 2D wireframes are detected, where the scene has none.
+    Detect,
     /// The fields are optimised.
     Train,
     /// The wireframe is taken out of the fields.
@@ -29,6 +31,7 @@ impl fmt::Display for Stage {
         f.pad(match self {
             Self::Synthesise => "synthesise",
             Self::Load => "load",
+            Self::Detect => "detect",
             Self::Train => "train",
             Self::Distill => "distill",
             Self::Export => "export",
@@ -63,6 +66,9 @@ pub enum Event<'a> {
         /// How long it took.
         seconds: f64,
     },
+    /// A fact about the scene that a person should check, such as where its sphere
+    /// is.
+    Note(String),
     /// Something that a person should know and that does not stop the run.
     Warning(String),
     /// A result that a person may want to open is on disk.

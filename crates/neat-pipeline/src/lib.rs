@@ -3,13 +3,16 @@
 //! Everything here reports through events and results; nothing draws.
 
 mod awake;
+pub mod background;
 pub mod benchmark;
 mod chunked_step;
 pub mod compare_backends;
 pub mod config;
 pub mod demo;
+pub mod detection;
 pub mod distill;
 pub mod error;
+pub mod estimate;
 pub mod event;
 pub mod field;
 pub mod flops;

@@ -1,7 +1,7 @@
 //! `manifest.json`: what ran, on which inputs, where, and how long it took.
 
 use crate::event::Stage;
-use neat_core::SceneError;
+use neat_core::{SceneError, SceneSphere};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -48,6 +48,10 @@ pub struct Manifest {
     pub seed: u64,
     /// The folder of the scene.
     pub scene: PathBuf,
+    /// The part of space that is modelled, in the frame and unit of the scene's
+    /// files.
+    #[serde(default)]
+    pub sphere: Option<SceneSphere>,
     /// SHA-256 of every input file, in hexadecimal, by its path in that folder.
     pub inputs: BTreeMap<String, String>,
     /// What was noticed on the way.

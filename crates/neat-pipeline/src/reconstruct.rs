@@ -12,6 +12,7 @@ use crate::error::PipelineError;
 use crate::event::{OnEvent, Stage};
 use crate::run_dir::{Existing, RunDir};
 use neat_core::Wireframe3d;
+use neat_core::file_cache::FileCache;
 use neat_tensor::Backend;
 use session::Session;
 use std::path::PathBuf;
@@ -38,6 +39,8 @@ pub struct RunOptions {
     /// Training ends after this long, if its steps are not done before; the
     /// schedules of the optimisation are shortened with it.
     pub time_budget: Option<Duration>,
+    /// Keeps what takes long, such as detected 2D wireframes, for the next run.
+    pub cache: Option<FileCache>,
     /// The arguments of the program, for the manifest.
     pub command_line: Vec<String>,
 }

@@ -32,6 +32,7 @@ const MANIFEST: &str = "manifest.json";
 const METRICS: &str = "metrics.jsonl";
 const CHECKPOINTS: &str = "checkpoints";
 const OVERLAYS: &str = "overlays";
+const DETECTIONS: &str = "detections";
 const RESULT_FILES: [&str; 4] = [
     "wireframe.json",
     "wireframe.obj",
@@ -164,7 +165,7 @@ impl RunDir {
         for name in files {
             ignore_missing(fs::remove_file(self.root.join(name)), &self.root.join(name))?;
         }
-        for name in [CHECKPOINTS, OVERLAYS] {
+        for name in [CHECKPOINTS, OVERLAYS, DETECTIONS] {
             let path = self.root.join(name);
             ignore_missing(fs::remove_dir_all(&path), &path)?;
         }
@@ -184,6 +185,11 @@ impl RunDir {
     /// The picture of the wireframe on the photograph of `view`.
     pub fn overlay(&self, view: &str) -> PathBuf {
         self.root.join(OVERLAYS).join(format!("{view}.png"))
+    }
+
+    /// The 2D wireframe that was detected in `view`.
+    pub fn detection(&self, view: &str) -> PathBuf {
+        self.root.join(DETECTIONS).join(format!("{view}.json"))
     }
 
     /// Writes `config.toml`.

@@ -1,34 +1,104 @@
 //! Reading a scene as a configuration wants it.
 
-use crate::config::DataConfig;
-use neat_core::{LoadOptions, LoadedScene, Scene, SceneError, load_scene};
+use crate::config::{Config, DataConfig};
+use crate::detection::detect_wireframes;
+use crate::error::PipelineError;
+use crate::event::{Event, OnEvent, Stage};
+use crate::reconstruct::timed;
+use neat_core::file_cache::FileCache;
+use neat_core::layout::HAWP_DIR;
+use neat_core::{LoadOptions, Scene, SceneSphere, load_scene};
+use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Reads the scene in the folder `dir`.
+/// A scene as a run needs it.
+#[derive(Clone, Debug)]
+pub struct PreparedScene {
+    /// The scene: every view has a 2D wireframe with segments.
+    pub scene: Scene,
+    /// Its sphere, in the frame and unit of the files.
+    pub sphere: SceneSphere,
+    /// Whether its 2D wireframes were detected, for want of files.
+    pub detected: bool,
+    /// What a person should know; told as events already.
+    pub warnings: Vec<String>,
+    /// Seconds of each stage.
+    pub seconds: BTreeMap<Stage, f64>,
+}
+
+/// Reads the scene in the folder `dir`, and detects its 2D wireframes if it has
+/// none. `cache` keeps what takes long for the next time.
 ///
-/// Without a configured radius the world is scaled so that the ball that all
-/// cameras see has radius 1: every length of a configuration (β, grid, encoding)
-/// then means the same in a scene of millimetres and in one of metres.
+/// Without a configured radius the world is scaled so that the scene sphere has
+/// radius 1: every length of a configuration (β, grid, encoding) then means the
+/// same in a scene of millimetres and in one of metres.
 ///
 /// # Errors
-/// If the scene cannot be read.
-pub fn read_scene(dir: &Path, config: &DataConfig) -> Result<LoadedScene, SceneError> {
+/// If the scene cannot be read, or no view has a segment.
+pub fn prepare_scene(
+    dir: &Path,
+    config: &Config,
+    cache: Option<&FileCache>,
+    on_event: OnEvent<'_>,
+) -> Result<PreparedScene, PipelineError> {
+    let detected = !dir.join(HAWP_DIR).is_dir();
     let options = LoadOptions {
+        require_wireframes: !detected,
+        ..load_options(&config.data)
+    };
+    let mut seconds = BTreeMap::new();
+    let (loaded, time) = timed(on_event, Stage::Load, |_| Ok(load_scene(dir, &options)?))?;
+    seconds.insert(Stage::Load, time);
+    on_event(Event::Note(format!("scene sphere: {}", loaded.sphere)));
+    let mut warnings: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+    let mut scene = loaded.scene;
+    if detected {
+        let (more, time) = timed(on_event, Stage::Detect, |on_event| {
+            let min_score = config.data.min_segment_score;
+            Ok(detect_wireframes(
+                &mut scene,
+                &config.detect,
+                min_score,
+                cache,
+                on_event,
+            )?)
+        })?;
+        seconds.insert(Stage::Detect, time);
+        warnings.extend(more);
+    }
+    for warning in &warnings {
+        on_event(Event::Warning(warning.clone()));
+    }
+    Ok(PreparedScene {
+        scene: scaled_for(&config.data, scene),
+        sphere: loaded.sphere,
+        detected,
+        warnings,
+        seconds,
+    })
+}
+
+/// How a configuration wants a scene to be read.
+pub fn load_options(config: &DataConfig) -> LoadOptions {
+    LoadOptions {
         pixel_center: config.pixel_center,
         min_segment_score: config.min_segment_score,
+        sphere: config.scene_sphere,
         ..LoadOptions::default()
-    };
-    let mut loaded = load_scene(dir, &options)?;
-    loaded.scene = scaled_for(config, loaded.scene);
-    Ok(loaded)
+    }
 }
 
 /// `scene` in the unit that the configuration wants.
 pub(crate) fn scaled_for(config: &DataConfig, scene: Scene) -> Scene {
-    let radius = scene.bounding_ball_radius();
-    match config.scene_radius.is_none() && radius.is_finite() && radius > 0.0 {
-        true => scene.scaled(1.0 / radius),
-        false => scene,
+    match config.scene_radius {
+        None => {
+            let radius = scene.sphere_radius;
+            scene.scaled(1.0 / radius)
+        }
+        Some(radius) => Scene {
+            sphere_radius: radius,
+            ..scene
+        },
     }
 }
 
@@ -56,15 +126,20 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         write_scene(&in_millimetres, dir.path()).unwrap();
 
-        let mut config = Preset::Fast.config().data;
-        let scaled = read_scene(dir.path(), &config).unwrap().scene;
-        assert!((scaled.bounding_ball_radius() - 1.0).abs() < 1e-12);
+        let mut config = Preset::Fast.config();
+        let read = |config: &Config| {
+            let prepared = prepare_scene(dir.path(), config, None, &mut |_| {});
+            prepared.unwrap().scene
+        };
+        let scaled = read(&config);
+        assert!((scaled.sphere_radius - 1.0).abs() < 1e-12);
         let camera = |scene: &neat_core::Scene| scene.views[1].camera.center_in_world;
         let back = scaled.original_from_world.apply(&camera(&scaled));
         assert!((back - camera(&in_millimetres)).norm() < 1e-9);
 
-        config.scene_radius = Some(1500.0);
-        let kept = read_scene(dir.path(), &config).unwrap().scene;
+        config.data.scene_radius = Some(1500.0);
+        let kept = read(&config);
         assert!((camera(&kept) - camera(&in_millimetres)).norm() < 1e-9);
+        assert_eq!(kept.sphere_radius, 1500.0);
     }
 }

@@ -186,7 +186,7 @@ impl Trainer {
         if data.region_pixels() == 0 {
             return Err(TrainError::NoRegionPixel(config.data.attraction_distance));
         }
-        let scene_radius = scene_radius(scene, config);
+        let scene_radius = config.data.scene_radius.unwrap_or(scene.sphere_radius);
         let device = device.clone().autodiff();
         let model = NeatModel::new(&config.model, scene_radius, seed, &device);
         let initial_radius = config.model.implicit.initial_sphere * scene_radius;
@@ -533,14 +533,6 @@ impl Trainer {
             self.device.clone().inner(),
         )
     }
-}
-
-/// Radius of the modelled ball: as configured, or what all cameras see.
-fn scene_radius(scene: &Scene, config: &Config) -> f64 {
-    config
-        .data
-        .scene_radius
-        .unwrap_or_else(|| scene.bounding_ball_radius())
 }
 
 pub(crate) fn metadata<T: std::str::FromStr>(

@@ -1,6 +1,7 @@
 //! `neat compare-backends`.
 
 use crate::arguments::{MethodArgs, backend_parser};
+use crate::cache::CacheArgs;
 use crate::error::CliError;
 use crate::output;
 use crate::progress::Progress;
@@ -10,7 +11,7 @@ use neat_pipeline::compare_backends::compare_backends;
 use neat_pipeline::event::Event;
 use neat_pipeline::reconstruct::software_warning;
 use neat_pipeline::run_dir::RunDir;
-use neat_pipeline::scene::read_scene;
+use neat_pipeline::scene::prepare_scene;
 use neat_tensor::Backend;
 use std::path::PathBuf;
 
@@ -45,6 +46,8 @@ pub struct CompareBackendsArgs {
     /// Seed of all randomness
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    cache: CacheArgs,
 }
 
 impl CompareBackendsArgs {
@@ -63,13 +66,13 @@ impl CompareBackendsArgs {
                 progress.show(Event::Warning(warning));
             }
         }
-        let loaded = read_scene(&self.scene, &config.data)?;
-        for warning in &loaded.warnings {
-            progress.show(Event::Warning(warning.to_string()));
-        }
+        let cache = self.cache.open();
+        let prepared = prepare_scene(&self.scene, &config, cache.as_ref(), &mut |event| {
+            progress.show(event);
+        })?;
         file::create_dir(&self.out)?;
         let comparison = compare_backends(
-            &loaded.scene,
+            &prepared.scene,
             &config,
             self.seed,
             self.method.steps.unwrap_or(DEFAULT_STEPS),

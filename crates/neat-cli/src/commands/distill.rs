@@ -2,6 +2,7 @@
 
 use super::reconstruct::summary;
 use crate::arguments::BackendArg;
+use crate::cache::CacheArgs;
 use crate::error::CliError;
 use crate::output;
 use crate::progress::Progress;
@@ -31,6 +32,8 @@ pub struct DistillArgs {
     set: Vec<String>,
     #[command(flatten)]
     backend: BackendArg,
+    #[command(flatten)]
+    cache: CacheArgs,
 }
 
 impl DistillArgs {
@@ -40,6 +43,7 @@ impl DistillArgs {
             &self.run,
             self.scene.as_deref(),
             self.backend.backend,
+            self.cache.open().as_ref(),
             |config| Ok::<_, CliError>(apply_overrides(&config, &self.set)?),
             &mut |event| progress.show(event),
         )?;

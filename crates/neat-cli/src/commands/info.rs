@@ -91,11 +91,8 @@ fn describe(loaded: &LoadedScene, min_score: f64) -> String {
             &|view| view.camera.center_in_world.norm(),
             3,
         ),
-        format!(
-            "{:<20}{:.3} around the origin",
-            "scene ball",
-            scene.bounding_ball_radius()
-        ),
+        format!("{:<20}{}", "scene sphere", loaded.sphere),
+        format!("{:<20}{}", "sparse points", scene.sparse_points.len()),
         format!("{:<20}{}", "first pixel centre", scene.pixel_center),
     ];
     if *original != neat_core::Similarity::identity() {
@@ -130,7 +127,7 @@ fn warnings(loaded: &LoadedScene, min_score: f64) -> Vec<String> {
             empty.join(", ")
         ));
     }
-    let radius = scene.bounding_ball_radius();
+    let radius = scene.sphere_radius;
     let inside = scene
         .views
         .iter()

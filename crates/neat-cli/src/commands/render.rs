@@ -1,6 +1,7 @@
 //! `neat render`.
 
 use crate::arguments::BackendArg;
+use crate::cache::CacheArgs;
 use crate::error::CliError;
 use crate::output;
 use crate::progress::Progress;
@@ -40,6 +41,8 @@ pub struct RenderArgs {
     scene: Option<PathBuf>,
     #[command(flatten)]
     backend: BackendArg,
+    #[command(flatten)]
+    cache: CacheArgs,
 }
 
 impl RenderArgs {
@@ -49,6 +52,7 @@ impl RenderArgs {
             &self.run,
             self.scene.as_deref(),
             self.backend.backend,
+            self.cache.open().as_ref(),
             Ok::<_, CliError>,
             &mut |event| progress.show(event),
         )?;

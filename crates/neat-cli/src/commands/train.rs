@@ -1,6 +1,7 @@
 //! `neat train`, and the arguments that it shares with `neat reconstruct`.
 
 use crate::arguments::{ComputeArgs, MethodArgs};
+use crate::cache::CacheArgs;
 use crate::error::CliError;
 use crate::progress::Progress;
 use crate::{interrupt, output};
@@ -46,6 +47,8 @@ pub struct RunArgs {
     seed: u64,
     #[command(flatten)]
     compute: ComputeArgs,
+    #[command(flatten)]
+    cache: CacheArgs,
 }
 
 impl RunArgs {
@@ -70,6 +73,7 @@ impl RunArgs {
             backend: self.compute.backend.backend,
             seed,
             time_budget: self.compute.time_budget,
+            cache: self.cache.open(),
             command_line: command_line(),
         })
     }

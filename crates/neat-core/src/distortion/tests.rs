@@ -2,7 +2,7 @@ use super::*;
 use proptest::prelude::*;
 
 /// Lenses as calibrations give them, one or two of each model.
-fn lenses() -> [Distortion; 6] {
+fn lenses() -> [Distortion; 7] {
     [
         Distortion::None,
         Distortion::Brown {
@@ -17,6 +17,11 @@ fn lenses() -> [Distortion; 6] {
             radial: [0.03, -0.01, 0.004, -0.001, 2e-4, -1e-5],
             tangential: [5e-4, -3e-4],
             thin_prism: [4e-4, -1e-4, -3e-4, 2e-4],
+        },
+        Distortion::ThinPrismFisheye {
+            radial: [0.03, -0.01, 0.004, -0.001],
+            tangential: [5e-4, -3e-4],
+            thin_prism: [4e-4, -3e-4],
         },
         Distortion::Fov { omega: 0.9 },
         Distortion::Division { k: -0.08 },
@@ -61,6 +66,20 @@ fn by_the_book(lens: &Distortion, x: f64, y: f64) -> (f64, f64) {
                     + 2.0 * p2 * u * v
                     + s3 * rho.powi(2)
                     + s4 * rho.powi(4),
+            )
+        }
+        Distortion::ThinPrismFisheye {
+            radial: [k1, k2, k3, k4],
+            tangential: [p1, p2],
+            thin_prism: [s1, s2],
+        } => {
+            let theta = r.atan2(1.0);
+            let (u, v) = (theta * phi.cos(), theta * phi.sin());
+            let q = theta * theta;
+            let factor = 1.0 + k1 * q + k2 * q.powi(2) + k3 * q.powi(3) + k4 * q.powi(4);
+            (
+                u * factor + 2.0 * p1 * u * v + p2 * (q + 2.0 * u * u) + s1 * q,
+                v * factor + p1 * (q + 2.0 * v * v) + 2.0 * p2 * u * v + s2 * q,
             )
         }
         Distortion::Fov { omega } => {

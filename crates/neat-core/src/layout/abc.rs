@@ -5,15 +5,15 @@
 //! - `cameras.npz`: `intrinsics` [N, 3, 3] or [N, 4, 4], `extrinsics` [N, 4, 4]
 //!   camera-to-world in OpenCV axes, in the order of the sorted image names.
 //!
-//! Two more arrays are written and, where they are, read: `scale_mat` [4, 4]
-//! leads from the world to the original frame, and `pixel_center` [] says which
-//! image coordinates the centre of the first pixel has. Other programs ignore
-//! them.
+//! Three more arrays are written and, where they are, read: `scale_mat` [4, 4]
+//! leads from the world to the original frame, `pixel_center` [] says which image
+//! coordinates the centre of the first pixel has, and `sphere_radius` [] how large
+//! the scene sphere around the origin is. Other programs ignore them.
 
 use super::images;
 use super::poses::{
     CAMERAS_NPZ, NPZ_REMEDY, PIXEL_CENTER, PosedImage, Poses, check_counts, intrinsics_of, matrix4,
-    pixel_center_array, read_pixel_center, similarity_of, view_error, wrong_shape,
+    number, read_pixel_center, scalar, similarity_of, view_error, wrong_shape,
 };
 use crate::npz::{NpyArray, NpzReader, write_npz};
 use crate::{Distortion, Scene, SceneError, Similarity, ViewError, file, hawp_json};
@@ -22,12 +22,18 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-pub(super) const INTRINSICS: &str = "intrinsics";
-pub(super) const EXTRINSICS: &str = "extrinsics";
+const INTRINSICS: &str = "intrinsics";
+const EXTRINSICS: &str = "extrinsics";
 const SCALE_MAT: &str = "scale_mat";
+const SPHERE_RADIUS: &str = "sphere_radius";
 const IMAGES_DIR: &str = "images";
 /// The folder of 2D wireframes, in every layout.
-pub(crate) const HAWP_DIR: &str = "hawp";
+pub const HAWP_DIR: &str = "hawp";
+
+/// Whether the arrays are those of this layout.
+pub(super) fn is_in(npz: &NpzReader) -> bool {
+    npz.contains(INTRINSICS) && npz.contains(EXTRINSICS)
+}
 
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let path = dir.join(CAMERAS_NPZ);
@@ -62,6 +68,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         original_from_world: read_scale_mat(&mut npz, &path)?,
         pixel_center: read_pixel_center(&mut npz, &path)?,
         points: Vec::new(),
+        declared_radius: read_sphere_radius(&mut npz, &path)?,
         path,
         views,
     })
@@ -84,6 +91,12 @@ fn read_scale_mat(npz: &mut NpzReader, path: &Path) -> Result<Similarity, SceneE
         return Ok(Similarity::identity());
     }
     similarity_of(path, &matrix4(path, SCALE_MAT, &npz.array(SCALE_MAT)?)?)
+}
+
+fn read_sphere_radius(npz: &mut NpzReader, path: &Path) -> Result<Option<f64>, SceneError> {
+    number(npz, path, SPHERE_RADIUS, "a number above 0", |x| {
+        x.is_finite() && x > 0.0
+    })
 }
 
 /// Writes a scene into the folder `dir`, which is created where needed. Reading
@@ -139,7 +152,8 @@ fn write_cameras(scene: &Scene, path: &Path) -> Result<(), SceneError> {
                 values: row_major(&scene.original_from_world.matrix()),
             },
         ),
-        (PIXEL_CENTER, pixel_center_array(scene.pixel_center)),
+        (PIXEL_CENTER, scalar(scene.pixel_center)),
+        (SPHERE_RADIUS, scalar(scene.sphere_radius)),
     ]);
     write_npz(path, &arrays)
 }

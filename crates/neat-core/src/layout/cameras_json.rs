@@ -2,8 +2,8 @@
 //!
 //! `cameras.json`: `{"frames": [{"file": "images/a.png", "width": w, "height": h,
 //! "K": 3×3, "c2w": 4×4}, …], "scale_mat": 4×4}`. Poses are camera-to-world in
-//! OpenCV axes; the optional `scale_mat` leads from the world to the original
-//! frame. Other keys are ignored.
+//! OpenCV axes; the optional `scale_mat` leads from the world, whose unit ball holds
+//! the object, to the original frame. Other keys are ignored.
 
 use super::images::with_existing_ending;
 use super::poses::{PosedImage, Poses, similarity_of, view_error};
@@ -43,6 +43,8 @@ fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
         format: "list of cameras",
         source,
     })?;
+    // Who normalised the world did so for the unit ball.
+    let declared_radius = json.scale_mat.is_some().then_some(1.0);
     let original_from_world = json.scale_mat.map_or(Ok(Similarity::identity()), |rows| {
         similarity_of(&path, &Matrix4::from(rows).transpose())
     })?;
@@ -69,12 +71,14 @@ fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
         original_from_world,
         pixel_center: None,
         points: Vec::new(),
+        declared_radius,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mutation::{CASES, damaged};
     use proptest::prelude::*;
 
     const ONE_FRAME: &str = r#"{"frames": [{"file": "images/a.png", "width": 4, "height": 3,
@@ -95,16 +99,14 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(CASES))]
         #[test]
         fn truncated_and_damaged_files_are_errors_not_panics(
-            end in 0..ONE_FRAME.len(), at in 0..ONE_FRAME.len(), byte: u8,
+            end in 0..ONE_FRAME.len(), bytes in damaged(ONE_FRAME),
         ) {
-            let bytes = ONE_FRAME.as_bytes();
-            prop_assert!(parse(&bytes[..end], Path::new("scene")).is_err());
-            let mut damaged = bytes.to_vec();
-            damaged[at] = byte;
-            if let Ok(poses) = parse(&damaged, Path::new("scene")) {
-                prop_assert!(poses.views.len() <= 1);
+            prop_assert!(parse(&ONE_FRAME.as_bytes()[..end], Path::new("scene")).is_err());
+            if let Ok(poses) = parse(&bytes, Path::new("scene")) {
+                prop_assert!(poses.views.iter().all(|view| view.intrinsics.validate().is_ok()));
             }
         }
     }

@@ -3,33 +3,44 @@
 //! - `images/NAME.png`; names may have subfolders
 //! - `hawp/NAME.json`, see [`crate::hawp_json`]
 //! - `sparse/0/`, else `sparse/`, else the folder itself: `cameras`, `images`
-//!   and, where they are, `points3D`, all `.bin` or all `.txt`.
+//!   and, where they are, `points3D`, all `.bin` or all `.txt`. Else, as
+//!   nerfstudio puts it, the model in `colmap/sparse/0/`, or, as COLMAP's
+//!   undistorter puts them, the model in `dense/sparse/` or `dense/0/sparse/`
+//!   with the images in `dense/images/` or `dense/0/images/`.
 //!
 //! Poses in these files are camera-from-world in OpenCV axes, and the centre of
-//! the first pixel has the image coordinates (0.5, 0.5). A reconstruction has its
-//! origin anywhere, but a scene has it in the object: the world is the frame of
-//! the files moved so that the median of the points is the origin. Without points
-//! it is the frame of the files.
+//! the first pixel has the image coordinates (0.5, 0.5). The world is the frame
+//! of the files. Other files of a model, such as `rigs` and `frames`, are ignored:
+//! `images` holds the pose of every image also in models with rigs.
 //!
-//! A scene has pinhole cameras only, so images must be undistorted.
+//! Points are read with their tracks. Elements of a track that name an image or a
+//! 2D point that is not there are left out: models of known poses, and models made
+//! smaller, are without 2D points.
 
 mod binary;
 mod camera_model;
 mod text;
 
 use super::images;
-use super::poses::{PosedImage, Poses, view_error};
+use super::poses::{PosedImage, Poses, malformed, pose_of, rotation_of, view_error};
+use super::reconstruction::Reconstruction;
 use crate::hawp_json::file_stem;
-use crate::scene::check_names;
-use crate::{CameraError, Distortion, Intrinsics, SceneError, Similarity, file};
+use crate::{CameraError, Distortion, Intrinsics, Observation, SceneError, SparsePoint, file};
 use camera_model::CameraModel;
-use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Matrix4, Vector2, Vector3};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-/// Where a model may lie in the folder of a scene, the likeliest first.
-const MODEL_DIRS: [&str; 3] = ["sparse/0", "sparse", ""];
-const IMAGES_DIR: &str = "images";
+/// Where a model and its images may lie in the folder of a scene, the likeliest
+/// first.
+const MODEL_AND_IMAGES_DIRS: [[&str; 2]; 6] = [
+    ["sparse/0", "images"],
+    ["sparse", "images"],
+    ["", "images"],
+    ["colmap/sparse/0", "images"],
+    ["dense/sparse", "dense/images"],
+    ["dense/0/sparse", "dense/0/images"],
+];
 /// COLMAP counts image coordinates from the corner of the image.
 const PIXEL_CENTER: f64 = 0.5;
 const REMEDY: &str = "provide the COLMAP model, cameras and images with the ending .bin or .txt";
@@ -45,9 +56,10 @@ struct ColmapCamera {
     parameters: Vec<f64>,
 }
 
-/// A record of `images`, without its 2D points.
+/// A record of `images`.
 #[derive(Clone, Debug, PartialEq)]
 struct ColmapImage {
+    id: u32,
     /// Path below the folder of images, as the file has it: not yet checked.
     name: String,
     camera: u32,
@@ -55,6 +67,16 @@ struct ColmapImage {
     quaternion: [f64; 4],
     /// Translation camera-from-world.
     translation: [f64; 3],
+    /// Pixels of its 2D points.
+    points: Vec<[f64; 2]>,
+}
+
+/// A record of `points3D`.
+#[derive(Clone, Debug, PartialEq)]
+struct ColmapPoint {
+    position: [f64; 3],
+    /// Numbers of images, each with the index of one of their 2D points.
+    track: Vec<[u32; 2]>,
 }
 
 /// The two forms in which COLMAP writes its files.
@@ -86,7 +108,7 @@ impl Format {
         }
     }
 
-    fn points(self, path: &Path, bytes: &[u8]) -> Result<Vec<[f64; 3]>, SceneError> {
+    fn points(self, path: &Path, bytes: &[u8]) -> Result<Vec<ColmapPoint>, SceneError> {
         match self {
             Self::Binary => binary::points(path, bytes),
             Self::Text => text::points(path, bytes),
@@ -97,16 +119,19 @@ impl Format {
 /// The files of a model.
 struct Model {
     dir: PathBuf,
+    images_dir: PathBuf,
     format: Format,
 }
 
 impl Model {
     /// The model of the scene in `dir`: where there are several, the first of
-    /// [`MODEL_DIRS`], and binary files before text, as COLMAP prefers them.
+    /// [`MODEL_AND_IMAGES_DIRS`], and binary files before text, as COLMAP prefers
+    /// them.
     fn find(dir: &Path) -> Option<Self> {
-        let models = MODEL_DIRS.iter().flat_map(|below| {
+        let models = MODEL_AND_IMAGES_DIRS.iter().flat_map(|[below, images]| {
             [Format::Binary, Format::Text].map(|format| Self {
                 dir: dir.join(below),
+                images_dir: dir.join(images),
                 format,
             })
         });
@@ -128,19 +153,33 @@ pub(super) fn is_in(dir: &Path) -> bool {
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let Some(model) = Model::find(dir) else {
         return Err(SceneError::Missing {
-            path: dir.join(MODEL_DIRS[0]),
+            path: dir.join(MODEL_AND_IMAGES_DIRS[0][0]),
             remedy: REMEDY.into(),
         });
     };
-    let (cameras_path, path) = (model.file("cameras"), model.file("images"));
-    let cameras = model
-        .format
-        .cameras(&cameras_path, &file::read(&cameras_path, REMEDY)?)?;
-    let cameras = by_id(cameras, &cameras_path)?;
-    let images = model.format.images(&path, &file::read(&path, REMEDY)?)?;
-    let origin = median(&read_points(&model)?);
+    let read = |name| file::read(&model.file(name), REMEDY);
+    let (cameras, images) = (read("cameras")?, read("images")?);
+    // Models of known poses have no file of points, or an empty one.
+    let points = match read("points3D") {
+        Err(SceneError::Missing { .. } | SceneError::Empty { .. }) => None,
+        points => Some(points?),
+    };
+    parse(&model, &cameras, &images, points.as_deref())
+}
 
-    let images_dir = dir.join(IMAGES_DIR);
+fn parse(
+    model: &Model,
+    cameras: &[u8],
+    images: &[u8],
+    points: Option<&[u8]>,
+) -> Result<Poses, SceneError> {
+    let (cameras_path, path) = (model.file("cameras"), model.file("images"));
+    let cameras = by_id(model.format.cameras(&cameras_path, cameras)?, &cameras_path)?;
+    let images = model.format.images(&path, images)?;
+    let points = points.map_or(Ok(Vec::new()), |bytes| {
+        let path = model.file("points3D");
+        sparse_points(&path, model.format.points(&path, bytes)?, &images)
+    })?;
     let mut views = Vec::with_capacity(images.len());
     for image in images {
         let relative = relative_path(&path, &image.name)?;
@@ -153,27 +192,24 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
             );
             return Err(malformed(&path, reason));
         };
-        views.push(PosedImage {
-            image: images::with_existing_ending(images_dir.join(relative)),
-            intrinsics: intrinsics_of(camera, &cameras_path, &name)?,
-            distortion: Distortion::None,
-            world_from_camera: world_from_camera(&image, &origin, &path, &name)?,
+        let (intrinsics, distortion) = lens_of(camera, &cameras_path, &name)?;
+        let posed = PosedImage {
+            image: images::with_existing_ending(model.images_dir.join(relative)),
+            intrinsics,
+            distortion,
+            world_from_camera: world_from_camera(&image, &path, &name)?,
             size: Some(size_of(camera, &cameras_path)?),
             name,
-        });
+        };
+        views.push((image.id as usize, posed));
     }
-    views.sort_by(|a, b| a.name.cmp(&b.name));
-    check_names(views.iter().map(|view| view.name.as_str()), &path)?;
-    Ok(Poses {
+    let reconstruction = Reconstruction {
         path,
         views,
-        original_from_world: Similarity {
-            scale: 1.0,
-            translation: origin,
-        },
-        pixel_center: Some(PIXEL_CENTER),
-        points: Vec::new(),
-    })
+        points,
+        pixel_center: PIXEL_CENTER,
+    };
+    reconstruction.into_poses()
 }
 
 fn by_id(
@@ -190,32 +226,33 @@ fn by_id(
     Ok(found)
 }
 
-/// The points of a model; none where it has no file of them, or an empty one, as
-/// models of known poses have.
-fn read_points(model: &Model) -> Result<Vec<[f64; 3]>, SceneError> {
-    let path = model.file("points3D");
-    let points = match file::read(&path, REMEDY) {
-        Ok(bytes) => model.format.points(&path, &bytes)?,
-        Err(SceneError::Missing { .. } | SceneError::Empty { .. }) => return Ok(Vec::new()),
-        Err(error) => return Err(error),
-    };
-    match points.iter().flatten().all(|x| x.is_finite()) {
-        true => Ok(points),
-        false => Err(malformed(&path, "a point is not finite".into())),
+/// The points with the pixels of their tracks, seen by views under the numbers of
+/// their images.
+fn sparse_points(
+    path: &Path,
+    points: Vec<ColmapPoint>,
+    images: &[ColmapImage],
+) -> Result<Vec<SparsePoint>, SceneError> {
+    let images: BTreeMap<u32, &ColmapImage> =
+        images.iter().map(|image| (image.id, image)).collect();
+    let mut found = Vec::with_capacity(points.len());
+    for point in points {
+        if point.position.iter().any(|x| !x.is_finite()) {
+            return Err(malformed(path, "a point is not finite".into()));
+        }
+        let pixel = |image: u32, index: u32| images.get(&image)?.points.get(index as usize);
+        let observations = point.track.iter().filter_map(|&[image, index]| {
+            pixel(image, index).map(|&pixel| Observation {
+                view: image as usize,
+                pixel: Vector2::from(pixel),
+            })
+        });
+        found.push(SparsePoint {
+            position_in_world: Vector3::from(point.position),
+            observations: observations.collect(),
+        });
     }
-}
-
-/// The median of each coordinate (of an even number of points the upper one),
-/// which stray points hardly move. The origin where there are no points.
-fn median(points: &[[f64; 3]]) -> Vector3<f64> {
-    if points.is_empty() {
-        return Vector3::zeros();
-    }
-    Vector3::from_fn(|axis, _| {
-        let mut values: Vec<f64> = points.iter().map(|point| point[axis]).collect();
-        let middle = values.len() / 2;
-        *values.select_nth_unstable_by(middle, f64::total_cmp).1
-    })
+    Ok(found)
 }
 
 /// A name from `images` as a path that stays below the folder of images.
@@ -233,19 +270,19 @@ fn relative_path<'a>(path: &Path, name: &'a str) -> Result<&'a Path, SceneError>
     })
 }
 
-fn intrinsics_of(camera: &ColmapCamera, path: &Path, view: &str) -> Result<Intrinsics, SceneError> {
+fn lens_of(
+    camera: &ColmapCamera,
+    path: &Path,
+    view: &str,
+) -> Result<(Intrinsics, Distortion), SceneError> {
     if camera.parameters.iter().any(|x| !x.is_finite()) {
         return Err(view_error(path, view, CameraError::NotFinite));
     }
-    let Some(intrinsics) = camera.model.pinhole(&camera.parameters) else {
-        return Err(SceneError::NotPinhole {
-            path: path.into(),
-            camera: camera.id,
-            model: camera.model.name.into(),
-        });
+    let Some((intrinsics, distortion)) = camera.model.lens(&camera.parameters) else {
+        return Err(unknown_model(path, camera.id, camera.model.name.into()));
     };
     match intrinsics.validate() {
-        Ok(()) => Ok(intrinsics),
+        Ok(()) => Ok((intrinsics, distortion)),
         Err(problem) => Err(view_error(path, view, problem)),
     }
 }
@@ -263,42 +300,23 @@ fn size_of(camera: &ColmapCamera, path: &Path) -> Result<(u32, u32), SceneError>
     }
 }
 
-/// The pose of `image` in the world whose origin is `origin` in the file's frame.
 fn world_from_camera(
     image: &ColmapImage,
-    origin: &Vector3<f64>,
     path: &Path,
     view: &str,
 ) -> Result<Matrix4<f64>, SceneError> {
-    let [w, x, y, z] = image.quaternion;
-    let quaternion = Quaternion::new(w, x, y, z);
     let translation = Vector3::from(image.translation);
-    let mut numbers = quaternion.coords.iter().chain(&translation);
-    if numbers.any(|x| !x.is_finite()) {
+    if translation.iter().any(|x| !x.is_finite()) {
         return Err(view_error(path, view, CameraError::NotFinite));
     }
-    // Not zero, and neither so small nor so large that it cannot be divided by.
-    if !quaternion.norm().is_normal() {
-        let reason =
-            format!("the quaternion ({w}, {x}, {y}, {z}) of view `{view}` is not a rotation");
-        return Err(malformed(path, reason));
-    }
+    let camera_from_world = rotation_of(image.quaternion, path, view)?;
     // camera = R · world + t, so the centre of the camera is −Rᵀ t.
-    let world_from_camera = UnitQuaternion::from_quaternion(quaternion).inverse();
-    let center = -(world_from_camera * translation) - origin;
-    Ok(world_from_camera
-        .to_homogeneous()
-        .append_translation(&center))
+    let center = -(camera_from_world.inverse() * translation);
+    let rotation = camera_from_world.to_rotation_matrix().into_inner();
+    Ok(pose_of(&rotation, &center))
 }
 
-fn malformed(path: &Path, reason: String) -> SceneError {
-    SceneError::Malformed {
-        path: path.into(),
-        reason,
-    }
-}
-
-/// A camera of a model that is not known.
+/// A camera of a model that is not read.
 fn unknown_model(path: &Path, camera: u32, model: String) -> SceneError {
     SceneError::NotPinhole {
         path: path.into(),
@@ -310,13 +328,44 @@ fn unknown_model(path: &Path, camera: u32, model: String) -> SceneError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mutation::{CASES, damaged};
+    use proptest::prelude::*;
+
+    const CAMERAS: &[u8] = b"7 PINHOLE 12 8 20 21 6.5 4\n2 OPENCV 12 8 20 21 6 4 0.1 0.2 0.3 0.4\n";
+    const IMAGES: &[u8] =
+        b"3 1 0 0 0 1 2 3 7 b.png\n1.5 2.5 -1 3.5 4.5 9\n1 1 0 1 0 1 2 4 2 a.png\n\n";
+    const POINTS: &[u8] = b"1 10 20 30 255 0 128 0.5 1 0 3 1 3 7\n9 9 21 31 1 2 3 0.5\n";
+
+    fn model(format: Format) -> Model {
+        Model {
+            dir: "scene/sparse/0".into(),
+            images_dir: "scene/images".into(),
+            format,
+        }
+    }
 
     #[test]
-    fn stray_points_do_not_move_the_origin() {
-        let mut points = vec![[1.0, 2.0, 3.0]; 5];
-        points.push([1e9, -1e9, 1e9]);
-        assert_eq!(median(&points), Vector3::new(1.0, 2.0, 3.0));
-        assert_eq!(median(&[]), Vector3::zeros());
+    fn lenses_and_observations_are_those_of_the_files() {
+        let poses = parse(&model(Format::Text), CAMERAS, IMAGES, Some(POINTS)).unwrap();
+        let [a, b] = poses.views.as_slice() else {
+            panic!("two views");
+        };
+        let lens = Distortion::Brown {
+            radial: [0.1, 0.2, 0.0, 0.0, 0.0, 0.0],
+            tangential: [0.3, 0.4],
+        };
+        assert_eq!((a.distortion, b.distortion), (lens, Distortion::None));
+        let [first, second] = poses.points.as_slice() else {
+            panic!("two points");
+        };
+        assert_eq!(first.position_in_world, Vector3::new(10.0, 20.0, 30.0));
+        // Neither image 1 nor the eighth point of image 3 has a pixel.
+        let seen = Observation {
+            view: 1,
+            pixel: Vector2::new(3.5, 4.5),
+        };
+        assert_eq!(first.observations, [seen]);
+        assert_eq!(second.observations, []);
     }
 
     #[test]
@@ -330,6 +379,25 @@ mod tests {
                 relative_path(path, bad),
                 Err(SceneError::ViewName { .. })
             ));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(CASES))]
+        #[test]
+        fn damaged_text_models_never_panic(
+            cameras in damaged(CAMERAS), images in damaged(IMAGES), points in damaged(POINTS),
+            kind in 0..4usize,
+        ) {
+            let [mut files, damaged] = [[CAMERAS, IMAGES, POINTS], [&cameras, &images, &points]];
+            // One file or all of them.
+            match kind {
+                3 => files = damaged,
+                kind => files[kind] = damaged[kind],
+            }
+            if let Ok(poses) = parse(&model(Format::Text), files[0], files[1], Some(files[2])) {
+                prop_assert!(poses.views.iter().all(|view| view.intrinsics.validate().is_ok()));
+            }
         }
     }
 }

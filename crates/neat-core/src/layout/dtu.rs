@@ -2,10 +2,12 @@
 //!
 //! - `image/NAME.png` (or `images/`)
 //! - `hawp/NAME.json`, see [`crate::hawp_json`]
-//! - `cameras.npz`: for the i-th image by sorted name, `world_mat_i` [4, 4], the
+//! - `cameras_sphere.npz`, else `cameras.npz`: for the i-th image by sorted name, `world_mat_i` [4, 4], the
 //!   projection of the original frame, and `scale_mat_i` [4, 4], which leads from
-//!   the normalised world to the original frame; where it is, `pixel_center` [],
-//!   as in [`super::abc`].
+//!   the normalised world to the original frame. Where both files are there, the
+//!   first is read, as NeuS does: its world is normalised to a sphere around the
+//!   object. `pixel_center` [] is read as in [`super::abc`]; other arrays, such as
+//!   `camera_mat_i`, are ignored.
 
 use super::images;
 use super::poses::{
@@ -16,8 +18,12 @@ use crate::hawp_json::file_stem;
 use crate::npz::NpzReader;
 use crate::{CameraError, Distortion, Intrinsics, SceneError};
 use nalgebra::{Matrix3, Matrix4};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
+/// `scale_mat` is made so that the unit ball holds the object.
+const DECLARED_RADIUS: f64 = 1.0;
+/// In the order in which they are looked for.
+const FILE_NAMES: [&str; 2] = ["cameras_sphere.npz", CAMERAS_NPZ];
 const IMAGES_DIRS: [&str; 2] = ["image", "images"];
 
 pub(crate) fn world_mat(index: usize) -> String {
@@ -28,8 +34,19 @@ pub(crate) fn scale_mat(index: usize) -> String {
     format!("scale_mat_{index}")
 }
 
+/// The files of this layout that the folder `dir` may hold.
+pub(super) fn candidates(dir: &Path) -> [PathBuf; 2] {
+    FILE_NAMES.map(|name| dir.join(name))
+}
+
+/// Whether the arrays are those of this layout.
+pub(super) fn is_in(npz: &NpzReader) -> bool {
+    npz.contains(&world_mat(0)) && npz.contains(&scale_mat(0))
+}
+
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
-    let path = dir.join(CAMERAS_NPZ);
+    let [sphere, plain] = candidates(dir);
+    let path = if sphere.is_file() { sphere } else { plain };
     let mut npz = NpzReader::open(&path, NPZ_REMEDY)?;
     let dirs = IMAGES_DIRS.map(|name| dir.join(name));
     let images_dir = dirs.iter().find(|dir| dir.is_dir()).unwrap_or(&dirs[0]);
@@ -78,6 +95,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         original_from_world,
         pixel_center,
         points: Vec::new(),
+        declared_radius: Some(DECLARED_RADIUS),
     })
 }
 

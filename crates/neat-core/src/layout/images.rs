@@ -1,13 +1,26 @@
 //! Images on disk.
 
 use crate::{SceneError, file, hawp_json::file_stem};
-use image::{DynamicImage, ImageReader, RgbImage};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 /// The endings of the images that are read.
 pub(super) const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// The first file by name in `dir` with this ending. Hidden files do not count,
+/// nor do the files of a folder that cannot be read.
+pub(super) fn first_with_ending(dir: &Path, ending: &str) -> Option<PathBuf> {
+    let files = fs::read_dir(dir).into_iter().flatten().flatten();
+    let matches = |path: &PathBuf| {
+        path.extension()
+            .is_some_and(|found| found.eq_ignore_ascii_case(ending))
+            && !file_stem(path).starts_with('.')
+            && path.is_file()
+    };
+    files.map(|entry| entry.path()).filter(matches).min()
+}
 
 /// The images in a folder, sorted by file name. Hidden files are no images.
 pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, SceneError> {
@@ -52,6 +65,12 @@ pub(super) fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
         })
 }
 
+/// Whether an image has transparency, from its first bytes.
+pub(super) fn has_alpha(path: &Path) -> Option<bool> {
+    let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
+    Some(reader.into_decoder().ok()?.color_type().has_alpha())
+}
+
 /// `image`, or where it does not exist the same with another ending that does:
 /// data sets are often passed on with their images converted.
 pub(super) fn with_existing_ending(image: PathBuf) -> PathBuf {
@@ -60,6 +79,42 @@ pub(super) fn with_existing_ending(image: PathBuf) -> PathBuf {
     }
     let mut others = ENDINGS.iter().map(|ending| image.with_extension(ending));
     others.find(|other| other.exists()).unwrap_or(image)
+}
+
+/// Folders above an image that are looked at, from the image upward.
+const MAX_FOLDERS: usize = 15;
+
+/// The image that the file of poses `path` calls `name`, in one of the folders
+/// `dirs`, of which the first is the one that the format means.
+///
+/// Such files come from other machines, with absolute paths, drive letters or
+/// `..`. No file outside the scene is opened: only what follows the last of these
+/// counts, and its leading folders are left out one by one until an image is
+/// found.
+pub(super) fn locate(path: &Path, dirs: &[PathBuf], name: &str) -> Result<PathBuf, SceneError> {
+    let mut parts: Vec<&str> = name.split(['/', '\\']).collect();
+    let leads_out = |part: &&str| *part == ".." || part.contains(':');
+    let start = parts.iter().rposition(leads_out).map_or(0, |at| at + 1);
+    parts.drain(..start);
+    parts.retain(|part| !part.is_empty() && *part != ".");
+    if parts.is_empty() {
+        return Err(SceneError::ViewName {
+            path: path.into(),
+            view: name.into(),
+            reason: "names no image: write the file again",
+        });
+    }
+    let shortened = (0..parts.len()).skip(parts.len().saturating_sub(MAX_FOLDERS + 1));
+    let candidates = shortened.flat_map(|from| {
+        let relative: PathBuf = parts[from..].iter().collect();
+        dirs.iter()
+            .map(move |dir| with_existing_ending(dir.join(&relative)))
+    });
+    let meant = dirs
+        .iter()
+        .map(|dir| dir.join(parts.iter().collect::<PathBuf>()));
+    let found = candidates.into_iter().find(|image| image.is_file());
+    Ok(found.or(meant.into_iter().next()).unwrap_or_default())
 }
 
 /// The bytes of an image's file.
@@ -74,20 +129,54 @@ pub(super) fn decode_rgb(
     path: &Path,
     background: [u8; 3],
 ) -> Result<RgbImage, SceneError> {
-    let error = |source| SceneError::Image {
+    let image_error = |source| SceneError::Image {
         path: path.into(),
         source,
     };
     // By its first bytes: endings of converted data sets are not to be trusted.
-    let image = ImageReader::new(Cursor::new(bytes))
+    let reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
-        .map_err(|source| error(source.into()))?
-        .decode()
-        .map_err(error)?;
+        .map_err(|source| image_error(source.into()))?;
+    // The decoder makes up what is missing.
+    if reader.format() == Some(ImageFormat::Jpeg) && !jpeg_is_complete(bytes) {
+        let error = io::Error::new(io::ErrorKind::UnexpectedEof, "the file is truncated");
+        return Err(image_error(ImageError::IoError(error)));
+    }
+    let image = reader.decode().map_err(image_error)?;
     if image.color().has_alpha() {
         return Ok(blend(&image, background));
     }
     Ok(image.into_rgb8())
+}
+
+/// Whether a JPEG file goes on to its end marker (ITU-T T.81, annex B). What
+/// follows is nobody's business.
+fn jpeg_is_complete(bytes: &[u8]) -> bool {
+    const END: u8 = 0xd9;
+    const START_OF_SCAN: u8 = 0xda;
+    let mut at = 0;
+    let mut in_scan = false;
+    while let Some(&[first, marker]) = bytes.get(at..at + 2).and_then(|b| b.first_chunk()) {
+        match (first, marker) {
+            (0xff, END) => return true,
+            // Zeros are stuffed, and markers of restarts put, into scans only;
+            // 0xd8 starts the image, and any number of 0xff fills.
+            (0xff, 0x00 | 0xd0..=0xd8) => at += 2,
+            (0xff, 0xff) => at += 1,
+            (0xff, marker) => {
+                let Some(&length) = bytes.get(at + 2..).and_then(|b| b.first_chunk()) else {
+                    return false;
+                };
+                in_scan = marker == START_OF_SCAN;
+                at += 2 + usize::from(u16::from_be_bytes(length)).max(2);
+            }
+            // Decoders differ in what they take between segments; none may be
+            // refused that they take.
+            _ if !in_scan => return true,
+            _ => at += 1,
+        }
+    }
+    false
 }
 
 fn blend(image: &DynamicImage, background: [u8; 3]) -> RgbImage {
@@ -124,6 +213,56 @@ mod tests {
         let bytes = read_bytes(&path).unwrap();
         let rgb = decode_rgb(&bytes, &path, [10, 20, 30]).unwrap();
         assert_eq!(rgb.into_raw(), [200, 100, 50, 10, 20, 30, 59, 67, 75]);
+    }
+
+    #[test]
+    fn images_are_located_below_the_scene_only() {
+        let dir = tempfile::tempdir().unwrap();
+        let scene = dir.path().join("scene");
+        fs::create_dir_all(scene.join("images/left")).unwrap();
+        for file in [
+            "a.png",
+            "scene/b.png",
+            "scene/images/c.png",
+            "scene/images/left/d.jpg",
+        ] {
+            fs::write(dir.path().join(file), b"x").unwrap();
+        }
+        let dirs = [scene.clone(), scene.join("images")];
+        let found = |name| locate(Path::new("model"), &dirs, name).unwrap();
+        for (name, expected) in [
+            ("b.png", "b.png"),
+            ("c.png", "images/c.png"),
+            ("/home/someone/photos/images/c.png", "images/c.png"),
+            (r"C:\photos\left\d.png", "images/left/d.jpg"),
+            ("../elsewhere/b.png", "b.png"),
+            // Not there: where the format means it, never above the scene.
+            ("../a.png", "a.png"),
+            ("./left/../none.png", "none.png"),
+        ] {
+            assert_eq!(found(name), scene.join(expected), "{name}");
+        }
+        for name in ["", "/", "..", "C:"] {
+            assert!(locate(Path::new("model"), &dirs, name).is_err(), "{name}");
+        }
+    }
+
+    #[test]
+    fn truncated_jpegs_are_errors_and_trailing_bytes_are_not() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.jpg");
+        let noise = |x: u32, y: u32| (x * 7919 + y * 104_729).wrapping_mul(2_654_435_761) >> 24;
+        let image = RgbImage::from_fn(64, 48, |x, y| image::Rgb([noise(x, y) as u8; 3]));
+        image.save(&path).unwrap();
+        let mut bytes = fs::read(&path).unwrap();
+        for share in [4, 2] {
+            let part = &bytes[..bytes.len() - bytes.len() / share];
+            let error = decode_rgb(part, &path, [0; 3]).unwrap_err();
+            assert!(matches!(error, SceneError::Image { .. }), "{error}");
+        }
+        bytes.extend_from_slice(b"more \xff\xda than an image");
+        let image = decode_rgb(&bytes, &path, [0; 3]).unwrap();
+        assert_eq!(image.dimensions(), (64, 48));
     }
 
     #[test]

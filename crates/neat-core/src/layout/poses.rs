@@ -2,7 +2,7 @@
 
 use crate::npz::{NpyArray, NpzReader};
 use crate::{CameraError, Distortion, Intrinsics, SceneError, Similarity, SparsePoint, ViewError};
-use nalgebra::{Matrix3, Matrix4};
+use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 
 /// The poses of a whole scene.
@@ -18,6 +18,9 @@ pub(super) struct Poses {
     /// Sparse points of the reconstruction, in the world of the poses, observed
     /// in the photographs as they are on disk; empty where there are none.
     pub points: Vec<SparsePoint>,
+    /// Radius of the ball around the origin that holds the object, where the
+    /// layout's world is made so.
+    pub declared_radius: Option<f64>,
 }
 
 /// An image on disk with its camera.
@@ -46,11 +49,11 @@ pub(super) const NPZ_REMEDY: &str = "provide the poses of the images";
 /// first pixel has. It is ours: other programs ignore it.
 pub(crate) const PIXEL_CENTER: &str = "pixel_center";
 
-/// The array [`PIXEL_CENTER`].
-pub(crate) fn pixel_center_array(pixel_center: f64) -> NpyArray {
+/// An array of shape [].
+pub(crate) fn scalar(value: f64) -> NpyArray {
     NpyArray {
         shape: vec![],
-        values: vec![pixel_center],
+        values: vec![value],
     }
 }
 
@@ -59,14 +62,27 @@ pub(super) fn read_pixel_center(
     npz: &mut NpzReader,
     path: &Path,
 ) -> Result<Option<f64>, SceneError> {
-    if !npz.contains(PIXEL_CENTER) {
+    number(npz, path, PIXEL_CENTER, "0 or 0.5", |x| {
+        [0.0, 0.5].contains(&x)
+    })
+}
+
+/// The array `name` of one number, where there is one, which must be `expected`.
+pub(super) fn number(
+    npz: &mut NpzReader,
+    path: &Path,
+    name: &str,
+    expected: &str,
+    is_good: impl Fn(f64) -> bool,
+) -> Result<Option<f64>, SceneError> {
+    if !npz.contains(name) {
         return Ok(None);
     }
-    match npz.array(PIXEL_CENTER)?.values.as_slice() {
-        [value] if [0.0, 0.5].contains(value) => Ok(Some(*value)),
+    match npz.array(name)?.values.as_slice() {
+        [value] if is_good(*value) => Ok(Some(*value)),
         other => Err(SceneError::Malformed {
             path: path.into(),
-            reason: format!("`{PIXEL_CENTER}` is {other:?}, not 0 or 0.5"),
+            reason: format!("`{name}` holds {other:?}, not {expected}"),
         }),
     }
 }
@@ -96,6 +112,40 @@ pub(super) fn view_error(path: &Path, view: &str, problem: impl Into<ViewError>)
         view: view.into(),
         problem: problem.into(),
     }
+}
+
+/// A file that breaks the rules of its format.
+pub(super) fn malformed(path: &Path, reason: String) -> SceneError {
+    SceneError::Malformed {
+        path: path.into(),
+        reason,
+    }
+}
+
+/// The rotation of a quaternion w, x, y, z of any length, as file and view have it.
+pub(super) fn rotation_of(
+    quaternion: [f64; 4],
+    path: &Path,
+    view: &str,
+) -> Result<UnitQuaternion<f64>, SceneError> {
+    let [w, x, y, z] = quaternion;
+    if quaternion.iter().any(|x| !x.is_finite()) {
+        return Err(view_error(path, view, CameraError::NotFinite));
+    }
+    let quaternion = Quaternion::new(w, x, y, z);
+    // Not zero, and neither so small nor so large that it cannot be divided by.
+    if !quaternion.norm().is_normal() {
+        let reason =
+            format!("the quaternion ({w}, {x}, {y}, {z}) of view `{view}` is not a rotation");
+        return Err(malformed(path, reason));
+    }
+    Ok(UnitQuaternion::from_quaternion(quaternion))
+}
+
+/// The 4×4 camera-to-world pose of a rotation camera-from-world and a centre.
+pub(super) fn pose_of(camera_from_world: &Matrix3<f64>, center: &Vector3<f64>) -> Matrix4<f64> {
+    let rotation = camera_from_world.transpose().to_homogeneous();
+    rotation.append_translation(center)
 }
 
 /// The upper left 3×3 of a matrix.

@@ -8,12 +8,20 @@
 //! `applied_scale` have been applied to the poses already. `pixel_center`, which
 //! [`crate::convert`] writes, says which image coordinates the centre of the first
 //! pixel has. Other keys are ignored.
+//!
+//! Lenses are perspective (`k1 k2 k3 p1 p2`, [`Distortion::Brown`]) unless
+//! `camera_model` is `OPENCV_FISHEYE` or `is_fisheye` is set (`k1 … k4`,
+//! [`Distortion::Fisheye`]). `distortion_params` lists `k1 k2 k3 k4 p1 p2`. Points
+//! are those of nerfstudio's `ply_file_path`, where that file is there; they have
+//! no observations.
 
-use super::images::{ENDINGS, has_known_ending, read_size, with_existing_ending};
+use super::images::{self, ENDINGS, has_known_ending, read_size, with_existing_ending};
 use super::poses::{PosedImage, Poses, upper_left, view_error};
+use super::reconstruction::{check_finite, simplest};
 use crate::hawp_json::file_stem;
+use crate::point_cloud::read_ply;
 use crate::scene::check_names;
-use crate::{Distortion, Intrinsics, SceneError, Similarity, file};
+use crate::{Distortion, Intrinsics, SceneError, Similarity, SparsePoint, file};
 use nalgebra::Matrix4;
 use serde::Deserialize;
 use std::f64::consts::PI;
@@ -22,8 +30,7 @@ use std::path::{Component, Path, PathBuf};
 /// In the order in which they are looked for. The second is Blender's.
 const FILE_NAMES: [&str; 2] = ["transforms.json", "transforms_train.json"];
 
-/// Camera models without distortion once their coefficients are zero. Others,
-/// such as fisheye or panorama, are no pinhole cameras with any coefficients.
+/// Camera models that differ in which of `k1 k2 k3 p1 p2` they have.
 const PERSPECTIVE_MODELS: [&str; 7] = [
     "PINHOLE",
     "SIMPLE_PINHOLE",
@@ -33,6 +40,8 @@ const PERSPECTIVE_MODELS: [&str; 7] = [
     "RADIAL",
     "SIMPLE_RADIAL",
 ];
+
+const FISHEYE_MODEL: &str = "OPENCV_FISHEYE";
 
 /// The middle of an image at W/2: its corner is the origin.
 const PIXEL_CENTER_OF_MIDDLE: f64 = 0.5;
@@ -44,6 +53,7 @@ struct TransformsJson {
     /// Ours, as in `cameras.npz`: other programs ignore it.
     pixel_center: Option<f64>,
     frames: Vec<Frame>,
+    ply_file_path: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -124,12 +134,34 @@ fn parse(bytes: &[u8], path: PathBuf, dir: &Path) -> Result<Poses, SceneError> {
     views.sort_by(|a, b| a.name.cmp(&b.name));
     check_names(views.iter().map(|view| view.name.as_str()), &path)?;
     Ok(Poses {
+        points: sparse_points(&path, dir, json.ply_file_path.as_deref())?,
         path,
         views,
         original_from_world: Similarity::identity(),
         pixel_center,
-        points: Vec::new(),
+        declared_radius: None,
     })
+}
+
+/// The points that a file names, if they are there: they are often not passed on.
+fn sparse_points(
+    path: &Path,
+    dir: &Path,
+    ply_file_path: Option<&str>,
+) -> Result<Vec<SparsePoint>, SceneError> {
+    let Some(name) = ply_file_path.filter(|name| !name.is_empty()) else {
+        return Ok(Vec::new());
+    };
+    let points_path = images::locate(path, &[dir.into()], name)?;
+    if !points_path.is_file() {
+        return Ok(Vec::new());
+    }
+    let positions = read_ply(&points_path)?.into_iter();
+    let points = positions.map(|position_in_world| SparsePoint {
+        position_in_world,
+        observations: Vec::new(),
+    });
+    Ok(points.collect())
 }
 
 /// A frame with what its file says about all frames.
@@ -141,7 +173,7 @@ struct FrameContext<'a> {
 
 impl FrameContext<'_> {
     fn posed_image(&self, dir: &Path) -> Result<PosedImage, SceneError> {
-        self.check_perspective()?;
+        let distortion = self.distortion()?;
         let world_from_camera = self.world_from_camera()?;
         let relative = self.relative_path()?;
         let name = view_name(&relative);
@@ -150,12 +182,13 @@ impl FrameContext<'_> {
         let intrinsics = self.intrinsics(size, &image)?;
         intrinsics
             .validate()
+            .and_then(|()| check_finite(&distortion))
             .map_err(|problem| view_error(self.path, &name, problem))?;
         Ok(PosedImage {
             name,
             image,
             intrinsics,
-            distortion: Distortion::None,
+            distortion: simplest(distortion),
             world_from_camera,
             size,
         })
@@ -173,40 +206,64 @@ impl FrameContext<'_> {
         }
     }
 
-    /// Errs at lenses that do not map straight lines to straight lines.
-    fn check_perspective(&self) -> Result<(), SceneError> {
-        const REMEDY: &str = "undistort the images to pinhole cameras first";
+    /// The lens, by the model and the coefficients.
+    fn distortion(&self) -> Result<Distortion, SceneError> {
         let model = self.first(|lens| lens.camera_model.clone());
-        if let Some(model) = model
-            && !PERSPECTIVE_MODELS.contains(&model.to_uppercase().as_str())
-        {
-            return Err(self.error(format_args!(
-                "has the camera model `{model}`, which is not read: {REMEDY}"
-            )));
-        }
-        if self.first(|lens| lens.is_fisheye) == Some(true) {
-            return Err(self.error(format_args!("has a fisheye lens: {REMEDY}")));
-        }
-        let mut coefficients = vec![
-            ("k1", self.first(|lens| lens.k1)),
-            ("k2", self.first(|lens| lens.k2)),
-            ("k3", self.first(|lens| lens.k3)),
-            ("k4", self.first(|lens| lens.k4)),
-            ("p1", self.first(|lens| lens.p1)),
-            ("p2", self.first(|lens| lens.p2)),
-        ];
-        let listed = self.first(|lens| lens.distortion_params.clone());
-        let listed = listed.unwrap_or_default().into_iter();
-        coefficients.extend(listed.map(|value| ("distortion_params", Some(value))));
-        for (name, value) in coefficients {
-            let value = value.unwrap_or(0.0);
-            if value != 0.0 {
+        let model = model.map(|model| model.to_uppercase());
+        let is_fisheye = match model.as_deref() {
+            Some(FISHEYE_MODEL) => true,
+            Some(model) if !PERSPECTIVE_MODELS.contains(&model) => {
                 return Err(self.error(format_args!(
-                    "has lens distortion ({name} = {value}): {REMEDY}"
+                    "has the camera model `{model}`, which is not read: \
+                     undistort the images to pinhole cameras first"
                 )));
             }
+            _ => self.first(|lens| lens.is_fisheye) == Some(true),
+        };
+        let [k1, k2, k3, k4, p1, p2] = self.coefficients()?;
+        let (unread, meaning) = match is_fisheye {
+            true => ([p1, p2], "tangential terms of a fisheye lens"),
+            false => ([k4, 0.0], "a fourth radial term of a perspective lens"),
+        };
+        if unread != [0.0; 2] {
+            return Err(self.error(format_args!(
+                "has {meaning} ({unread:?}), which are not read: \
+                 undistort the images to pinhole cameras first"
+            )));
         }
-        Ok(())
+        Ok(match is_fisheye {
+            true => Distortion::Fisheye {
+                radial: [k1, k2, k3, k4, 0.0, 0.0],
+                tangential: [0.0; 2],
+                thin_prism: [0.0; 4],
+            },
+            false => Distortion::Brown {
+                radial: [k1, k2, k3, 0.0, 0.0, 0.0],
+                tangential: [p1, p2],
+            },
+        })
+    }
+
+    /// k1 k2 k3 k4 p1 p2. What a frame says itself stands before what the file says
+    /// for all.
+    fn coefficients(&self) -> Result<[f64; 6], SceneError> {
+        let Some(listed) = self.first(|lens| lens.distortion_params.clone()) else {
+            let numbers: [fn(&Lens) -> Option<f64>; 6] = [
+                |lens| lens.k1,
+                |lens| lens.k2,
+                |lens| lens.k3,
+                |lens| lens.k4,
+                |lens| lens.p1,
+                |lens| lens.p2,
+            ];
+            return Ok(numbers.map(|number| self.first(number).unwrap_or(0.0)));
+        };
+        listed.as_slice().try_into().map_err(|_| {
+            self.error(format_args!(
+                "has {} `distortion_params`, expected k1 k2 k3 k4 p1 p2",
+                listed.len()
+            ))
+        })
     }
 
     /// The pose in OpenCV axes: y and z of the camera change their signs. What
@@ -388,7 +445,9 @@ fn existing_image(image: PathBuf) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mutation::{CASES, damaged};
     use proptest::prelude::*;
+    use serde_json::json;
 
     const ONE_FRAME: &str = r#"{"fl_x": 5, "fl_y": 6.0, "cx": 2, "cy": 1.5, "w": 4.0, "h": 3,
         "k1": 0, "camera_model": "OPENCV", "aabb_scale": 16, "frames": [{"file_path": "./images/a.png",
@@ -419,18 +478,106 @@ mod tests {
         assert_eq!(names, ["r_0", "r_0", "r_0.5", "d"]);
     }
 
+    /// The lens of the frame with these members added.
+    fn lens(members: serde_json::Value) -> Result<Distortion, String> {
+        let mut json: serde_json::Value = serde_json::from_str(ONE_FRAME).unwrap();
+        for (key, value) in members.as_object().unwrap() {
+            json[key] = value.clone();
+        }
+        let poses = parse_text(json.to_string().as_bytes());
+        poses
+            .map(|poses| poses.views[0].distortion)
+            .map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn lenses_have_the_coefficients_of_nerfstudio() {
+        let brown = Distortion::Brown {
+            radial: [0.1, 0.2, 0.3, 0.0, 0.0, 0.0],
+            tangential: [0.5, 0.6],
+        };
+        let named = json!({"k1": 0.1, "k2": 0.2, "k3": 0.3, "p1": 0.5, "p2": 0.6});
+        assert_eq!(lens(named), Ok(brown));
+        let listed = json!({"distortion_params": [0.1, 0.2, 0.3, 0, 0.5, 0.6], "k1": 9});
+        assert_eq!(lens(listed), Ok(brown));
+        assert_eq!(lens(json!({"k4": 0})), Ok(Distortion::None));
+
+        let fisheye = Distortion::Fisheye {
+            radial: [0.1, 0.2, 0.3, 0.4, 0.0, 0.0],
+            tangential: [0.0; 2],
+            thin_prism: [0.0; 4],
+        };
+        let coefficients = json!({"k1": 0.1, "k2": 0.2, "k3": 0.3, "k4": 0.4});
+        for (key, value) in [
+            ("camera_model", json!("opencv_fisheye")),
+            ("is_fisheye", json!(true)),
+        ] {
+            let mut members = coefficients.clone();
+            members[key] = value;
+            assert_eq!(lens(members.clone()), Ok(fisheye));
+            members["p2"] = json!(1e-6);
+            assert!(lens(members).unwrap_err().contains("tangential terms"));
+        }
+        // Frames win.
+        let mut json: serde_json::Value = serde_json::from_str(ONE_FRAME).unwrap();
+        json["frames"][0]["k1"] = 0.1.into();
+        json["k1"] = 0.2.into();
+        let poses = parse_text(json.to_string().as_bytes()).unwrap();
+        assert!(
+            matches!(poses.views[0].distortion, Distortion::Brown { radial, .. } if radial[0] == 0.1)
+        );
+    }
+
+    #[test]
+    fn lenses_that_are_not_read_are_named() {
+        for (members, expected) in [
+            (
+                json!({"camera_model": "EQUIRECTANGULAR"}),
+                "`EQUIRECTANGULAR`, which is not read",
+            ),
+            (json!({"k4": 0.1}), "fourth radial term"),
+            (
+                json!({"distortion_params": [0, 0.25]}),
+                "2 `distortion_params`",
+            ),
+            (json!({"is_fisheye": true, "p1": 0.1}), "tangential terms"),
+        ] {
+            let message = lens(members).unwrap_err();
+            assert!(message.contains("frame `./images/a.png`"), "{message}");
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn points_are_those_of_the_named_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("transforms.json");
+        let text = ONE_FRAME.replacen('{', r#"{"ply_file_path": "sparse_pc.ply","#, 1);
+        let points = || {
+            parse(text.as_bytes(), path.clone(), dir.path())
+                .unwrap()
+                .points
+        };
+        assert_eq!(points(), []);
+        let ply = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n\
+            property float y\nproperty float z\nend_header\n1 2 3\n";
+        std::fs::write(dir.path().join("sparse_pc.ply"), ply).unwrap();
+        let expected = SparsePoint {
+            position_in_world: nalgebra::Vector3::new(1.0, 2.0, 3.0),
+            observations: Vec::new(),
+        };
+        assert_eq!(points(), [expected]);
+    }
+
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(CASES))]
         #[test]
         fn truncated_and_damaged_files_are_errors_not_panics(
-            end in 0..ONE_FRAME.len(), at in 0..ONE_FRAME.len(), byte: u8,
+            end in 0..ONE_FRAME.len(), bytes in damaged(ONE_FRAME),
         ) {
-            let bytes = ONE_FRAME.as_bytes();
-            prop_assert!(parse_text(&bytes[..end]).is_err());
-            let mut damaged = bytes.to_vec();
-            damaged[at] = byte;
-            if let Ok(poses) = parse_text(&damaged) {
-                prop_assert_eq!(poses.views.len(), 1);
-                prop_assert!(poses.views[0].intrinsics.validate().is_ok());
+            prop_assert!(parse_text(&ONE_FRAME.as_bytes()[..end]).is_err());
+            if let Ok(poses) = parse_text(&bytes) {
+                prop_assert!(poses.views.iter().all(|view| view.intrinsics.validate().is_ok()));
             }
         }
 

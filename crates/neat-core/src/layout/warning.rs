@@ -34,6 +34,9 @@ pub enum SceneWarning {
         /// What the system said first.
         reason: String,
     },
+    /// Nothing tells where the scene is: its sphere lies around the origin of the
+    /// poses.
+    SphereUnknown,
     /// A view was dropped because nothing was detected in it.
     ViewWithoutSegments {
         /// Name of the view.
@@ -66,6 +69,9 @@ impl fmt::Display for SceneWarning {
                 f,
                 "undistorted images cannot be kept in {}: {reason}; the next run makes them again",
                 dir.display()
+            ),
+            Self::SphereUnknown => f.write_str(
+                "neither sparse points nor the cameras tell where the scene is: its sphere is put around the origin of the poses; give --scene-sphere x,y,z,radius if that is not the object",
             ),
             Self::ViewWithoutSegments {
                 view,

@@ -4,6 +4,7 @@ use super::detection::detect;
 use super::viewpoints::{min_distance, viewpoints};
 use super::visible_edges::{VisiblePart, visible_parts};
 use super::{Frustum, Solid, render};
+use crate::scene_sphere::visible_radius;
 use crate::{Scene, Similarity, View, Wireframe3d};
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -150,7 +151,7 @@ pub struct ViewTruth {
 pub fn generate(config: &SyntheticScene) -> Result<SyntheticData, SyntheticError> {
     config.validate()?;
     let solid = config.solid.frustum();
-    let (views, view_truths) = viewpoints(
+    let (views, view_truths): (Vec<View>, Vec<ViewTruth>) = viewpoints(
         config.views,
         config.camera_distance,
         config.image_size,
@@ -173,12 +174,14 @@ pub fn generate(config: &SyntheticScene) -> Result<SyntheticData, SyntheticError
         (view, ViewTruth { visible, sources })
     })
     .unzip();
+    let sphere_radius = visible_radius(views.iter().map(|view| &view.camera));
     Ok(SyntheticData {
         scene: Scene {
             name: config.solid.name().to_owned(),
             views,
             original_from_world: Similarity::identity(),
             pixel_center: 0.5,
+            sphere_radius,
             sparse_points: Vec::new(),
         },
         truth: solid.wireframe().clone(),

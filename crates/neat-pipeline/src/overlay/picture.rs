@@ -144,6 +144,7 @@ mod tests {
             views: Vec::new(),
             original_from_world: neat_core::Similarity::identity(),
             pixel_center: 0.5,
+            sphere_radius: 1.0,
             sparse_points: Vec::new(),
         };
         let picture = draw_wireframe(&Wireframe3d::default(), &scene);

@@ -1,15 +1,17 @@
 //! A run in progress: its folder, its scene, and its manifest kept up to date.
 
 use super::RunOptions;
+use crate::background::fit_background;
 use crate::config::Config;
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage};
 use crate::field::TrainedField;
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
 use crate::run_dir::{Existing, RunDir};
-use crate::scene::read_scene;
+use crate::scene::prepare_scene;
 use burn::tensor::Device;
-use neat_core::{LoadedScene, Scene, SceneError};
+use neat_core::file_cache::FileCache;
+use neat_core::{Scene, SceneError, hawp_json};
 use neat_tensor::Backend;
 use neat_tensor::backend::software_driver;
 use std::collections::BTreeMap;
@@ -44,19 +46,20 @@ impl<'a> Session<'a> {
         for warning in &warnings {
             on_event(Event::Warning(warning.clone()));
         }
-        let ((loaded, inputs), seconds) = timed(on_event, Stage::Load, |on_event| {
-            let loaded = load(&scene_dir, &options.config, on_event)?;
-            Ok((loaded, hash_inputs(&scene_dir)?))
-        })?;
-        warnings.extend(loaded.warnings.iter().map(ToString::to_string));
+        let cache = options.cache.as_ref();
+        let prepared = prepare_scene(&scene_dir, &options.config, cache, on_event)?;
+        let inputs = hash_inputs(&scene_dir)?;
+        warnings.extend(prepared.warnings);
         if earlier.as_ref().is_some_and(|e| e.inputs != inputs) {
             let warning = "the files of the scene have changed since the run began".to_owned();
             on_event(Event::Warning(warning.clone()));
             warnings.push(warning);
         }
 
+        let mut config = options.config.clone();
+        fit_background(&mut config, &prepared.scene);
         let dir = RunDir::create(&options.out, options.existing)?;
-        dir.write_config(&options.config)?;
+        dir.write_config(&config)?;
         let now = utc_now();
         let manifest = Manifest {
             neat: env!("CARGO_PKG_VERSION").to_owned(),
@@ -69,6 +72,7 @@ impl<'a> Session<'a> {
             threads: rayon::current_num_threads(),
             seed: options.seed,
             scene: scene_dir,
+            sphere: Some(prepared.sphere),
             inputs,
             warnings,
             status: Status::Running,
@@ -81,13 +85,18 @@ impl<'a> Session<'a> {
         };
         let mut session = Self {
             dir,
-            config: options.config.clone(),
+            config,
             manifest,
-            scene: loaded.scene,
+            scene: prepared.scene,
             device,
             on_event,
         };
-        session.add_seconds(Stage::Load, seconds);
+        for (stage, seconds) in prepared.seconds {
+            session.add_seconds(stage, seconds);
+        }
+        if prepared.detected {
+            session.write_detections()?;
+        }
         session.write_manifest()?;
         Ok(session)
     }
@@ -123,6 +132,15 @@ impl<'a> Session<'a> {
         self.add_seconds(stage, seconds);
         (self.on_event)(Event::StageFinished { stage, seconds });
         Ok(value)
+    }
+
+    /// Writes the 2D wireframes that were detected, as files that a scene can have.
+    fn write_detections(&mut self) -> Result<(), PipelineError> {
+        for view in &self.scene.views {
+            let path = self.dir.detection(&view.name);
+            hawp_json::write(&path, &view.wireframe, self.scene.pixel_center)?;
+        }
+        Ok(())
     }
 
     pub fn warn(&mut self, warning: &str) {
@@ -174,6 +192,7 @@ pub fn open_run<E>(
     run: &Path,
     scene: Option<&Path>,
     backend: Backend,
+    cache: Option<&FileCache>,
     configure: impl FnOnce(Config) -> Result<Config, E>,
     on_event: OnEvent<'_>,
 ) -> Result<OpenedRun, E>
@@ -182,7 +201,7 @@ where
 {
     let dir = RunDir::open(run).map_err(PipelineError::from)?;
     let config = configure(dir.config().map_err(PipelineError::from)?)?;
-    Ok(read_run(dir, config, scene, backend, on_event)?)
+    Ok(read_run(dir, config, scene, backend, cache, on_event)?)
 }
 
 fn read_run(
@@ -190,6 +209,7 @@ fn read_run(
     config: Config,
     scene: Option<&Path>,
     backend: Backend,
+    cache: Option<&FileCache>,
     on_event: OnEvent<'_>,
 ) -> Result<OpenedRun, PipelineError> {
     let device = backend.device()?;
@@ -198,32 +218,17 @@ fn read_run(
     }
     let manifest = dir.manifest()?;
     let scene_dir = scene.unwrap_or(&manifest.scene);
-    let (loaded, _) = timed(on_event, Stage::Load, |on_event| {
-        load(scene_dir, &config, on_event)
-    })?;
+    let prepared = prepare_scene(scene_dir, &config, cache, on_event)?;
     let checkpoint = dir.read_latest_checkpoint()?;
     let field = TrainedField::load(&config, &checkpoint, &device)?;
     Ok(OpenedRun {
         dir,
         config,
         manifest,
-        scene: loaded.scene,
+        scene: prepared.scene,
         device,
         field,
     })
-}
-
-/// Reads a scene as a run needs it, and passes its warnings on.
-fn load(
-    scene: &Path,
-    config: &Config,
-    on_event: OnEvent<'_>,
-) -> Result<LoadedScene, PipelineError> {
-    let loaded = read_scene(scene, &config.data)?;
-    for warning in &loaded.warnings {
-        on_event(Event::Warning(warning.to_string()));
-    }
-    Ok(loaded)
 }
 
 /// Does a stage outside of a session; returns its time too.

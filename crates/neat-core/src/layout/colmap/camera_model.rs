@@ -1,6 +1,6 @@
-//! COLMAP's camera models, and which of them are pinholes.
+//! COLMAP's camera models: the meaning and order of their parameters.
 
-use crate::Intrinsics;
+use crate::{Distortion, Intrinsics};
 
 /// A camera model, by the order and meaning of its parameters.
 #[derive(Debug, PartialEq)]
@@ -12,33 +12,59 @@ pub(super) struct CameraModel {
     lens: Lens,
 }
 
-/// What the parameters start with, and what all others at zero leave.
+/// What the parameters start with, and what distortion follows.
 #[derive(Debug, PartialEq)]
 enum Lens {
-    /// f, cx, cy, then distortion of a pinhole.
-    OneFocalLength,
-    /// fx, fy, cx, cy, then distortion of a pinhole.
-    TwoFocalLengths,
-    /// Equidistant: no pinhole even where every distortion is zero.
-    Fisheye,
+    /// f, cx, cy, then [`Bend`].
+    OneFocalLength(Bend),
+    /// fx, fy, cx, cy, then [`Bend`].
+    TwoFocalLengths(Bend),
+    /// No [`Distortion`] says what it does.
+    NotRead,
 }
 
-use Lens::{Fisheye, OneFocalLength, TwoFocalLengths};
+/// The parameters that bend rays; models with fewer have the first ones.
+#[derive(Debug, PartialEq)]
+enum Bend {
+    /// k1, k2, p1, p2, k3, k4, k5, k6.
+    Brown,
+    /// k1, k2, k3, k4.
+    Fisheye,
+    /// k1, k2, p1, p2, k3, k4, sx1, sy1.
+    ThinPrismFisheye,
+    /// k0 … k5, p0, p1, s0 … s3.
+    RadTanThinPrismFisheye,
+    /// ω.
+    Fov,
+}
+
+use Bend::{Brown, Fisheye, Fov, RadTanThinPrismFisheye, ThinPrismFisheye};
+use Lens::{NotRead, OneFocalLength, TwoFocalLengths};
 
 /// The models by their numbers in binary files.
-const MODELS: [CameraModel; 12] = [
-    model("SIMPLE_PINHOLE", 3, OneFocalLength),
-    model("PINHOLE", 4, TwoFocalLengths),
-    model("SIMPLE_RADIAL", 4, OneFocalLength),
-    model("RADIAL", 5, OneFocalLength),
-    model("OPENCV", 8, TwoFocalLengths),
-    model("OPENCV_FISHEYE", 8, Fisheye),
-    model("FULL_OPENCV", 12, TwoFocalLengths),
-    model("FOV", 5, TwoFocalLengths),
-    model("SIMPLE_RADIAL_FISHEYE", 4, Fisheye),
-    model("RADIAL_FISHEYE", 5, Fisheye),
-    model("THIN_PRISM_FISHEYE", 12, Fisheye),
-    model("RAD_TAN_THIN_PRISM_FISHEYE", 16, Fisheye),
+const MODELS: [CameraModel; 18] = [
+    model("SIMPLE_PINHOLE", 3, OneFocalLength(Brown)),
+    model("PINHOLE", 4, TwoFocalLengths(Brown)),
+    model("SIMPLE_RADIAL", 4, OneFocalLength(Brown)),
+    model("RADIAL", 5, OneFocalLength(Brown)),
+    model("OPENCV", 8, TwoFocalLengths(Brown)),
+    model("OPENCV_FISHEYE", 8, TwoFocalLengths(Fisheye)),
+    model("FULL_OPENCV", 12, TwoFocalLengths(Brown)),
+    model("FOV", 5, TwoFocalLengths(Fov)),
+    model("SIMPLE_RADIAL_FISHEYE", 4, OneFocalLength(Fisheye)),
+    model("RADIAL_FISHEYE", 5, OneFocalLength(Fisheye)),
+    model("THIN_PRISM_FISHEYE", 12, TwoFocalLengths(ThinPrismFisheye)),
+    model(
+        "RAD_TAN_THIN_PRISM_FISHEYE",
+        16,
+        TwoFocalLengths(RadTanThinPrismFisheye),
+    ),
+    model("SIMPLE_DIVISION", 4, NotRead),
+    model("DIVISION", 5, NotRead),
+    model("SIMPLE_FISHEYE", 3, OneFocalLength(Fisheye)),
+    model("FISHEYE", 4, TwoFocalLengths(Fisheye)),
+    model("EUCM", 6, NotRead),
+    model("EQUIRECTANGULAR", 2, NotRead),
 ];
 
 const fn model(name: &'static str, parameters: usize, lens: Lens) -> CameraModel {
@@ -63,56 +89,163 @@ impl CameraModel {
             .find(|model| model.name == name)
     }
 
-    /// The intrinsics, if `parameters` make the model a pinhole: every distortion
-    /// is zero.
-    pub fn pinhole(&self, parameters: &[f64]) -> Option<Intrinsics> {
-        let (fx, fy, cx, cy, distortion) = match (&self.lens, parameters) {
-            (OneFocalLength, &[f, cx, cy, ref rest @ ..]) => (f, f, cx, cy, rest),
-            (TwoFocalLengths, &[fx, fy, cx, cy, ref rest @ ..]) => (fx, fy, cx, cy, rest),
+    /// Intrinsics and lens, or `None` for a model that [`Distortion`] cannot say.
+    pub fn lens(&self, parameters: &[f64]) -> Option<(Intrinsics, Distortion)> {
+        let (bend, fx, fy, cx, cy, rest) = match (&self.lens, parameters) {
+            (OneFocalLength(bend), &[f, cx, cy, ref rest @ ..]) => (bend, f, f, cx, cy, rest),
+            (TwoFocalLengths(bend), &[fx, fy, cx, cy, ref rest @ ..]) => {
+                (bend, fx, fy, cx, cy, rest)
+            }
             _ => return None,
         };
-        let skew = 0.0;
-        distortion.iter().all(|&x| x == 0.0).then_some(Intrinsics {
+        let intrinsics = Intrinsics {
             fx,
             fy,
             cx,
             cy,
-            skew,
-        })
+            skew: 0.0,
+        };
+        Some((intrinsics, bend.distortion(rest)))
     }
+}
+
+impl Bend {
+    fn distortion(&self, parameters: &[f64]) -> Distortion {
+        match self {
+            Brown => {
+                let [k1, k2, p1, p2, k3, k4, k5, k6] = filled(parameters);
+                Distortion::Brown {
+                    radial: [k1, k2, k3, k4, k5, k6],
+                    tangential: [p1, p2],
+                }
+            }
+            Fisheye => {
+                let [k1, k2, k3, k4] = filled(parameters);
+                Distortion::Fisheye {
+                    radial: [k1, k2, k3, k4, 0.0, 0.0],
+                    tangential: [0.0; 2],
+                    thin_prism: [0.0; 4],
+                }
+            }
+            ThinPrismFisheye => {
+                let [k1, k2, p1, p2, k3, k4, s1, s2] = filled(parameters);
+                Distortion::ThinPrismFisheye {
+                    radial: [k1, k2, k3, k4],
+                    tangential: [p1, p2],
+                    thin_prism: [s1, s2],
+                }
+            }
+            RadTanThinPrismFisheye => {
+                let [k0, k1, k2, k3, k4, k5, p0, p1, s0, s1, s2, s3] = filled(parameters);
+                Distortion::Fisheye {
+                    radial: [k0, k1, k2, k3, k4, k5],
+                    // Here p0 belongs to x², and p1 to y²: the other way round
+                    // than in OpenCV.
+                    tangential: [p1, p0],
+                    thin_prism: [s0, s1, s2, s3],
+                }
+            }
+            Fov => {
+                let [omega] = filled(parameters);
+                Distortion::Fov { omega }
+            }
+        }
+    }
+}
+
+/// The first parameters, and zero for those that a simpler model does not have.
+fn filled<const N: usize>(parameters: &[f64]) -> [f64; N] {
+    let mut all = [0.0; N];
+    for (number, parameter) in all.iter_mut().zip(parameters) {
+        *number = *parameter;
+    }
+    all
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn lens(name: &str, parameters: &[f64]) -> (Intrinsics, Distortion) {
+        let model = CameraModel::by_name(name).unwrap();
+        assert_eq!(model.parameters, parameters.len(), "{name}");
+        model.lens(parameters).unwrap()
+    }
+
+    /// The parameters after focal lengths and principal point are 0.1, 0.2, …
+    fn distortion(name: &str) -> Distortion {
+        let model = CameraModel::by_name(name).unwrap();
+        let shared: &[f64] = match model.lens {
+            OneFocalLength(_) => &[9.0, 6.0, 4.0],
+            _ => &[9.0, 8.0, 6.0, 4.0],
+        };
+        let rest = (1..).map(|i| f64::from(i) / 10.0);
+        let parameters: Vec<_> = (shared.iter().copied().chain(rest))
+            .take(model.parameters)
+            .collect();
+        let (intrinsics, distortion) = lens(name, &parameters);
+        let found = [intrinsics.fx, intrinsics.cx, intrinsics.cy, intrinsics.skew];
+        assert_eq!(found, [9.0, 6.0, 4.0, 0.0], "{name}");
+        let fy = if shared.len() == 3 { 9.0 } else { 8.0 };
+        assert_eq!(intrinsics.fy, fy, "{name}");
+        distortion
+    }
+
+    /// By the formulas of COLMAP's `sensor/models.h`.
     #[test]
-    fn only_models_without_distortion_are_pinholes() {
+    fn parameters_have_the_order_of_colmap() {
+        for name in ["SIMPLE_PINHOLE", "PINHOLE"] {
+            assert!(distortion(name).is_none());
+        }
+        let brown = |radial, tangential| Distortion::Brown { radial, tangential };
+        let simple = brown([0.1, 0.0, 0.0, 0.0, 0.0, 0.0], [0.0; 2]);
+        assert_eq!(distortion("SIMPLE_RADIAL"), simple);
+        let radial = brown([0.1, 0.2, 0.0, 0.0, 0.0, 0.0], [0.0; 2]);
+        assert_eq!(distortion("RADIAL"), radial);
+        let opencv = brown([0.1, 0.2, 0.0, 0.0, 0.0, 0.0], [0.3, 0.4]);
+        assert_eq!(distortion("OPENCV"), opencv);
+        let full = brown([0.1, 0.2, 0.5, 0.6, 0.7, 0.8], [0.3, 0.4]);
+        assert_eq!(distortion("FULL_OPENCV"), full);
+        assert_eq!(distortion("FOV"), Distortion::Fov { omega: 0.1 });
+
+        let fisheye = |radial| Distortion::Fisheye {
+            radial,
+            tangential: [0.0; 2],
+            thin_prism: [0.0; 4],
+        };
+        for name in ["SIMPLE_FISHEYE", "FISHEYE"] {
+            assert_eq!(distortion(name), fisheye([0.0; 6]));
+        }
+        let simple = fisheye([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(distortion("SIMPLE_RADIAL_FISHEYE"), simple);
+        let radial = fisheye([0.1, 0.2, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(distortion("RADIAL_FISHEYE"), radial);
+        let opencv = fisheye([0.1, 0.2, 0.3, 0.4, 0.0, 0.0]);
+        assert_eq!(distortion("OPENCV_FISHEYE"), opencv);
+        let thin_prism = Distortion::ThinPrismFisheye {
+            radial: [0.1, 0.2, 0.5, 0.6],
+            tangential: [0.3, 0.4],
+            thin_prism: [0.7, 0.8],
+        };
+        assert_eq!(distortion("THIN_PRISM_FISHEYE"), thin_prism);
+        let rad_tan = Distortion::Fisheye {
+            radial: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
+            tangential: [0.8, 0.7],
+            thin_prism: [0.9, 1.0, 1.1, 1.2],
+        };
+        assert_eq!(distortion("RAD_TAN_THIN_PRISM_FISHEYE"), rad_tan);
+    }
+
+    #[test]
+    fn models_are_found_by_number_and_name() {
         for (id, model) in (0..).zip(&MODELS) {
             assert_eq!(CameraModel::by_id(id), Some(model));
             assert_eq!(CameraModel::by_name(model.name), Some(model));
-            let shared = if model.lens == OneFocalLength { 3 } else { 4 };
-            let mut parameters = vec![0.0; model.parameters];
-            for (index, parameter) in parameters[..shared].iter_mut().enumerate() {
-                *parameter = 1.0 + index as f64;
-            }
-            let pinhole = model.pinhole(&parameters);
-            assert_eq!(pinhole.is_some(), model.lens != Fisheye, "{}", model.name);
-            if let Some(found) = pinhole {
-                let found = [found.fx, found.fy, found.cx, found.cy];
-                let expected = match shared {
-                    3 => [1.0, 1.0, 2.0, 3.0],
-                    _ => [1.0, 2.0, 3.0, 4.0],
-                };
-                assert_eq!(found, expected, "{}", model.name);
-            }
-            for distorted in shared..model.parameters {
-                let mut parameters = parameters.clone();
-                parameters[distorted] = 1e-3;
-                assert_eq!(model.pinhole(&parameters), None, "{}", model.name);
-            }
+            let parameters = vec![1.0; model.parameters];
+            let read = model.lens(&parameters).is_some();
+            assert_eq!(read, model.lens != NotRead, "{}", model.name);
         }
-        assert_eq!(CameraModel::by_id(12), None);
+        assert_eq!(CameraModel::by_id(18), None);
         assert_eq!(CameraModel::by_id(-1), None);
         assert_eq!(CameraModel::by_name("pinhole"), None);
     }

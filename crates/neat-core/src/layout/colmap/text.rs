@@ -2,10 +2,10 @@
 //! start with `#` are comments.
 
 use super::camera_model::CameraModel;
-use super::{ColmapCamera, ColmapImage, malformed, unknown_model};
+use super::{ColmapCamera, ColmapImage, ColmapPoint, unknown_model};
 use crate::SceneError;
+use crate::layout::text_lines::{Line, lines, next_field, records};
 use std::path::Path;
-use std::str::FromStr;
 
 pub(super) fn cameras(path: &Path, bytes: &[u8]) -> Result<Vec<ColmapCamera>, SceneError> {
     let mut cameras = Vec::new();
@@ -21,7 +21,7 @@ pub(super) fn cameras(path: &Path, bytes: &[u8]) -> Result<Vec<ColmapCamera>, Sc
         for _ in 0..model.parameters {
             parameters.push(line.parse("PARAMS")?);
         }
-        if !line.rest.trim().is_empty() {
+        if !line.is_at_end() {
             let reason = format!("{name} has only {} parameters", model.parameters);
             return Err(line.error(&reason));
         }
@@ -41,11 +41,11 @@ pub(super) fn images(path: &Path, bytes: &[u8]) -> Result<Vec<ColmapImage>, Scen
     let mut images = Vec::new();
     while let Some(line) = lines.next() {
         if line.is_record() {
-            let image = image(line)?;
+            let mut image = image(line)?;
             // The next line holds the points even where it is empty. Only the
             // last one may be missing: editors strip empty lines.
             if let Some(points) = lines.next() {
-                check_points(points, &image.name)?;
+                image.points = image_points(points, &image.name)?;
             }
             images.push(image);
         }
@@ -64,7 +64,7 @@ fn image(mut line: Line) -> Result<ColmapImage, SceneError> {
         return Err(line.error("expected IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID and NAME"));
     }
     line.owner = Some(format!("view `{name}`"));
-    let _id: u32 = line.parse("IMAGE_ID")?;
+    let id = line.parse("IMAGE_ID")?;
     let mut quaternion = [0.0; 4];
     for (number, what) in quaternion.iter_mut().zip(["QW", "QX", "QY", "QZ"]) {
         *number = line.parse(what)?;
@@ -74,103 +74,53 @@ fn image(mut line: Line) -> Result<ColmapImage, SceneError> {
         *number = line.parse(what)?;
     }
     Ok(ColmapImage {
+        id,
         name: name.into(),
         camera: line.parse("CAMERA_ID")?,
         quaternion,
         translation,
+        points: Vec::new(),
     })
 }
 
-/// Errs unless the line is a list of x, y, number of the 3D point. A file without
-/// the lines of points would otherwise lose every other image in silence.
-fn check_points(mut line: Line, view: &str) -> Result<(), SceneError> {
-    let last = line.rest.split_whitespace().next_back();
-    let number = last.is_none_or(|last| last.parse::<i64>().is_ok());
-    if number && line.rest.split_whitespace().count().is_multiple_of(3) {
-        return Ok(());
-    }
-    line.owner = Some(format!("view `{view}`"));
-    Err(line.error("expected the image's points as X, Y, POINT3D_ID, or an empty line"))
-}
-
-pub(super) fn points(path: &Path, bytes: &[u8]) -> Result<Vec<[f64; 3]>, SceneError> {
+/// The pixels of a line of x, y, number of the 3D point. A line that is none is an
+/// error: a file without these lines would otherwise lose every other image in
+/// silence.
+fn image_points(mut line: Line, view: &str) -> Result<Vec<[f64; 2]>, SceneError> {
+    let mut fields = line.rest.split_whitespace();
     let mut points = Vec::new();
-    for mut line in records(path, bytes)? {
-        let _id: u64 = line.parse("POINT3D_ID")?;
-        let point = [line.parse("X")?, line.parse("Y")?, line.parse("Z")?];
-        for what in ["R", "G", "B"] {
-            let _colour: u8 = line.parse(what)?;
-        }
-        let _error: f64 = line.parse("ERROR")?;
-        points.push(point);
+    while let Some(x) = fields.next() {
+        let point = (
+            x.parse(),
+            fields.next().map(str::parse),
+            fields.next().map(str::parse::<i64>),
+        );
+        let (Ok(x), Some(Ok(y)), Some(Ok(_point))) = point else {
+            line.owner = Some(format!("view `{view}`"));
+            let reason = "expected the image's points as X, Y, POINT3D_ID, or an empty line";
+            return Err(line.error(reason));
+        };
+        points.push([x, y]);
     }
     Ok(points)
 }
 
-/// What is left of a line.
-struct Line<'a> {
-    path: &'a Path,
-    number: usize,
-    /// The view or camera that it is about, once that is known.
-    owner: Option<String>,
-    rest: &'a str,
-}
-
-impl<'a> Line<'a> {
-    fn is_record(&self) -> bool {
-        let text = self.rest.trim_start();
-        !text.is_empty() && !text.starts_with('#')
+pub(super) fn points(path: &Path, bytes: &[u8]) -> Result<Vec<ColmapPoint>, SceneError> {
+    let mut points = Vec::new();
+    for mut line in records(path, bytes)? {
+        let _id: u64 = line.parse("POINT3D_ID")?;
+        let position = [line.parse("X")?, line.parse("Y")?, line.parse("Z")?];
+        for what in ["R", "G", "B"] {
+            let _colour: u8 = line.parse(what)?;
+        }
+        let _error: f64 = line.parse("ERROR")?;
+        let mut track = Vec::new();
+        while !line.is_at_end() {
+            track.push([line.parse("IMAGE_ID")?, line.parse("POINT2D_IDX")?]);
+        }
+        points.push(ColmapPoint { position, track });
     }
-
-    fn field(&mut self, what: &str) -> Result<&'a str, SceneError> {
-        next_field(&mut self.rest).ok_or_else(|| self.error(&format!("it ends before {what}")))
-    }
-
-    fn parse<T: FromStr>(&mut self, what: &str) -> Result<T, SceneError> {
-        let field = self.field(what)?;
-        field
-            .parse()
-            .map_err(|_| self.error(&format!("`{field}` cannot be {what}")))
-    }
-
-    fn error(&self, reason: &str) -> SceneError {
-        let owner = self
-            .owner
-            .as_deref()
-            .map_or(String::new(), |owner| format!(", {owner}"));
-        malformed(self.path, format!("line {}{owner}: {reason}", self.number))
-    }
-}
-
-/// Takes what is before the next white space.
-fn next_field<'a>(rest: &mut &'a str) -> Option<&'a str> {
-    let text = rest.trim_start();
-    let end = text.find(char::is_whitespace).unwrap_or(text.len());
-    let (field, after) = text.split_at(end);
-    *rest = after;
-    (!field.is_empty()).then_some(field)
-}
-
-fn lines<'a>(
-    path: &'a Path,
-    bytes: &'a [u8],
-) -> Result<impl Iterator<Item = Line<'a>>, SceneError> {
-    let text = std::str::from_utf8(bytes)
-        .map_err(|error| malformed(path, format!("it is not UTF-8 text: {error}")))?;
-    Ok((1..).zip(text.lines()).map(move |(number, rest)| Line {
-        path,
-        number,
-        owner: None,
-        rest,
-    }))
-}
-
-/// Lines that are neither empty nor comments.
-fn records<'a>(
-    path: &'a Path,
-    bytes: &'a [u8],
-) -> Result<impl Iterator<Item = Line<'a>>, SceneError> {
-    Ok(lines(path, bytes)?.filter(Line::is_record))
+    Ok(points)
 }
 
 #[cfg(test)]
@@ -222,7 +172,7 @@ mod tests {
                 "SIMPLE_PINHOLE has only 3 parameters",
             ),
             (0, "7 SIMPLE_PINHOLE -4 3 5 2 1.5", "`-4` cannot be WIDTH"),
-            (0, "7 SPHERE 4 3 5", "camera 7 of model SPHERE"),
+            (0, "7 SPHERE 4 3 5", "camera 7 has the model SPHERE"),
             (1, "1 1 0 0 0 7 8 9 7", "line 1: expected IMAGE_ID"),
             (
                 1,

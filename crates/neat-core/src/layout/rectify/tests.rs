@@ -1,6 +1,8 @@
 //! Scenes of distorted and of large photographs, as [`load_posed`] reads them.
 
-use super::super::{Layout, LoadOptions, LoadedScene, Poses, SceneWarning, load_posed};
+use super::super::load::load_posed;
+use super::super::poses::Poses;
+use super::super::{Layout, LoadOptions, LoadedScene, SceneWarning};
 use super::*;
 use crate::{Observation, SceneError, Similarity, SparsePoint, file, hawp_json};
 use image::Rgb;
@@ -92,6 +94,8 @@ fn poses(dir: &Path, distortion: Distortion, pixel_center: f64) -> Poses {
         original_from_world: Similarity::identity(),
         pixel_center: Some(pixel_center),
         points: points().map(seen).to_vec(),
+        // The world stays as it is.
+        declared_radius: Some(1.0),
     }
 }
 
@@ -330,6 +334,7 @@ fn times_of_a_first_and_a_second_load() {
             original_from_world: Similarity::identity(),
             pixel_center: Some(0.5),
             points: Vec::new(),
+            declared_radius: None,
         };
         let options = LoadOptions {
             require_wireframes: false,

@@ -1,0 +1,161 @@
+//! One segment for each image edge: duplicates go, pieces of one line are joined,
+//! and segments that run into each other under a small angle end where they meet.
+
+use crate::line_fitting::{FittedSegment, LineFitter, normal_of};
+use neat_core::LineSegment2;
+
+/// Edges of opposite contrast, such as the two sides of a thin line, are one
+/// only if they are nearer than this, in pixels.
+const SAME_EDGE: f64 = 0.75;
+/// A fit to joined pieces must keep so much of their joint length.
+const MIN_KEPT_LENGTH: f64 = 0.9;
+/// A fit to joined pieces has at most this spread, in pixels.
+const MAX_SPREAD: f64 = 0.6;
+/// A segment that follows another edge beyond their crossing stays this near to
+/// it, in pixels.
+const OVERSHOOT: f64 = 1.5;
+
+/// How near collinear segments must be to become one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MergeLimits {
+    /// Between a segment's ends and the other's line, in pixels.
+    pub distance: f64,
+    /// Sine of the largest angle between them.
+    pub sin_angle: f64,
+    /// Between the two along their line, in pixels.
+    pub gap: f64,
+}
+
+/// Merges `segments` until no two belong together. The result is sorted by
+/// length, longest first.
+pub(crate) fn merge(
+    mut segments: Vec<FittedSegment>,
+    fitter: &LineFitter,
+    limits: &MergeLimits,
+) -> Vec<FittedSegment> {
+    loop {
+        sort_by_length(&mut segments);
+        let before = segments.len();
+        let mut kept: Vec<FittedSegment> = Vec::new();
+        for segment in segments {
+            let merged = (kept.iter_mut()).find_map(|long| {
+                joined(long, &segment, fitter, limits).map(|joined| *long = joined)
+            });
+            if merged.is_none() {
+                kept.push(segment);
+            }
+        }
+        segments = kept;
+        if segments.len() == before {
+            return segments;
+        }
+    }
+}
+
+/// Longest first.
+fn sort_by_length(segments: &mut [FittedSegment]) {
+    segments.sort_by(|a, b| b.segment.length().total_cmp(&a.segment.length()));
+}
+
+/// The one segment that stands for both; `None` if they are two.
+fn joined(
+    long: &FittedSegment,
+    short: &FittedSegment,
+    fitter: &LineFitter,
+    limits: &MergeLimits,
+) -> Option<FittedSegment> {
+    let direction = long.direction();
+    let normal = normal_of(&direction);
+    let length = long.segment.length();
+    let same_way = direction.dot(&short.direction()) >= 0.0;
+    let short_way = if same_way {
+        short.segment
+    } else {
+        short.segment.reversed()
+    };
+    let [first, last] = short_way
+        .ends()
+        .map(|end| (end - long.segment.start).dot(&direction));
+    if first > length + limits.gap || last < -limits.gap {
+        return None;
+    }
+    let across = short_way
+        .ends()
+        .map(|end| (end - long.segment.start).dot(&normal).abs());
+    let same_contrast = (long.change.dot(&short.change) >= 0.0) == same_way;
+    let distance = if same_contrast {
+        limits.distance
+    } else {
+        SAME_EDGE
+    };
+    if across[0].max(across[1]) > distance {
+        return None;
+    }
+    if first >= -limits.distance && last <= length + limits.distance {
+        return Some(long.clone());
+    }
+    if direction.perp(&short.direction()).abs() > limits.sin_angle {
+        return None;
+    }
+    let whole = LineSegment2::new(
+        if first < 0.0 {
+            short_way.start
+        } else {
+            long.segment.start
+        },
+        if last > length {
+            short_way.end
+        } else {
+            long.segment.end
+        },
+    );
+    fitter.fit(&whole, limits.distance).filter(|fitted| {
+        fitted.spread <= MAX_SPREAD && fitted.segment.length() >= MIN_KEPT_LENGTH * whole.length()
+    })
+}
+
+/// Cuts off what runs on along another segment beyond the point where they meet:
+/// edges that bend a little at a junction are followed too far from both sides.
+/// Only pairs under an angle below `max_sin_angle` do so.
+pub(crate) fn trim_overshoots(segments: &mut [FittedSegment], max_sin_angle: f64) {
+    for i in 0..segments.len() {
+        for j in 0..i {
+            let [a, b] = [&segments[i].segment, &segments[j].segment];
+            let sine = segments[i].direction().perp(&segments[j].direction()).abs();
+            if sine > max_sin_angle {
+                continue;
+            }
+            let Some([at_a, at_b]) = crossing(a, b) else {
+                continue;
+            };
+            let [trimmed_a, trimmed_b] = [trimmed(a, at_a, b), trimmed(b, at_b, a)];
+            segments[i].segment = trimmed_a;
+            segments[j].segment = trimmed_b;
+        }
+    }
+}
+
+/// The parameters at which two segments cross.
+fn crossing(a: &LineSegment2, b: &LineSegment2) -> Option<[f64; 2]> {
+    let [along_a, along_b, between] = [a.end - a.start, b.end - b.start, b.start - a.start];
+    let determinant = along_a.perp(&along_b);
+    let at = [
+        between.perp(&along_b) / determinant,
+        between.perp(&along_a) / determinant,
+    ];
+    at.iter().all(|t| (0.0..=1.0).contains(t)).then_some(at)
+}
+
+/// `segment` without the shorter of the parts before and after `at`, if that part
+/// keeps near to `other`.
+fn trimmed(segment: &LineSegment2, at: f64, other: &LineSegment2) -> LineSegment2 {
+    let crossing = segment.point_at(at);
+    let near = |end| other.distance_to_point(end) <= OVERSHOOT;
+    if at <= 0.5 && near(&segment.start) {
+        LineSegment2::new(crossing, segment.end)
+    } else if at > 0.5 && near(&segment.end) {
+        LineSegment2::new(segment.start, crossing)
+    } else {
+        *segment
+    }
+}

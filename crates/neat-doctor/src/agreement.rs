@@ -1,0 +1,91 @@
+//! How much of what the images show is explained by given cameras.
+
+use crate::corner_consensus::CornerEvidence;
+use crate::tracks::{self, Track};
+use neat_core::Camera;
+use std::ops::AddAssign;
+
+/// How many of how many.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Tally {
+    pub explained: usize,
+    pub total: usize,
+}
+
+impl Tally {
+    pub fn one(explained: bool) -> Self {
+        Self {
+            explained: usize::from(explained),
+            total: 1,
+        }
+    }
+
+    /// In [0, 1]; 0 of nothing is 0.
+    pub fn share(&self) -> f64 {
+        self.explained as f64 / self.total.max(1) as f64
+    }
+}
+
+impl AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.explained += other.explained;
+        self.total += other.total;
+    }
+}
+
+/// What cameras explain, in all and of each view.
+#[derive(Clone, Debug)]
+pub(crate) struct Agreement {
+    pub all: Tally,
+    /// Grows with how much is explained and how exactly: smooth enough for a
+    /// search, of the same evidence.
+    pub score: f64,
+    /// For each view of the scene.
+    pub per_view: Vec<Tally>,
+}
+
+impl Agreement {
+    pub fn none(views: usize) -> Self {
+        Self {
+            all: Tally::default(),
+            score: 0.0,
+            per_view: vec![Tally::default(); views],
+        }
+    }
+
+    /// Adds to the score.
+    pub fn weigh(&mut self, weight: f64) {
+        self.score += weight;
+    }
+
+    pub fn share(&self) -> f64 {
+        self.all.share()
+    }
+}
+
+/// What the images show that cameras have to explain.
+pub(crate) enum Evidence {
+    /// Points of textured things, matched by their looks.
+    Tracks(Vec<Track>),
+    /// Corners of things without texture, which all look alike.
+    Corners(CornerEvidence),
+}
+
+impl Evidence {
+    /// How well `cameras`, one for each view of the scene, explain what the
+    /// `trusted` views show together.
+    pub fn agreement(&self, cameras: &[Camera], trusted: &[bool]) -> Agreement {
+        match self {
+            Self::Tracks(tracks) => tracks::agreement(tracks, cameras, trusted),
+            Self::Corners(corners) => corners.agreement(cameras, trusted),
+        }
+    }
+
+    /// What is counted, in words.
+    pub fn noun(&self) -> &'static str {
+        match self {
+            Self::Tracks(_) => "points matched through three views",
+            Self::Corners(_) => "corners",
+        }
+    }
+}

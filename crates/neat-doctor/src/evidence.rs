@@ -1,0 +1,145 @@
+//! Gathers what the images show, without looking at the poses.
+
+use crate::agreement::Evidence;
+use crate::corner_consensus::{CornerEvidence, MAX_CORNERS, ViewCorners};
+use crate::corners::{corners, refined};
+use crate::descriptor::keypoints;
+use crate::gray_image::GrayImage;
+use crate::tracks::{ViewKeypoints, matching};
+use nalgebra::Vector2;
+use neat_core::{Scene, View};
+use rayon::prelude::*;
+
+/// Images with more corners than this show texture, which tells points apart.
+const TEXTURE: usize = 120;
+
+/// Corners that are refined; some are dropped then.
+const CANDIDATES: usize = 2 * MAX_CORNERS;
+
+/// What the images of some views show.
+pub(crate) struct Gathered {
+    /// Indices of those views.
+    pub views: Vec<usize>,
+    pub evidence: Evidence,
+    /// How alike the views i < j look, in the order (0, 1), (0, 2), …, (1, 2), ….
+    pub likeness: Vec<f64>,
+}
+
+/// Whether most of the given views show texture.
+pub(crate) fn is_textured(working: &[(GrayImage, u32)], views: &[usize]) -> bool {
+    // A few views tell; the first and the last are often the worst.
+    let few: Vec<usize> = views.iter().copied().skip(1).step_by(6).collect();
+    let mut counts: Vec<usize> = (few.par_iter())
+        .map(|&view| corners(&working[view].0, TEXTURE + 1).len())
+        .collect();
+    counts.sort_unstable();
+    counts
+        .get(counts.len() / 2)
+        .is_some_and(|&count| count > TEXTURE)
+}
+
+/// Looks at the given views for points of texture or for corners.
+pub(crate) fn gather(
+    scene: &Scene,
+    working: &[(GrayImage, u32)],
+    views: Vec<usize>,
+    textured: bool,
+) -> Gathered {
+    if textured {
+        let keypoints: Vec<_> = views
+            .par_iter()
+            .map(|&view| ViewKeypoints {
+                view,
+                factor: f64::from(working[view].1),
+                pixel_center: scene.pixel_center,
+                keypoints: keypoints(&working[view].0),
+            })
+            .collect();
+        let matching = matching(&keypoints);
+        return Gathered {
+            views,
+            evidence: Evidence::Tracks(matching.tracks),
+            likeness: matching
+                .common
+                .iter()
+                .map(|&n| (1.0 + n as f64).ln())
+                .collect(),
+        };
+    }
+    let corners: Vec<_> = (views.par_iter())
+        .map(|&view| {
+            let (image, factor) = &working[view];
+            let gradients = image.blurred(1).gradients();
+            let full = |working: f32| {
+                (f64::from(working) + 0.5) * f64::from(*factor) - 0.5 + scene.pixel_center
+            };
+            let corners = corners(image, CANDIDATES)
+                .iter()
+                .filter_map(|corner| refined(&gradients, corner))
+                .take(MAX_CORNERS)
+                .map(|corner| Vector2::new(full(corner.x), full(corner.y)))
+                .collect();
+            ViewCorners::new(view, corners, larger_side(&scene.views[view]))
+        })
+        .collect();
+    let thumbnails: Vec<_> = (views.par_iter())
+        .map(|&view| Thumbnail::new(&working[view].0))
+        .collect();
+    let likeness = (0..views.len())
+        .flat_map(|i| (i + 1..views.len()).map(move |j| [i, j]))
+        .map(|[i, j]| thumbnails[i].likeness(&thumbnails[j]))
+        .collect();
+    Gathered {
+        views,
+        evidence: Evidence::Corners(CornerEvidence::new(corners)),
+        likeness,
+    }
+}
+
+fn larger_side(view: &View) -> f64 {
+    f64::from(view.camera.width.max(view.camera.height))
+}
+
+/// An image at 24 × 24, its mean taken off.
+pub(crate) struct Thumbnail(Vec<f32>);
+
+impl Thumbnail {
+    const SIDE: usize = 24;
+
+    pub fn new(image: &GrayImage) -> Self {
+        let mut values = Vec::with_capacity(Self::SIDE * Self::SIDE);
+        for row in 0..Self::SIDE {
+            for column in 0..Self::SIDE {
+                let range = |index: usize, extent: usize| {
+                    let start = index * extent / Self::SIDE;
+                    start
+                        ..((index + 1) * extent / Self::SIDE)
+                            .max(start + 1)
+                            .min(extent)
+                };
+                let (rows, columns) = (range(row, image.height), range(column, image.width));
+                let count = (rows.len() * columns.len()).max(1);
+                let sum: f32 = rows
+                    .flat_map(|y| columns.clone().map(move |x| (x, y)))
+                    .map(|(x, y)| image.at(x, y))
+                    .sum();
+                values.push(sum / count as f32);
+            }
+        }
+        let mean = values.iter().sum::<f32>() / values.len() as f32;
+        values.iter_mut().for_each(|value| *value -= mean);
+        Self(values)
+    }
+
+    /// The correlation of two thumbnails, in [−1, 1].
+    pub fn likeness(&self, other: &Self) -> f64 {
+        let dot =
+            |a: &[f32], b: &[f32]| -> f64 { a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum() };
+        let norm = (dot(&self.0, &self.0) * dot(&other.0, &other.0)).sqrt();
+        if norm > 0.0 {
+            dot(&self.0, &other.0) / norm
+        } else {
+            0.0
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! The examination of a scene, and of a folder that should hold one.
+
+use crate::capture_checks::capture_findings;
+use crate::evidence::{gather, is_textured};
+use crate::examination::{Cause, Check, Examination, Finding, Level, Repair};
+use crate::gray_image::GrayImage;
+use crate::image_checks::image_findings;
+use crate::load_failure::{explain, size_factor};
+use crate::pose_diagnosis::Diagnosis;
+use nalgebra::Vector3;
+use neat_core::layout::PoseConvention;
+use neat_core::{CameraError, LoadOptions, LoadedScene, Scene, SceneError, ViewError, load_scene};
+use rayon::prelude::*;
+use std::path::Path;
+
+/// How thoroughly to look.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Depth {
+    /// At some views; thoroughly only if their cameras do not agree with them.
+    /// A second or two.
+    Quick,
+    /// At up to 60 photographs or 300 images of things without texture.
+    #[default]
+    Full,
+}
+
+/// The ball that holds what is to be reconstructed, in the world of the cameras.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SceneSphere {
+    /// Its middle.
+    pub center: Vector3<f64>,
+    /// Its radius; positive.
+    pub radius: f64,
+}
+
+/// How [`examine`] looks at a scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ExamineOptions {
+    /// How thoroughly.
+    pub depth: Depth,
+    /// The scene sphere; without one, that of [`Scene::sphere_radius`]
+    /// around the origin.
+    pub sphere: Option<SceneSphere>,
+    /// The convention that the poses were read with, as in
+    /// [`LoadOptions::pose_convention`]: remedies name the one to use instead.
+    pub pose_convention: Option<PoseConvention>,
+}
+
+/// Views that are looked at: photographs, of which each is matched with all
+/// others, and images without texture.
+const FULL_PHOTOGRAPHS: usize = 60;
+const FULL_VIEWS: usize = 300;
+const QUICK_VIEWS: usize = 30;
+/// Photographs take longer: two runs of neighbours, by their names.
+const QUICK_RUN: usize = 6;
+
+/// Examines a scene: its cameras against its images, and both by themselves.
+///
+/// The same scene gives the same examination, for any number of threads.
+///
+/// ```
+/// use neat_core::synthetic::{SyntheticScene, generate};
+/// use neat_doctor::{ExamineOptions, Level, examine};
+///
+/// let scene = generate(&SyntheticScene { views: 24, image_size: 256, ..Default::default() })?.scene;
+/// let examination = examine(&scene, &ExamineOptions::default());
+/// assert_eq!(examination.problems().count(), 0, "{examination}");
+/// # Ok::<(), neat_core::synthetic::SyntheticError>(())
+/// ```
+pub fn examine(scene: &Scene, options: &ExamineOptions) -> Examination {
+    examine_as(scene, options, false)
+}
+
+/// `mirrored` if the poses could only be read by mirroring their world.
+fn examine_as(scene: &Scene, options: &ExamineOptions, mirrored: bool) -> Examination {
+    if scene.views.is_empty() {
+        let finding = Finding::new(Check::Files, Level::Problem, "the scene holds no view")
+            .because(Cause::MissingFile)
+            .remedied_by("a scene needs images and their poses");
+        return Examination::new(&scene.name, 0, vec![finding]);
+    }
+    let working: Vec<_> = (scene.views.par_iter())
+        .map(|view| GrayImage::working_copy(&view.image))
+        .collect();
+    let sphere = options.sphere.unwrap_or_else(|| SceneSphere {
+        center: Vector3::zeros(),
+        radius: scene.sphere_radius,
+    });
+    let mut findings = pose_findings(scene, &working, options, mirrored);
+    findings.extend(image_findings(scene, &working));
+    findings.extend(capture_findings(scene, &sphere));
+    Examination::new(&scene.name, scene.views.len(), findings)
+}
+
+fn pose_findings(
+    scene: &Scene,
+    working: &[(GrayImage, u32)],
+    options: &ExamineOptions,
+    mirrored: bool,
+) -> Vec<Finding> {
+    let read_as = options.pose_convention.unwrap_or_default();
+    let count = scene.views.len();
+    let textured = is_textured(working, &evenly(count, QUICK_VIEWS));
+    if options.depth == Depth::Quick {
+        let views = if textured && count > 2 * QUICK_RUN {
+            let second = count / 2;
+            (0..QUICK_RUN).chain(second..second + QUICK_RUN).collect()
+        } else {
+            evenly(count, QUICK_VIEWS)
+        };
+        let gathered = gather(scene, working, views, textured);
+        let diagnosis = Diagnosis::new(scene, &gathered, read_as, mirrored);
+        if diagnosis.is_plainly_good() {
+            return diagnosis.agreeing_findings();
+        }
+    }
+    let limit = if textured {
+        FULL_PHOTOGRAPHS
+    } else {
+        FULL_VIEWS
+    };
+    let gathered = gather(scene, working, evenly(count, limit), textured);
+    Diagnosis::new(scene, &gathered, read_as, mirrored).findings()
+}
+
+/// At most `limit` of `count` views, evenly spread.
+pub(crate) fn evenly(count: usize, limit: usize) -> Vec<usize> {
+    let step = count.div_ceil(limit).max(1);
+    (0..count).step_by(step).collect()
+}
+
+/// Reads the scene in the folder `dir` and examines it. A scene that cannot be
+/// read is explained; where its poses are mirrored or its images scaled, it is
+/// read in spite of that to find the repair.
+pub fn examine_folder(
+    dir: impl AsRef<Path>,
+    load: &LoadOptions,
+    options: &ExamineOptions,
+) -> Examination {
+    let dir = dir.as_ref();
+    let mut options = *options;
+    options.pose_convention = options.pose_convention.or(load.pose_convention);
+    let error = match load_scene(dir, load) {
+        Ok(loaded) => return with_warnings(&loaded, examine(&loaded.scene, &options)),
+        Err(error) => error,
+    };
+    let unreadable = |finding| {
+        let name = dir.file_name().unwrap_or(dir.as_os_str());
+        Examination::new(name.to_string_lossy(), 0, vec![finding])
+    };
+    let mirrored = matches!(
+        &error,
+        SceneError::View {
+            problem: ViewError::Camera(CameraError::Mirrored { .. }),
+            ..
+        }
+    );
+    if mirrored {
+        let mut convention = load.pose_convention.unwrap_or_default();
+        convention.mirrored_world = !convention.mirrored_world;
+        let again = LoadOptions {
+            pose_convention: Some(convention),
+            ..load.clone()
+        };
+        // If only some poses are mirrored, others fail now: the first error holds.
+        if let Ok(loaded) = load_scene(dir, &again) {
+            options.pose_convention = Some(convention);
+            return with_warnings(&loaded, examine_as(&loaded.scene, &options, true));
+        }
+    }
+    if let Some(scale) = size_factor(&error) {
+        let scale = scale * load.intrinsics_scale.unwrap_or(1.0);
+        let repair = Repair {
+            intrinsics_scale: Some(scale),
+            ..Repair::default()
+        };
+        if let Ok(loaded) = load_scene(dir, &repair.apply(load)) {
+            let mut finding = explain(&error);
+            finding.repair = Some(repair);
+            finding.remedy = Some(format!("run it with `{repair}`"));
+            let rest = with_warnings(&loaded, examine(&loaded.scene, &options));
+            let findings = [vec![finding], rest.findings].concat();
+            return Examination::new(rest.scene, rest.views, findings);
+        }
+    }
+    unreadable(explain(&error))
+}
+
+/// Puts what was noticed while reading before the other findings.
+fn with_warnings(loaded: &LoadedScene, examination: Examination) -> Examination {
+    let notes = (loaded.warnings.iter())
+        .map(|warning| Finding::new(Check::Files, Level::Note, warning.to_string()));
+    let findings = notes.chain(examination.findings).collect();
+    Examination::new(examination.scene, examination.views, findings)
+}

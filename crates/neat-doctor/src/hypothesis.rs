@@ -1,0 +1,250 @@
+//! What the cameras may really be, where they are not what they were read as.
+
+use nalgebra::Matrix4;
+use neat_core::Camera;
+use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
+
+/// A change of all cameras that makes them what they may really be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Hypothesis {
+    /// Another convention of poses than the one they were read with.
+    Convention {
+        read_as: PoseConvention,
+        is: PoseConvention,
+    },
+    /// Focal lengths times a factor.
+    FocalScale(f64),
+    /// All intrinsics times a factor: the images were scaled.
+    IntrinsicsScale(f64),
+    /// The principal point in the middle of the image.
+    CenteredPrincipalPoint,
+    /// fx and fy, cx and cy change places.
+    SwappedIntrinsics,
+    /// Poses in another order.
+    Order(PoseOrder),
+}
+
+/// Which pose belongs to which image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PoseOrder {
+    /// View i has the pose of view i + n; those beyond the last begin anew.
+    Shifted(isize),
+    /// The first view has the last pose.
+    Reversed,
+    /// The poses are in the order of the numbers in names, images were sorted as
+    /// text: 1, 10, 11, 2.
+    ByNumber,
+    /// The other way round.
+    ByText,
+}
+
+impl Hypothesis {
+    /// The cameras if it holds.
+    pub fn cameras(&self, cameras: &[Camera], names: &[&str]) -> Vec<Camera> {
+        match self {
+            Self::Convention { read_as, is } => with_each(cameras, |camera| {
+                let pose = is.world_from_camera(&stored_pose(camera, read_as));
+                *camera =
+                    Camera::from_matrices(camera.intrinsics, &pose, camera.width, camera.height);
+            }),
+            Self::FocalScale(scale) => with_each(cameras, |camera| {
+                camera.intrinsics.fx *= scale;
+                camera.intrinsics.fy *= scale;
+                camera.intrinsics.skew *= scale;
+            }),
+            Self::IntrinsicsScale(scale) => with_each(cameras, |camera| {
+                let k = &mut camera.intrinsics;
+                for value in [&mut k.fx, &mut k.fy, &mut k.cx, &mut k.cy, &mut k.skew] {
+                    *value *= scale;
+                }
+            }),
+            Self::CenteredPrincipalPoint => with_each(cameras, |camera| {
+                camera.intrinsics.cx = f64::from(camera.width) / 2.0;
+                camera.intrinsics.cy = f64::from(camera.height) / 2.0;
+            }),
+            Self::SwappedIntrinsics => with_each(cameras, |camera| {
+                let k = &mut camera.intrinsics;
+                (k.fx, k.fy, k.cx, k.cy) = (k.fy, k.fx, k.cy, k.cx);
+            }),
+            Self::Order(order) => order
+                .sources(names)
+                .into_iter()
+                .zip(cameras)
+                .map(|(source, camera)| Camera {
+                    world_from_camera: cameras[source].world_from_camera,
+                    center_in_world: cameras[source].center_in_world,
+                    ..*camera
+                })
+                .collect(),
+        }
+    }
+
+    /// How unusual it is: of two that explain the same, the simpler one holds.
+    pub fn complexity(&self) -> u32 {
+        match self {
+            Self::Convention { is: convention, .. } => {
+                let axes = match convention.axes {
+                    CameraAxes::OPENCV => 0,
+                    CameraAxes::OPENGL => 1,
+                    _ => 2,
+                };
+                let direction = match convention.direction {
+                    PoseDirection::CameraToWorld => 0,
+                    PoseDirection::WorldToCamera => 1,
+                    _ => 2,
+                };
+                axes + direction + u32::from(convention.mirrored_world)
+            }
+            _ => 1,
+        }
+    }
+}
+
+fn with_each(cameras: &[Camera], change: impl Fn(&mut Camera)) -> Vec<Camera> {
+    let changed = |camera: &Camera| {
+        let mut camera = *camera;
+        change(&mut camera);
+        camera
+    };
+    cameras.iter().map(changed).collect()
+}
+
+/// The matrix that `convention` makes the pose of `camera` of.
+pub(crate) fn stored_pose(camera: &Camera, convention: &PoseConvention) -> Matrix4<f64> {
+    let mut pose = camera.matrix_world_from_camera();
+    if convention.mirrored_world {
+        for column in 0..4 {
+            pose[(2, column)] = -pose[(2, column)];
+        }
+    }
+    let rotation = pose.fixed_view::<3, 3>(0, 0) * convention.axes.opencv_from_camera();
+    pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+    if convention.direction == PoseDirection::WorldToCameraTranslation {
+        let translation = -(rotation.transpose() * pose.fixed_view::<3, 1>(0, 3));
+        pose.fixed_view_mut::<3, 1>(0, 3).copy_from(&translation);
+        return pose;
+    }
+    // The other directions are their own inverses.
+    PoseConvention {
+        direction: convention.direction,
+        ..PoseConvention::default()
+    }
+    .world_from_camera(&pose)
+}
+
+/// All conventions but `read_as`, with the hand of the world that makes rigid
+/// poses of what is stored.
+pub(crate) fn conventions(camera: &Camera, read_as: PoseConvention) -> Vec<PoseConvention> {
+    let stored = stored_pose(camera, &read_as);
+    let right_handed = stored.fixed_view::<3, 3>(0, 0).determinant() > 0.0;
+    let mut conventions = Vec::new();
+    for direction in PoseDirection::ALL {
+        for axes in CameraAxes::all() {
+            let convention = PoseConvention {
+                direction,
+                axes,
+                mirrored_world: axes.is_right_handed() != right_handed,
+            };
+            if convention != read_as {
+                conventions.push(convention);
+            }
+        }
+    }
+    conventions
+}
+
+impl PoseOrder {
+    /// Orders that happen, for scenes of these views.
+    pub fn all(names: &[&str]) -> Vec<Self> {
+        let mut orders = vec![Self::Reversed];
+        orders.extend([1, -1, 2, -2, 3, -3].map(Self::Shifted));
+        if by_number(names).iter().enumerate().any(|(i, &j)| i != j) {
+            orders.extend([Self::ByNumber, Self::ByText]);
+        }
+        orders
+    }
+
+    /// For each view the index of the view whose pose it gets.
+    pub fn sources(self, names: &[&str]) -> Vec<usize> {
+        let count = names.len();
+        match self {
+            Self::Shifted(by) => (0..count as isize)
+                .map(|i| (i + by).rem_euclid(count as isize) as usize)
+                .collect(),
+            Self::Reversed => (0..count).rev().collect(),
+            Self::ByText => by_number(names),
+            Self::ByNumber => {
+                let mut sources = vec![0; count];
+                for (rank, view) in by_number(names).into_iter().enumerate() {
+                    sources[view] = rank;
+                }
+                sources
+            }
+        }
+    }
+}
+
+/// The views in the order of the numbers in their names.
+fn by_number(names: &[&str]) -> Vec<usize> {
+    let mut views: Vec<usize> = (0..names.len()).collect();
+    views.sort_by_cached_key(|&view| number_key(names[view]));
+    views
+}
+
+/// A name cut into texts and numbers, as people sort them.
+fn number_key(name: &str) -> Vec<(String, u128)> {
+    let mut key = Vec::new();
+    let mut rest = name;
+    while !rest.is_empty() {
+        let digits = rest
+            .find(|c: char| c.is_ascii_digit())
+            .unwrap_or(rest.len());
+        let (text, after) = rest.split_at(digits);
+        let end = after
+            .find(|c: char| !c.is_ascii_digit())
+            .unwrap_or(after.len());
+        let (number, after) = after.split_at(end);
+        // Numbers beyond 38 digits are equal: names are no place for them.
+        key.push((text.to_owned(), number.parse().unwrap_or(u128::MAX)));
+        rest = after;
+    }
+    key
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_stored_pose_is_what_the_convention_was_applied_to() {
+        let rotation = nalgebra::Rotation3::from_euler_angles(0.4, -1.2, 2.0);
+        let mut pose = rotation.to_homogeneous();
+        pose[(0, 3)] = 2.0;
+        pose[(2, 3)] = -1.0;
+        let intrinsics = neat_core::Intrinsics {
+            fx: 1.0,
+            fy: 1.0,
+            cx: 0.0,
+            cy: 0.0,
+            skew: 0.0,
+        };
+        let camera = Camera::from_matrices(intrinsics, &pose, 4, 3);
+        for read_as in conventions(&camera, PoseConvention::default()) {
+            let stored = stored_pose(&camera, &read_as);
+            let again = read_as.world_from_camera(&stored);
+            assert!((again - pose).amax() < 1e-12, "{read_as:?}");
+            assert_eq!(conventions(&camera, read_as).len(), 191);
+        }
+    }
+
+    #[test]
+    fn names_sorted_as_text_get_the_poses_of_their_numbers() {
+        let names = ["im1", "im10", "im11", "im2"];
+        assert_eq!(by_number(&names), [0, 3, 1, 2]);
+        // Poses in the order 1, 2, 10, 11; image im10 needs the third.
+        assert_eq!(PoseOrder::ByNumber.sources(&names), [0, 2, 3, 1]);
+        assert_eq!(PoseOrder::ByText.sources(&names), [0, 3, 1, 2]);
+        assert_eq!(PoseOrder::Shifted(-1).sources(&names), [3, 0, 1, 2]);
+        assert!(!PoseOrder::all(&["a1", "a2"]).contains(&PoseOrder::ByNumber));
+    }
+}

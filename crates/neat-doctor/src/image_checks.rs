@@ -1,0 +1,281 @@
+//! Images by themselves and against their intrinsics: sizes, brightness, blur,
+//! images that occur twice.
+
+use crate::examination::{Cause, Check, Finding, Level, counted, listed};
+use crate::gray_image::GrayImage;
+use neat_core::{Camera, Scene};
+use rayon::prelude::*;
+
+/// What one image is like.
+#[derive(Clone, Copy, Debug)]
+struct ImageStatistics {
+    /// Mean brightness in [0, 1].
+    mean: f32,
+    /// Share of pixels that are entirely black or white.
+    clipped: f32,
+    /// Brightest minus darkest.
+    contrast: f32,
+    /// The gradient that one of 200 pixels exceeds.
+    steepness: f32,
+    /// Whether the border has one colour, as around rendered objects.
+    plain_border: bool,
+}
+
+impl ImageStatistics {
+    fn new(image: &GrayImage) -> Self {
+        let values = &image.values;
+        let count = values.len() as f32;
+        let darkest = values.iter().copied().fold(f32::INFINITY, f32::min);
+        let brightest = values.iter().copied().fold(0.0, f32::max);
+        let clipped = values.iter().filter(|&&v| v <= 0.002 || v >= 0.998).count();
+        let [along_x, along_y] = image.gradients();
+        let mut steepness: Vec<f32> = (along_x.values.iter().zip(&along_y.values))
+            .map(|(x, y)| x.hypot(*y))
+            .collect();
+        let rank = steepness.len() - 1 - (steepness.len() - 1) / 200;
+        let (_, steep, _) = steepness.select_nth_unstable_by(rank, f32::total_cmp);
+        Self {
+            mean: values.iter().sum::<f32>() / count,
+            clipped: clipped as f32 / count,
+            contrast: brightest - darkest,
+            steepness: *steep,
+            plain_border: has_plain_border(image),
+        }
+    }
+}
+
+fn has_plain_border(image: &GrayImage) -> bool {
+    let corner = image.at(0, 0);
+    let (right, bottom) = (image.width - 1, image.height - 1);
+    let horizontal = (0..image.width).flat_map(|x| [(x, 0), (x, bottom)]);
+    let vertical = (0..image.height).flat_map(|y| [(0, y), (right, y)]);
+    let (mut plain, mut all) = (0, 0);
+    for (x, y) in horizontal.chain(vertical) {
+        all += 1;
+        plain += usize::from((image.at(x, y) - corner).abs() < 0.01);
+    }
+    10 * plain >= 9 * all
+}
+
+/// A brightness that differs from the median by this factor is remarkable.
+const EXPOSURE_FACTOR: f32 = 2.0;
+/// An image whose edges are this many times as steep as usual is blurred.
+const BLUR_FACTOR: f32 = 0.35;
+/// Less contrast than this, of 255 levels 5, and an image shows nothing.
+const MIN_CONTRAST: f32 = 0.02;
+
+/// What is found about the images.
+pub(crate) fn image_findings(scene: &Scene, working: &[(GrayImage, u32)]) -> Vec<Finding> {
+    let statistics: Vec<ImageStatistics> = (working.par_iter())
+        .map(|(image, _)| ImageStatistics::new(image))
+        .collect();
+    let mut findings = vec![sizes(scene)];
+    findings.extend(intrinsics(scene));
+    findings.push(exposure(scene, &statistics));
+    findings.push(sharpness(scene, &statistics));
+    findings.extend(duplicates(scene));
+    findings
+}
+
+/// Names of the views for which `holds` does.
+fn views_where(scene: &Scene, holds: impl Fn(usize) -> bool) -> Vec<String> {
+    (0..scene.views.len())
+        .filter(|&view| holds(view))
+        .map(|view| scene.views[view].name.clone())
+        .collect()
+}
+
+fn median(mut values: Vec<f32>) -> f32 {
+    values.sort_by(f32::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn sizes(scene: &Scene) -> Finding {
+    let size = |view: usize| scene.views[view].image.dimensions();
+    let mut all: Vec<_> = (0..scene.views.len()).map(size).collect();
+    all.sort_unstable();
+    let usual = all[all.len() / 2];
+    let others = views_where(scene, |view| size(view) != usual);
+    let [width, height] = [usual.0, usual.1];
+    if others.is_empty() {
+        let message = format!("all images have {width}×{height} pixels");
+        return Finding::new(Check::ImageSizes, Level::Good, message);
+    }
+    let message = format!(
+        "{} of {} have another size than {width}×{height}: {}",
+        others.len(),
+        counted(scene.views.len(), "image"),
+        listed(&others)
+    );
+    Finding::new(Check::ImageSizes, Level::Note, message).of_views(others)
+}
+
+/// Fields of view beyond these, in degrees, are seldom meant.
+const FIELD_OF_VIEW: [f64; 2] = [4.0, 130.0];
+
+fn intrinsics(scene: &Scene) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let camera = |view: usize| &scene.views[view].camera;
+    let off_middle = |camera: &Camera| {
+        let off = |center: f64, pixels: u32| (center / f64::from(pixels) - 0.5).abs();
+        off(camera.intrinsics.cx, camera.width).max(off(camera.intrinsics.cy, camera.height))
+    };
+    let far = views_where(scene, |view| off_middle(camera(view)) > 0.15);
+    if !far.is_empty() {
+        let k = camera(0).intrinsics;
+        let message = format!(
+            "the principal point of {} is far from the middle of the image, such as \
+             ({:.0}, {:.0}) in {}×{} pixels",
+            counted(far.len(), "view"),
+            k.cx,
+            k.cy,
+            camera(0).width,
+            camera(0).height
+        );
+        let finding = Finding::new(Check::Intrinsics, Level::Warning, message)
+            .because(Cause::PrincipalPoint)
+            .remedied_by("give the intrinsics of these very images: were they scaled or cut?");
+        findings.push(finding.of_views(far));
+    }
+    let field_of_view = |camera: &Camera| {
+        let half = f64::from(camera.width) / (2.0 * camera.intrinsics.fx);
+        2.0 * half.atan().to_degrees()
+    };
+    let [narrowest, widest] = FIELD_OF_VIEW;
+    let odd = views_where(scene, |view| {
+        !(narrowest..=widest).contains(&field_of_view(camera(view)))
+    });
+    if !odd.is_empty() {
+        let message = format!(
+            "the field of view of {} is unusual: {:.1}° to the sides in the first view",
+            counted(odd.len(), "view"),
+            field_of_view(camera(0))
+        );
+        let finding = Finding::new(Check::Intrinsics, Level::Warning, message)
+            .because(Cause::FocalLength)
+            .remedied_by("check that focal lengths are in pixels of these images");
+        findings.push(finding.of_views(odd));
+    }
+    let aspect = views_where(scene, |view| {
+        let k = camera(view).intrinsics;
+        (k.fx / k.fy - 1.0).abs() > 0.05
+    });
+    if !aspect.is_empty() {
+        let message = format!(
+            "the pixels of {} are not square: fx is {:.1} and fy {:.1} in the first view",
+            counted(aspect.len(), "view"),
+            camera(0).intrinsics.fx,
+            camera(0).intrinsics.fy
+        );
+        findings.push(Finding::new(Check::Intrinsics, Level::Note, message).of_views(aspect));
+    }
+    if findings.is_empty() {
+        let message = format!(
+            "the field of view is {:.0}°, the principal point near the middle",
+            field_of_view(camera(0))
+        );
+        findings.push(Finding::new(Check::Intrinsics, Level::Good, message));
+    }
+    findings
+}
+
+fn exposure(scene: &Scene, statistics: &[ImageStatistics]) -> Finding {
+    let empty = views_where(scene, |view| statistics[view].contrast < MIN_CONTRAST);
+    if !empty.is_empty() {
+        let level = if 2 * empty.len() > scene.views.len() {
+            Level::Problem
+        } else {
+            Level::Warning
+        };
+        let message = format!(
+            "{} of one colour: {}",
+            counted(empty.len(), "image"),
+            listed(&empty)
+        );
+        return Finding::new(Check::Exposure, level, message)
+            .because(Cause::Other)
+            .remedied_by("take these images out or export them again")
+            .of_views(empty);
+    }
+    let on_background = statistics.iter().filter(|s| s.plain_border).count();
+    if 2 * on_background > statistics.len() {
+        let message = "the object stands before a plain background";
+        return Finding::new(Check::Exposure, Level::Good, message);
+    }
+    let usual = median(statistics.iter().map(|s| s.mean).collect());
+    let odd = views_where(scene, |view| {
+        let ratio = statistics[view].mean / usual;
+        !(1.0 / EXPOSURE_FACTOR..=EXPOSURE_FACTOR).contains(&ratio)
+    });
+    let clipped = views_where(scene, |view| statistics[view].clipped > 0.3);
+    if !odd.is_empty() {
+        let message = format!(
+            "{} twice as bright or half as bright as usual, or beyond: {}",
+            counted(odd.len(), "image"),
+            listed(&odd)
+        );
+        return Finding::new(Check::Exposure, Level::Warning, message)
+            .because(Cause::Other)
+            .remedied_by("develop all photographs with one exposure, or take these out")
+            .of_views(odd);
+    }
+    if !clipped.is_empty() {
+        let message = format!(
+            "more than 30 % of the pixels of {} are black or white: {}",
+            counted(clipped.len(), "image"),
+            listed(&clipped)
+        );
+        return Finding::new(Check::Exposure, Level::Note, message).of_views(clipped);
+    }
+    let message = format!(
+        "all images are about as bright, {:.0} of 255",
+        255.0 * usual
+    );
+    Finding::new(Check::Exposure, Level::Good, message)
+}
+
+fn sharpness(scene: &Scene, statistics: &[ImageStatistics]) -> Finding {
+    let usual = median(statistics.iter().map(|s| s.steepness).collect());
+    let blurred = views_where(scene, |view| {
+        statistics[view].steepness < BLUR_FACTOR * usual
+            && statistics[view].contrast >= MIN_CONTRAST
+    });
+    if blurred.is_empty() {
+        let message = "no image is much less sharp than the others";
+        return Finding::new(Check::Sharpness, Level::Good, message);
+    }
+    let message = format!(
+        "{} much less sharp than usual: {}",
+        counted(blurred.len(), "image"),
+        listed(&blurred)
+    );
+    Finding::new(Check::Sharpness, Level::Warning, message)
+        .because(Cause::Other)
+        .remedied_by("take blurred images out where others show the same")
+        .of_views(blurred)
+}
+
+/// Images that are equal to the last bit.
+fn duplicates(scene: &Scene) -> Option<Finding> {
+    let mut order: Vec<usize> = (0..scene.views.len()).collect();
+    let pixels = |view: usize| scene.views[view].image.as_raw();
+    order.sort_by(|&a, &b| pixels(a).cmp(pixels(b)).then(a.cmp(&b)));
+    let mut twice: Vec<usize> = (order.windows(2))
+        .filter(|pair| pixels(pair[0]) == pixels(pair[1]))
+        .map(|pair| pair[1])
+        .collect();
+    if twice.is_empty() {
+        return None;
+    }
+    twice.sort_unstable();
+    let names: Vec<String> = twice.iter().map(|&v| scene.views[v].name.clone()).collect();
+    let message = format!(
+        "{} the same as another one to the last pixel: {}",
+        counted(names.len(), "image"),
+        listed(&names)
+    );
+    let finding = Finding::new(Check::Duplicates, Level::Warning, message)
+        .because(Cause::Other)
+        .remedied_by("keep one image of each and its pose");
+    Some(finding.of_views(names))
+}
