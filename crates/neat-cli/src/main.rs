@@ -8,6 +8,7 @@ mod error;
 mod interrupt;
 mod output;
 mod progress;
+mod scene_arguments;
 
 use arguments::Cli;
 use clap::Parser;

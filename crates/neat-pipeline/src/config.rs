@@ -5,6 +5,7 @@
 
 use crate::background::Background;
 use neat_core::SphereChoice;
+use neat_core::layout::PoseConvention;
 use neat_detect::DetectorConfig;
 use neat_field::AttractionNetworkConfig;
 use neat_gjp::{CandidateConfig, MatchingConfig, PerceiverConfig};
@@ -47,6 +48,18 @@ pub struct DataConfig {
     /// or `x,y,z,radius` in the frame of the files.
     #[serde(default)]
     pub scene_sphere: SphereChoice,
+    /// What the poses really are, where they are not what their layout says.
+    #[serde(default)]
+    pub pose_convention: Option<PoseConvention>,
+    /// Multiplies the focal lengths of the files.
+    #[serde(default)]
+    pub focal_scale: Option<f64>,
+    /// Multiplies the intrinsics of the files, for images of another size.
+    #[serde(default)]
+    pub intrinsics_scale: Option<f64>,
+    /// Images with a longer side than this, in pixels, are scaled down.
+    #[serde(default)]
+    pub max_image_size: Option<u32>,
     /// What lies behind the object; `None` changes nothing.
     #[serde(default)]
     pub background: Option<Background>,

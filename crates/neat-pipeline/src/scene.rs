@@ -44,6 +44,7 @@ pub fn prepare_scene(
     let detected = !dir.join(HAWP_DIR).is_dir();
     let options = LoadOptions {
         require_wireframes: !detected,
+        cache_dir: cache.map(|cache| cache.dir().into()),
         ..load_options(&config.data)
     };
     let mut seconds = BTreeMap::new();
@@ -84,6 +85,10 @@ pub fn load_options(config: &DataConfig) -> LoadOptions {
         pixel_center: config.pixel_center,
         min_segment_score: config.min_segment_score,
         sphere: config.scene_sphere,
+        pose_convention: config.pose_convention,
+        focal_scale: config.focal_scale,
+        intrinsics_scale: config.intrinsics_scale,
+        max_image_size: config.max_image_size,
         ..LoadOptions::default()
     }
 }

@@ -4,6 +4,7 @@ use crate::arguments::{ComputeArgs, MethodArgs};
 use crate::cache::CacheArgs;
 use crate::error::CliError;
 use crate::progress::Progress;
+use crate::scene_arguments::SceneArgs;
 use crate::{interrupt, output};
 use clap::Args;
 use neat_pipeline::reconstruct::{RunOptions, train};
@@ -28,7 +29,8 @@ pub struct TrainArgs {
 /// A scene, a run folder, and how to get from one to the other.
 #[derive(Debug, Args)]
 pub struct RunArgs {
-    /// Folder of the scene: images, poses and 2D wireframes (see `neat info`)
+    /// Folder of the scene: images, poses and, unless they are to be detected, 2D wireframes (see
+    /// `neat info`)
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Folder for everything that the run leaves; it must be new or empty
@@ -38,7 +40,7 @@ pub struct RunArgs {
     #[arg(long)]
     overwrite: bool,
     /// Continue the run in that folder from its last checkpoint, with its configuration and seed
-    #[arg(long, conflicts_with_all = ["overwrite", "preset", "config", "seed"])]
+    #[arg(long, conflicts_with_all = ["overwrite", "preset", "config", "seed", "SceneArgs"])]
     resume: bool,
     #[command(flatten)]
     method: MethodArgs,
@@ -49,6 +51,8 @@ pub struct RunArgs {
     compute: ComputeArgs,
     #[command(flatten)]
     cache: CacheArgs,
+    #[command(flatten)]
+    pub scene_args: SceneArgs,
 }
 
 impl RunArgs {
@@ -61,7 +65,8 @@ impl RunArgs {
             (Existing::Resume, config, manifest.preset, manifest.seed)
         } else {
             let existing = existing(self.overwrite);
-            let config = self.method.config()?;
+            let mut config = self.method.config()?;
+            config.data = self.scene_args.apply(config.data);
             (existing, config, self.method.name(), self.seed)
         };
         Ok(RunOptions {

@@ -1,0 +1,61 @@
+//! How a scene is read.
+
+use crate::arguments::positive;
+use clap::Args;
+use neat_core::SphereChoice;
+use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
+use neat_pipeline::config::DataConfig;
+
+/// How a scene is read, where its files do not say or say wrongly.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Scene")]
+pub struct SceneArgs {
+    /// The part of space to model: around what the file declares, the sparse points, what the
+    /// cameras look at, or the masks (file, points, cameras, masks), the first of them that fits
+    /// (auto), or x,y,z,radius in the frame of the files
+    #[arg(long, value_name = "WHERE", allow_hyphen_values = true)]
+    scene_sphere: Option<SphereChoice>,
+    /// Scale images down so that their longer side has at most so many pixels; intrinsics and 2D
+    /// wireframes follow
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..))]
+    max_image_size: Option<u32>,
+    /// Where the poses lead: camera-to-world, world-to-camera, transposed-rotation or
+    /// world-to-camera-translation
+    #[arg(long, value_name = "DIRECTION")]
+    poses: Option<PoseDirection>,
+    /// Where the camera's x, y and z axes point, such as right-down-forward (OpenCV) or
+    /// right-up-back (OpenGL)
+    #[arg(long, value_name = "AXES")]
+    camera_axes: Option<CameraAxes>,
+    /// The world of the poses is left-handed
+    #[arg(long)]
+    mirrored_world: bool,
+    /// Multiply the focal lengths of the files
+    #[arg(long, value_name = "FACTOR", value_parser = positive)]
+    focal_scale: Option<f64>,
+    /// Multiply the intrinsics of the files: 0.5 for images of half the size that they are for
+    #[arg(long, value_name = "FACTOR", value_parser = positive)]
+    intrinsics_scale: Option<f64>,
+}
+
+impl SceneArgs {
+    /// `data` with everything that was given.
+    pub fn apply(&self, mut data: DataConfig) -> DataConfig {
+        if let Some(sphere) = self.scene_sphere {
+            data.scene_sphere = sphere;
+        }
+        data.max_image_size = self.max_image_size.or(data.max_image_size);
+        data.focal_scale = self.focal_scale.or(data.focal_scale);
+        data.intrinsics_scale = self.intrinsics_scale.or(data.intrinsics_scale);
+        let stored = data.pose_convention.unwrap_or_default();
+        let convention = PoseConvention {
+            direction: self.poses.unwrap_or(stored.direction),
+            axes: self.camera_axes.unwrap_or(stored.axes),
+            mirrored_world: self.mirrored_world || stored.mirrored_world,
+        };
+        if convention != stored {
+            data.pose_convention = Some(convention);
+        }
+        data
+    }
+}
