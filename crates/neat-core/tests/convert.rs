@@ -4,6 +4,7 @@
 use image::{Rgb, RgbImage};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
 use neat_core::convert::{POINTS_FILE, SceneFormat, convert};
+use neat_core::layout::SceneWarning;
 use neat_core::npz::NpzReader;
 use neat_core::point_cloud::read_ply;
 use neat_core::{
@@ -415,4 +416,35 @@ fn bad_targets_and_names_are_refused() {
     let target = parent.path().join("bad");
     assert!(convert(&bad, SceneFormat::Colmap, &target).is_err());
     assert!(!target.exists());
+}
+
+/// A lens is put into the files of a scene; what is written of that is a pinhole.
+#[test]
+fn distorted_scenes_are_written_undistorted() {
+    let parent = tempfile::tempdir().unwrap();
+    let distorted = parent.path().join("distorted");
+    convert(&scene(0.5), SceneFormat::Colmap, &distorted).unwrap();
+    let cameras = distorted.join("sparse/0/cameras.txt");
+    let pinholes = fs::read_to_string(&cameras).unwrap();
+    let lens = |line: &str| match line.starts_with('#') {
+        true => format!("{line}\n"),
+        false => format!(
+            "{} -0.2 0.05 0.001 -0.002\n",
+            line.replace("PINHOLE", "OPENCV")
+        ),
+    };
+    fs::write(&cameras, pinholes.lines().map(lens).collect::<String>()).unwrap();
+
+    let loaded = load_scene(&distorted, &LoadOptions::default()).unwrap();
+    let undistorted = SceneWarning::Undistorted {
+        lenses: vec!["Brown"],
+        views: 3,
+    };
+    assert_eq!(loaded.warnings, [undistorted]);
+    assert_ne!(loaded.scene.views[0].image, scene(0.5).views[0].image);
+    for format in FORMATS {
+        let dir = parent.path().join(format!("{format:?}"));
+        convert(&loaded.scene, format, &dir).unwrap();
+        assert_same(&load(&dir), &loaded.scene, &format!("{format:?}"));
+    }
 }
