@@ -104,7 +104,7 @@ pub fn write(path: &Path, wireframe: &Wireframe2d, pixel_center: f64) -> Result<
     file::write_atomically(path, &to_bytes(wireframe, pixel_center))
 }
 
-/// What [`write`] writes.
+/// What [`write()`] writes.
 pub fn to_bytes(wireframe: &Wireframe2d, pixel_center: f64) -> Vec<u8> {
     let json = HawpJson {
         vertices: Pairs::Nested(

@@ -4,6 +4,7 @@
 use image::{Rgb, RgbImage};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector2, Vector3, Vector4};
 use neat_core::convert::{POINTS_FILE, SceneFormat, convert};
+use neat_core::layout::SceneWarning;
 use neat_core::npz::NpzReader;
 use neat_core::point_cloud::read_ply;
 use neat_core::{
@@ -86,7 +87,7 @@ fn scene(pixel_center: f64) -> Scene {
             translation: Vector3::new(500.0, 7.5, -3.0),
         },
         pixel_center,
-        sphere_radius: 1.0,
+        sphere_radius: 0.75,
         sparse_points,
     }
 }
@@ -140,6 +141,24 @@ fn every_format_reads_back() {
             assert_same(&load(&dir), &scene, &context);
             // No temporary folder is left.
             assert_eq!(fs::read_dir(dir.parent().unwrap()).unwrap().count(), 1);
+            let back = load(&dir);
+            assert_eq!(back.sparse_points.len(), 3, "{context}");
+            for (found, expected) in back.sparse_points.iter().zip(&scene.sparse_points) {
+                let original = |scene: &Scene, point: &SparsePoint| {
+                    scene.original_from_world.apply(&point.position_in_world)
+                };
+                let difference = original(&back, found) - original(&scene, expected);
+                assert!(difference.norm() < 1e-9, "{context}");
+                // Only COLMAP's files say where points were seen.
+                if format == SceneFormat::Colmap {
+                    let shift = 0.5 - pixel_center;
+                    assert_eq!(found.observations.len(), expected.observations.len());
+                    for (a, b) in found.observations.iter().zip(&expected.observations) {
+                        assert_eq!(a.view, b.view);
+                        assert!((a.pixel - b.pixel.add_scalar(shift)).norm() < 1e-9);
+                    }
+                }
+            }
             if format != SceneFormat::Colmap {
                 let points = read_ply(&dir.join(POINTS_FILE)).unwrap();
                 for (found, point) in points.iter().zip(&scene.sparse_points) {
@@ -335,7 +354,8 @@ fn idr_reads_projections_of_the_original_frame() {
         let point = scene.sparse_points[0].position_in_world;
         let expected = view.camera.project(&point);
         for homogeneous in [
-            world * scale * point.push(1.0),
+            // The scene sphere is the unit ball of the normalised world.
+            world * scale * (point / scene.sphere_radius).push(1.0),
             world * scene.original_from_world.apply(&point).push(1.0),
         ] {
             let found = Vector2::new(homogeneous.x, homogeneous.y) / homogeneous.z;
@@ -396,4 +416,35 @@ fn bad_targets_and_names_are_refused() {
     let target = parent.path().join("bad");
     assert!(convert(&bad, SceneFormat::Colmap, &target).is_err());
     assert!(!target.exists());
+}
+
+/// A lens is put into the files of a scene; what is written of that is a pinhole.
+#[test]
+fn distorted_scenes_are_written_undistorted() {
+    let parent = tempfile::tempdir().unwrap();
+    let distorted = parent.path().join("distorted");
+    convert(&scene(0.5), SceneFormat::Colmap, &distorted).unwrap();
+    let cameras = distorted.join("sparse/0/cameras.txt");
+    let pinholes = fs::read_to_string(&cameras).unwrap();
+    let lens = |line: &str| match line.starts_with('#') {
+        true => format!("{line}\n"),
+        false => format!(
+            "{} -0.2 0.05 0.001 -0.002\n",
+            line.replace("PINHOLE", "OPENCV")
+        ),
+    };
+    fs::write(&cameras, pinholes.lines().map(lens).collect::<String>()).unwrap();
+
+    let loaded = load_scene(&distorted, &LoadOptions::default()).unwrap();
+    let undistorted = SceneWarning::Undistorted {
+        lenses: vec!["Brown"],
+        views: 3,
+    };
+    assert_eq!(loaded.warnings, [undistorted]);
+    assert_ne!(loaded.scene.views[0].image, scene(0.5).views[0].image);
+    for format in FORMATS {
+        let dir = parent.path().join(format!("{format:?}"));
+        convert(&loaded.scene, format, &dir).unwrap();
+        assert_same(&load(&dir), &loaded.scene, &format!("{format:?}"));
+    }
 }

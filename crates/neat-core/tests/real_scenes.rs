@@ -543,7 +543,6 @@ fn spheres_hold_their_scenes() {
                 ..LoadOptions::default()
             };
             let loaded = load_scene(&dir, &options).unwrap();
-            println!("{name}: {}", loaded.sphere);
             if choice == SphereChoice::Cameras {
                 assert_eq!(loaded.sphere.source, Cameras);
                 continue;

@@ -5,7 +5,7 @@ use super::{POINTS_FILE, image_name, points, write_images};
 use crate::layout::dtu::{scale_mat, world_mat};
 use crate::layout::poses::{CAMERAS_NPZ, PIXEL_CENTER, number_array};
 use crate::npz::{NpyArray, write_npz};
-use crate::{Scene, SceneError};
+use crate::{Scene, SceneError, Similarity};
 use nalgebra::Matrix4;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,7 +14,12 @@ const IMAGES_DIR: &str = "image";
 
 pub(super) fn write(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
     let mut arrays = BTreeMap::new();
-    let scale = scene.original_from_world.matrix();
+    // Programs of this layout model the unit ball of the normalised world.
+    let original_from_unit = Similarity {
+        scale: scene.original_from_world.scale * scene.sphere_radius,
+        ..scene.original_from_world
+    };
+    let scale = original_from_unit.matrix();
     let world_from_original = scene.original_from_world.inverse().matrix();
     // The i-th camera is that of the i-th file: `a-b.png` is before `a.png`.
     let mut views: Vec<_> = scene.views.iter().collect();
