@@ -382,7 +382,23 @@ fn missing_files_are_named() {
 
         let dir = images_dir();
         (format.write)(dir.path());
+        let all = load_scene(dir.path(), &options).unwrap().scene;
         fs::remove_file(dir.path().join("images/a.png")).unwrap();
+        let loaded = load_scene(dir.path(), &options).unwrap();
+        let warning = loaded.warnings[0].to_string();
+        assert!(warning.contains("/a."), "{:?}: {warning}", format.layout);
+        assert_eq!(loaded.scene.views.len(), all.views.len() - 1);
+        // Observations of the views that are left still meet their points.
+        for point in &loaded.scene.sparse_points {
+            for seen in &point.observations {
+                let camera = &loaded.scene.views[seen.view].camera;
+                let projected = camera.project(&point.position_in_world).pixel;
+                assert!((projected - seen.pixel).norm() < 1.0, "{:?}", format.layout);
+            }
+        }
+        for view in &all.views[1..] {
+            fs::remove_file(dir.path().join(format!("images/{}.png", view.name))).unwrap();
+        }
         let error = load_scene(dir.path(), &options).unwrap_err();
         assert!(matches!(error, SceneError::Missing { .. }), "{error}");
     }

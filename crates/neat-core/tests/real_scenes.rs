@@ -296,14 +296,11 @@ fn the_castle_agrees_with_the_cameras_and_tracks_made_from_it() {
         sphere: SphereChoice::File,
         ..LoadOptions::default()
     };
-    let missing = load_scene(castle.path(), &options).unwrap_err();
-    assert!(missing.to_string().contains("00010.jpg"), "{missing}");
-    RgbImage::new(2832, 2128)
-        .save(images.join("00010.jpg"))
-        .unwrap();
-
-    let scene = load_as(castle.path(), Layout::OpenMvs);
-    assert_eq!((scene.views.len(), scene.pixel_center), (11, 0.0));
+    let loaded = load_scene(castle.path(), &options).unwrap();
+    let missing = loaded.warnings[0].to_string();
+    assert!(missing.contains("00010.jpg"), "{missing}");
+    let scene = loaded.scene;
+    assert_eq!((scene.views.len(), scene.pixel_center), (10, 0.0));
     let (k, pose) = differences(&scene, &json_cameras(&dir));
     assert!(k < 1e-12 && pose < 1e-12, "{k:e} {pose:e}");
 
@@ -318,7 +315,8 @@ fn the_castle_agrees_with_the_cameras_and_tracks_made_from_it() {
     for (index, point) in scene.sparse_points.iter().enumerate() {
         let expected = Vector3::from_fn(|axis, _| positions[index][axis].as_f64().unwrap());
         assert!((point.position_in_world - expected).amax() < 1e-6);
-        let expected: Vec<_> = views[index].as_array().unwrap().iter().collect();
+        let mut expected: Vec<_> = views[index].as_array().unwrap().iter().collect();
+        expected.retain(|view| **view != 10);
         let found = point.observations.iter().map(|seen| seen.view as u64);
         // All but those that a point far off puts behind a camera.
         assert!(

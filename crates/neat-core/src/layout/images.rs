@@ -57,6 +57,14 @@ const REMEDY: &str = "put the image there or remove its pose";
 /// without files.
 pub(super) type ReadSize = fn(&Path) -> Result<(u32, u32), SceneError>;
 
+/// The error about an image that is not there.
+pub(super) fn missing(path: &Path) -> SceneError {
+    SceneError::Missing {
+        path: path.into(),
+        remedy: REMEDY.into(),
+    }
+}
+
 /// Width and height, from the first bytes of an image.
 pub(super) fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
     ImageReader::open(path)

@@ -69,12 +69,14 @@ pub fn load_scene(dir: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded
 pub(super) fn load_posed(
     dir: &Path,
     layout: Layout,
-    poses: Poses,
+    mut poses: Poses,
     options: &LoadOptions,
 ) -> Result<LoadedScene, SceneError> {
     if poses.views.is_empty() {
         return Err(SceneError::NoView { path: dir.into() });
     }
+    let mut warnings = Vec::new();
+    warnings.extend(drop_missing_images(&mut poses)?);
     check_names(poses.views.iter().map(|view| view.name.as_str()), dir)?;
     let hawp_dir = dir.join(HAWP_DIR);
     // Before the images, which take seconds to decode.
@@ -88,7 +90,6 @@ pub(super) fn load_posed(
     let cameras = try_par_map(&poses.views, |posed| {
         camera_of(posed, images::read_size(&posed.image)?, &poses.path)
     })?;
-    let mut warnings = Vec::new();
     let told = match options.pixel_center {
         PixelCenter::Integer => Some(0.0),
         PixelCenter::Half => Some(0.5),
@@ -194,6 +195,42 @@ pub(super) fn load_posed(
         layout,
         warnings,
     })
+}
+
+/// Leaves out the views whose images are not there: scenes are often passed on
+/// without some of them. Errs if that are more than half.
+fn drop_missing_images(poses: &mut Poses) -> Result<Option<SceneWarning>, SceneError> {
+    let is_there: Vec<bool> = (poses.views.iter())
+        .map(|view| view.image.exists())
+        .collect();
+    let missing: Vec<&PosedImage> = (poses.views.iter().zip(&is_there))
+        .filter_map(|(view, is_there)| (!is_there).then_some(view))
+        .collect();
+    let Some(first) = missing.first() else {
+        return Ok(None);
+    };
+    if 2 * missing.len() > poses.views.len() {
+        return Err(images::missing(&first.image));
+    }
+    let warning = SceneWarning::ImagesMissing {
+        first: first.image.clone(),
+        views: missing.len(),
+    };
+    let mut next = 0..;
+    let new_index: Vec<Option<usize>> = (is_there.iter())
+        .map(|&is_there| is_there.then(|| next.next()).flatten())
+        .collect();
+    for point in &mut poses.points {
+        point.observations = (point.observations.iter())
+            .filter_map(|&Observation { view, pixel }| {
+                let view = (*new_index.get(view)?)?;
+                Some(Observation { view, pixel })
+            })
+            .collect();
+    }
+    let mut is_there = is_there.into_iter();
+    poses.views.retain(|_| is_there.next() == Some(true));
+    Ok(Some(warning))
 }
 
 /// How many views were undistorted, and how many scaled down.

@@ -12,6 +12,13 @@ pub enum SceneWarning {
         /// The value taken.
         pixel_center: f64,
     },
+    /// Views were left out because their images are not there.
+    ImagesMissing {
+        /// The first of the images.
+        first: PathBuf,
+        /// How many views.
+        views: usize,
+    },
     /// Photographs were undistorted: the scene's cameras are the pinholes that
     /// took their place.
     Undistorted {
@@ -52,6 +59,11 @@ impl fmt::Display for SceneWarning {
             Self::PixelCenterAssumed { pixel_center } => write!(
                 f,
                 "the intrinsics do not tell where pixel centres are: {pixel_center} is assumed"
+            ),
+            Self::ImagesMissing { first, views } => write!(
+                f,
+                "{views} views are left out because their images are not there, such as {}",
+                first.display()
             ),
             Self::Undistorted { lenses, views } => write!(
                 f,
