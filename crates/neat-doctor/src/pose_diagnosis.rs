@@ -25,7 +25,7 @@ pub(crate) struct Diagnosis<'a> {
     gathered: &'a Gathered,
     cameras: Vec<Camera>,
     names: Vec<&'a str>,
-    read_as: PoseConvention,
+    read_with: Repair,
     /// The poses could only be read by mirroring the world.
     mirrored: bool,
 }
@@ -69,7 +69,7 @@ impl<'a> Diagnosis<'a> {
     pub fn new(
         scene: &'a Scene,
         gathered: &'a Gathered,
-        read_as: PoseConvention,
+        read_with: Repair,
         mirrored: bool,
     ) -> Self {
         Self {
@@ -77,9 +77,13 @@ impl<'a> Diagnosis<'a> {
             gathered,
             cameras: scene.views.iter().map(|view| view.camera).collect(),
             names: scene.views.iter().map(|view| view.name.as_str()).collect(),
-            read_as,
+            read_with,
             mirrored,
         }
+    }
+
+    fn read_as(&self) -> PoseConvention {
+        self.read_with.pose_convention.unwrap_or_default()
     }
 
     fn evidence(&self) -> &Evidence {
@@ -104,14 +108,24 @@ impl<'a> Diagnosis<'a> {
         trusted
     }
 
-    /// Whether the given cameras explain what they should, and nothing has to be
-    /// searched for.
+    /// Whether the given cameras explain what they should, in all views and
+    /// better than with other focal lengths: nothing has to be searched for.
     pub fn is_plainly_good(&self) -> bool {
-        let given = self
-            .evidence()
-            .agreement(&self.cameras, &self.all_trusted());
+        const FOCAL_SCALES: [f64; 6] = [0.8, 0.9, 0.95, 1.05, 1.1, 1.25];
+        let trusted = self.all_trusted();
+        let given = self.evidence().agreement(&self.cameras, &trusted);
         let limits = Limits::of(self.evidence(), self.gathered.views.len());
-        !self.mirrored && given.all.total >= limits.min_total && given.share() >= limits.good_share
+        let explains = given.all.total >= limits.min_total && given.share() >= limits.good_share;
+        let focal_is_better = || {
+            FOCAL_SCALES.into_par_iter().any(|scale| {
+                let other = self.try_out(Hypothesis::FocalScale(scale), &self.cameras, &trusted);
+                other.agreement.score > CLEARLY * given.score
+            })
+        };
+        !self.mirrored
+            && explains
+            && !focal_is_better()
+            && self.without_bad_views(trusted.clone()) == trusted
     }
 
     /// That the given cameras agree with the images.
@@ -182,28 +196,25 @@ impl<'a> Diagnosis<'a> {
             .into_iter()
             .filter(|candidate| candidate.agreement.score >= EQUALLY * best)
             .min_by_key(|candidate| candidate.hypothesis.complexity())?;
-        let clear = candidate.agreement.score > CLEARLY * given.score
-            && candidate.agreement.share() >= min_share;
-        if !clear {
-            return None;
+        let mut found = vec![candidate];
+        if !matches!(found[0].hypothesis, Hypothesis::FocalScale(_)) {
+            // Scenes of other programs can be wrong in two ways.
+            let focal = self.best_focal(&found[0].cameras, trusted);
+            if focal.agreement.score > CLEARLY * found[0].agreement.score {
+                found.push(focal);
+            }
         }
-        // Scenes of other programs can be wrong in two ways.
-        let focal = self.best_focal(&candidate.cameras, trusted);
-        let also_focal = !matches!(candidate.hypothesis, Hypothesis::FocalScale(_))
-            && focal.agreement.score > CLEARLY * candidate.agreement.score;
-        Some(if also_focal {
-            vec![candidate, focal]
-        } else {
-            vec![candidate]
-        })
+        let agreement = &found.last()?.agreement;
+        let clear = agreement.score > CLEARLY * given.score && agreement.share() >= min_share;
+        clear.then_some(found)
     }
 
     fn hypotheses(&self) -> Vec<Hypothesis> {
         let convention = |is| Hypothesis::Convention {
-            read_as: self.read_as,
+            read_as: self.read_as(),
             is,
         };
-        let mut hypotheses: Vec<_> = conventions(&self.cameras[0], self.read_as)
+        let mut hypotheses: Vec<_> = conventions(&self.cameras[0], self.read_as())
             .into_iter()
             .map(convention)
             .collect();
@@ -255,7 +266,7 @@ impl<'a> Diagnosis<'a> {
             return self.disagreement(given);
         };
         let after = last.agreement.share();
-        let mut repair = Repair::default();
+        let mut repair = self.read_with;
         let mut cause = None;
         let mut reasons = Vec::new();
         let mut remedy = None;
@@ -267,12 +278,14 @@ impl<'a> Diagnosis<'a> {
             match candidate.hypothesis {
                 Hypothesis::Convention { is, .. } => repair.pose_convention = Some(is),
                 Hypothesis::FocalScale(scale) => {
-                    repair.focal_scale = Some(scale);
+                    repair.focal_scale = Some(times(repair.focal_scale, scale));
                     if candidates.len() == 1 && scale.max(1.0 / scale) < BAD_FOCAL_FACTOR {
                         level = Level::Warning;
                     }
                 }
-                Hypothesis::IntrinsicsScale(scale) => repair.intrinsics_scale = Some(scale),
+                Hypothesis::IntrinsicsScale(scale) => {
+                    repair.intrinsics_scale = Some(times(repair.intrinsics_scale, scale));
+                }
                 Hypothesis::CenteredPrincipalPoint => {
                     remedy = Some(
                         "give the principal point of these very images, \
@@ -292,8 +305,7 @@ impl<'a> Diagnosis<'a> {
                 }
             }
         }
-        let flags = repair.to_string();
-        let remedy = remedy.unwrap_or_else(|| format!("run it with `{flags}`"));
+        let remedy = remedy.unwrap_or_else(|| run_with(&repair));
         let message = format!(
             "{}: so read, the cameras explain {} of {} {} instead of {}",
             reasons.join(", and "),
@@ -303,7 +315,7 @@ impl<'a> Diagnosis<'a> {
             percent(given.share()),
         );
         Finding {
-            repair: (repair != Repair::default()).then_some(repair),
+            repair: (repair != self.read_with).then_some(repair),
             ..Finding::new(Check::Poses, level, message)
         }
         .because(cause.unwrap_or(Cause::PosesDisagree))
@@ -351,12 +363,13 @@ impl<'a> Diagnosis<'a> {
     }
 
     fn convention_reason(&self, is: &PoseConvention) -> (Cause, String) {
-        let axes = (is.axes != self.read_as.axes).then(|| match is.axes {
+        let read_as = self.read_as();
+        let axes = (is.axes != read_as.axes).then(|| match is.axes {
             CameraAxes::OPENGL => "the camera axes are OpenGL's, x right, y up, z back".to_owned(),
             CameraAxes::OPENCV => "the camera axes are OpenCV's, x right, y down, z forward".into(),
             axes => format!("the camera axes are {axes}"),
         });
-        let direction = (is.direction != self.read_as.direction).then(|| match is.direction {
+        let direction = (is.direction != read_as.direction).then(|| match is.direction {
             PoseDirection::CameraToWorld => "the poses are camera-to-world".to_owned(),
             PoseDirection::WorldToCamera => "the poses are inverted, world-to-camera".into(),
             PoseDirection::TransposedRotation => {
@@ -366,7 +379,7 @@ impl<'a> Diagnosis<'a> {
                 "the translations are world-to-camera beside camera-to-world rotations".into()
             }
         });
-        let mirrored = (self.mirrored || is.mirrored_world != self.read_as.mirrored_world)
+        let mirrored = (self.mirrored || is.mirrored_world != read_as.mirrored_world)
             .then(|| "the poses are mirrored".to_owned());
         let cause = if mirrored.is_some() {
             Cause::MirroredPoses
@@ -400,13 +413,9 @@ impl<'a> Diagnosis<'a> {
         if given.share() < limits.good_share {
             return finding.remedied_by("convert them to right-handed OpenCV axes");
         }
-        let repair = Repair {
-            pose_convention: Some(self.read_as),
-            ..Repair::default()
-        };
         Finding {
-            repair: Some(repair),
-            ..finding.remedied_by(format!("run it with `{repair}`"))
+            repair: Some(self.read_with),
+            ..finding.remedied_by(run_with(&self.read_with))
         }
     }
 
@@ -549,6 +558,18 @@ impl<'a> Diagnosis<'a> {
         )
         .because(Cause::PosesDisagree)
         .remedied_by("look at a few views for moving things, lens distortion or bad poses")
+    }
+}
+
+/// A factor on top of the one there was, with four digits.
+fn times(before: Option<f64>, scale: f64) -> f64 {
+    (before.unwrap_or(1.0) * scale * 1e4).round() / 1e4
+}
+
+fn run_with(repair: &Repair) -> String {
+    match repair.to_string().as_str() {
+        "" => "run it without flags that change poses or intrinsics".into(),
+        flags => format!("run it with `{flags}`"),
     }
 }
 
