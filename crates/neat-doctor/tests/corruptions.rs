@@ -9,6 +9,7 @@ use neat_core::{LoadOptions, Scene, load_scene};
 use neat_doctor::{
     Cause, Check, Depth, ExamineOptions, Level, Repair, Verdict, examine, examine_folder,
 };
+use proptest::prelude::*;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -170,6 +171,45 @@ fn two_images_that_traded_places_are_both_named() {
 }
 
 #[test]
+fn rarer_faults_are_named_too() {
+    type Spoil = fn(&mut Scene);
+    let faults: [(Spoil, Cause); 3] = [
+        (
+            |scene| {
+                for view in &mut scene.views {
+                    view.camera.world_from_camera.transpose_mut();
+                }
+            },
+            Cause::TransposedRotations,
+        ),
+        (
+            |scene| {
+                let cameras: Vec<_> = scene.views.iter().map(|view| view.camera).collect();
+                for (view, camera) in scene.views.iter_mut().zip(cameras.into_iter().rev()) {
+                    view.camera = camera;
+                }
+            },
+            Cause::ImageOrder,
+        ),
+        (
+            |scene| {
+                for view in &mut scene.views {
+                    view.camera.intrinsics.cx *= 0.5;
+                }
+            },
+            Cause::PrincipalPoint,
+        ),
+    ];
+    for (spoil, cause) in faults {
+        let mut scene = synthetic(Solid::UPrism, 30);
+        spoil(&mut scene);
+        let examination = examine(&scene, &ExamineOptions::default());
+        let problem = examination.problems().next().unwrap();
+        assert_eq!(problem.cause, Some(cause), "{examination}");
+    }
+}
+
+#[test]
 fn images_sorted_as_text_and_poses_by_number_are_told_apart() {
     let mut scene = synthetic(Solid::LPrism, 40);
     for (index, view) in scene.views.iter_mut().enumerate() {
@@ -305,6 +345,53 @@ fn images_of_half_size_with_sizes_in_the_file_are_repaired_by_a_flag() {
 fn first_cause(dir: &Path) -> Option<Cause> {
     let examination = examine_folder(dir, &load_options(), &ExamineOptions::default());
     examination.problems().next()?.cause
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn cameras_of_any_kind_are_examined_without_panic(
+        size in (1u32..70, 1u32..70),
+        focal in -3.0..9.0f64,
+        principal in prop::array::uniform2(-1e9..1e9f64),
+        centers in prop::collection::vec(prop::array::uniform3(-1e12..1e12f64), 1..12),
+        texture: u32,
+    ) {
+        let (width, height) = size;
+        let mut scene = synthetic_frame(width, height, texture, centers.len());
+        for (view, center) in scene.views.iter_mut().zip(&centers) {
+            view.camera.intrinsics.fx = 10f64.powf(focal);
+            [view.camera.intrinsics.cx, view.camera.intrinsics.cy] = principal;
+            view.camera.center_in_world = (*center).into();
+        }
+        let examination = examine(&scene, &ExamineOptions::default());
+        prop_assert!(examination.to_string().contains("Verdict"));
+    }
+}
+
+/// Views of noise from one place.
+fn synthetic_frame(width: u32, height: u32, texture: u32, views: usize) -> Scene {
+    let config = SyntheticScene {
+        views: 1,
+        image_size: 16,
+        ..SyntheticScene::default()
+    };
+    let mut scene = generate(&config).unwrap().scene;
+    let first = scene.views.remove(0);
+    for index in 0..views {
+        let mut view = first.clone();
+        view.name = format!("view{index:02}");
+        (view.camera.width, view.camera.height) = (width, height);
+        view.wireframe = neat_core::Wireframe2d::empty(width, height);
+        view.image = image::RgbImage::from_fn(width, height, |x, y| {
+            let mixed = (x * 7919 + y * 104_729)
+                .wrapping_add(texture)
+                .wrapping_mul(2_654_435_761);
+            image::Rgb([(mixed >> 24) as u8; 3])
+        });
+        scene.views.push(view);
+    }
+    scene
 }
 
 #[test]
