@@ -89,7 +89,8 @@ pub enum Cause {
     Other,
 }
 
-/// What to read a scene with so that a finding is repaired.
+/// What to read a scene with so that a finding is repaired, as a whole: it takes
+/// the place of what the scene was read with before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Repair {
     /// For [`LoadOptions::pose_convention`].
@@ -101,6 +102,15 @@ pub struct Repair {
 }
 
 impl Repair {
+    /// What these options already correct.
+    pub fn of(options: &LoadOptions) -> Self {
+        Self {
+            pose_convention: options.pose_convention,
+            focal_scale: options.focal_scale,
+            intrinsics_scale: options.intrinsics_scale,
+        }
+    }
+
     /// The options with this repair.
     pub fn apply(&self, options: &LoadOptions) -> LoadOptions {
         LoadOptions {
@@ -324,7 +334,7 @@ pub(crate) fn listed(names: &[String]) -> String {
 /// A share as a percentage without digits that mean nothing.
 pub(crate) fn percent(share: f64) -> String {
     let percent = 100.0 * share;
-    if percent > 0.0 && percent < 9.95 {
+    if (0.05..9.95).contains(&percent) {
         format!("{percent:.1} %")
     } else {
         format!("{percent:.0} %")

@@ -2,13 +2,12 @@
 
 use crate::capture_checks::capture_findings;
 use crate::evidence::{gather, is_textured};
-use crate::examination::{Cause, Check, Examination, Finding, Level, Repair};
+use crate::examination::{Check, Examination, Finding, Level, Repair};
 use crate::gray_image::GrayImage;
 use crate::image_checks::image_findings;
 use crate::load_failure::{explain, size_factor};
 use crate::pose_diagnosis::Diagnosis;
 use nalgebra::Vector3;
-use neat_core::layout::PoseConvention;
 use neat_core::{CameraError, LoadOptions, LoadedScene, Scene, SceneError, ViewError, load_scene};
 use rayon::prelude::*;
 use std::path::Path;
@@ -41,9 +40,8 @@ pub struct ExamineOptions {
     /// The scene sphere; without one, that of [`Scene::sphere_radius`]
     /// around the origin.
     pub sphere: Option<SceneSphere>,
-    /// The convention that the poses were read with, as in
-    /// [`LoadOptions::pose_convention`]: remedies name the one to use instead.
-    pub pose_convention: Option<PoseConvention>,
+    /// What the scene was read with: remedies name what to use instead.
+    pub read_with: Repair,
 }
 
 /// Views that are looked at: photographs, of which each is matched with all
@@ -73,11 +71,9 @@ pub fn examine(scene: &Scene, options: &ExamineOptions) -> Examination {
 
 /// `mirrored` if the poses could only be read by mirroring their world.
 fn examine_as(scene: &Scene, options: &ExamineOptions, mirrored: bool) -> Examination {
-    if scene.views.is_empty() {
-        let finding = Finding::new(Check::Files, Level::Problem, "the scene holds no view")
-            .because(Cause::MissingFile)
-            .remedied_by("a scene needs images and their poses");
-        return Examination::new(&scene.name, 0, vec![finding]);
+    if let Err(error) = scene.validate() {
+        let findings = vec![explain(&error)];
+        return Examination::new(&scene.name, scene.views.len(), findings);
     }
     let working: Vec<_> = (scene.views.par_iter())
         .map(|view| GrayImage::working_copy(&view.image))
@@ -98,7 +94,6 @@ fn pose_findings(
     options: &ExamineOptions,
     mirrored: bool,
 ) -> Vec<Finding> {
-    let read_as = options.pose_convention.unwrap_or_default();
     let count = scene.views.len();
     let textured = is_textured(working, &evenly(count, QUICK_VIEWS));
     if options.depth == Depth::Quick {
@@ -109,7 +104,7 @@ fn pose_findings(
             evenly(count, QUICK_VIEWS)
         };
         let gathered = gather(scene, working, views, textured);
-        let diagnosis = Diagnosis::new(scene, &gathered, read_as, mirrored);
+        let diagnosis = Diagnosis::new(scene, &gathered, options.read_with, mirrored);
         if diagnosis.is_plainly_good() {
             return diagnosis.agreeing_findings();
         }
@@ -120,7 +115,7 @@ fn pose_findings(
         FULL_VIEWS
     };
     let gathered = gather(scene, working, evenly(count, limit), textured);
-    Diagnosis::new(scene, &gathered, read_as, mirrored).findings()
+    Diagnosis::new(scene, &gathered, options.read_with, mirrored).findings()
 }
 
 /// At most `limit` of `count` views, evenly spread.
@@ -131,7 +126,8 @@ pub(crate) fn evenly(count: usize, limit: usize) -> Vec<usize> {
 
 /// Reads the scene in the folder `dir` and examines it. A scene that cannot be
 /// read is explained; where its poses are mirrored or its images scaled, it is
-/// read in spite of that to find the repair.
+/// read in spite of that to find the repair. What `load` already corrects takes
+/// the place of [`ExamineOptions::read_with`].
 pub fn examine_folder(
     dir: impl AsRef<Path>,
     load: &LoadOptions,
@@ -139,7 +135,7 @@ pub fn examine_folder(
 ) -> Examination {
     let dir = dir.as_ref();
     let mut options = *options;
-    options.pose_convention = options.pose_convention.or(load.pose_convention);
+    options.read_with = Repair::of(load);
     let error = match load_scene(dir, load) {
         Ok(loaded) => return with_warnings(&loaded, examine(&loaded.scene, &options)),
         Err(error) => error,
@@ -164,7 +160,7 @@ pub fn examine_folder(
         };
         // If only some poses are mirrored, others fail now: the first error holds.
         if let Ok(loaded) = load_scene(dir, &again) {
-            options.pose_convention = Some(convention);
+            options.read_with = Repair::of(&again);
             return with_warnings(&loaded, examine_as(&loaded.scene, &options, true));
         }
     }
@@ -174,7 +170,10 @@ pub fn examine_folder(
             intrinsics_scale: Some(scale),
             ..Repair::default()
         };
-        if let Ok(loaded) = load_scene(dir, &repair.apply(load)) {
+        let again = repair.apply(load);
+        if let Ok(loaded) = load_scene(dir, &again) {
+            let repair = Repair::of(&again);
+            options.read_with = repair;
             let mut finding = explain(&error);
             finding.repair = Some(repair);
             finding.remedy = Some(format!("run it with `{repair}`"));

@@ -153,6 +153,46 @@ pub(crate) fn conventions(camera: &Camera, read_as: PoseConvention) -> Vec<PoseC
     conventions
 }
 
+/// Hypotheses about intrinsics that do not suit the size of their images.
+pub(crate) fn of_intrinsics(cameras: &[Camera]) -> Vec<Hypothesis> {
+    let camera = &cameras[0];
+    let k = &camera.intrinsics;
+    let scale_x = f64::from(camera.width) / (2.0 * k.cx);
+    let scale_y = f64::from(camera.height) / (2.0 * k.cy);
+    let mut hypotheses = Vec::new();
+    let off = |scale: f64| (scale - 1.0).abs() > 0.1;
+    if off(scale_x) || off(scale_y) {
+        hypotheses.push(Hypothesis::CenteredPrincipalPoint);
+        if scale_x > 0.0 && (scale_x / scale_y - 1.0).abs() < 0.15 {
+            // Images are scaled by simple factors, principal points are not
+            // quite in the middle.
+            let scale = 0.5 * (scale_x + scale_y);
+            let simple = [
+                0.125,
+                0.25,
+                1.0 / 3.0,
+                0.5,
+                2.0 / 3.0,
+                0.75,
+                1.5,
+                2.0,
+                3.0,
+                4.0,
+                8.0,
+            ];
+            let near = simple
+                .into_iter()
+                .find(|simple| (scale / simple - 1.0).abs() < 0.08);
+            let rounded = (near.unwrap_or(scale) * 1e4).round() / 1e4;
+            hypotheses.push(Hypothesis::IntrinsicsScale(rounded));
+        }
+    }
+    if (k.fx / k.fy - 1.0).abs() > 0.02 || (k.cx - k.cy).abs() > 0.02 * k.fx {
+        hypotheses.push(Hypothesis::SwappedIntrinsics);
+    }
+    hypotheses
+}
+
 impl PoseOrder {
     /// Orders that happen, for scenes of these views.
     pub fn all(names: &[&str]) -> Vec<Self> {

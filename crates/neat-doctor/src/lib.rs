@@ -28,6 +28,7 @@ mod image_checks;
 mod likeness;
 mod load_failure;
 mod pose_diagnosis;
+mod pose_findings;
 mod tracks;
 
 pub use examination::{Cause, Check, Examination, Finding, Level, Repair, Verdict};

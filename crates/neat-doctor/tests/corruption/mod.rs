@@ -81,6 +81,7 @@ impl Corruption {
         Self::ShuffledImages,
     ];
 
+    #[allow(dead_code, reason = "the example prints it, the tests do not")]
     pub fn name(self) -> &'static str {
         match self {
             Self::InvertedPoses => "inverted poses",
