@@ -48,7 +48,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let list = file::read(list_path, LIST_REMEDY)?;
     let images = image_names(list_path, &list)?;
     let dirs = [dir.into(), dir.join("images")];
-    parse(&bytes, &path, &images, &dirs, images::read_size)
+    parse(&bytes, &path, &images, &dirs, images::size_of_posed)
 }
 
 /// The names of a list, without `0 focal_length`.

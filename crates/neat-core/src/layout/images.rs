@@ -53,6 +53,15 @@ pub(super) fn has_known_ending(path: &Path) -> bool {
 /// What to do about a missing image.
 const REMEDY: &str = "put the image there or remove its pose";
 
+/// [`read_size`], and one pixel for an image that is not there: its view will be
+/// left out, or the scene refused.
+pub(super) fn size_of_posed(path: &Path) -> Result<(u32, u32), SceneError> {
+    match path.exists() {
+        true => read_size(path),
+        false => Ok((1, 1)),
+    }
+}
+
 /// How a reader learns width and height of an image: [`read_size`], but for tests
 /// without files.
 pub(super) type ReadSize = fn(&Path) -> Result<(u32, u32), SceneError>;

@@ -41,7 +41,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let path = find(dir).unwrap_or_else(|| dir.join("reconstruction.nvm"));
     let bytes = file::read(&path, REMEDY)?;
     let dirs = [dir.into(), dir.join("images")];
-    parse(&bytes, &path, &dirs, images::read_size)
+    parse(&bytes, &path, &dirs, images::size_of_posed)
 }
 
 /// The calibration that all images share, if the first line gives one.

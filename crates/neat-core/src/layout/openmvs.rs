@@ -50,7 +50,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let path = find(dir).unwrap_or_else(|| dir.join(FILE_NAME));
     let bytes = file::read(&path, REMEDY)?;
     let dirs = [dir.into(), dir.join("images")];
-    parse(&bytes, &path, &dirs, images::read_size)
+    parse(&bytes, &path, &dirs, images::size_of_posed)
 }
 
 struct Platform {
