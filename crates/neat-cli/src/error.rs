@@ -40,6 +40,9 @@ pub enum CliError {
         /// What there is.
         known: String,
     },
+    /// A scene with problems, which have been printed.
+    #[error("the scene is not ready: solve its problems first")]
+    NotReady,
     /// The operating system gives no threads.
     #[error("the threads asked for cannot be started: use fewer with --threads")]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -2,9 +2,12 @@
 
 use crate::arguments::positive;
 use clap::Args;
-use neat_core::SphereChoice;
+use neat_core::{LoadOptions, SphereChoice};
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
 use neat_pipeline::config::DataConfig;
+use neat_pipeline::preset::Preset;
+use neat_pipeline::scene::load_options;
+use std::fmt;
 
 /// How a scene is read, where its files do not say or say wrongly.
 #[derive(Clone, Debug, Args)]
@@ -39,6 +42,11 @@ pub struct SceneArgs {
 }
 
 impl SceneArgs {
+    /// How a scene is read with what was given.
+    pub fn load_options(&self) -> LoadOptions {
+        load_options(&self.apply(Preset::default().config().data))
+    }
+
     /// `data` with everything that was given.
     pub fn apply(&self, mut data: DataConfig) -> DataConfig {
         if let Some(sphere) = self.scene_sphere {
@@ -57,5 +65,25 @@ impl SceneArgs {
             data.pose_convention = Some(convention);
         }
         data
+    }
+}
+
+impl fmt::Display for SceneArgs {
+    /// As they were given, each after a space.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut flag = |name: &str, value: Option<String>| match value {
+            Some(value) => write!(f, " --{name} {value}"),
+            None => Ok(()),
+        };
+        flag("scene-sphere", self.scene_sphere.map(|x| x.to_string()))?;
+        flag("max-image-size", self.max_image_size.map(|x| x.to_string()))?;
+        flag("poses", self.poses.map(|x| x.to_string()))?;
+        flag("camera-axes", self.camera_axes.map(|x| x.to_string()))?;
+        flag("focal-scale", self.focal_scale.map(|x| x.to_string()))?;
+        flag("intrinsics-scale", self.intrinsics_scale.map(|x| x.to_string()))?;
+        match self.mirrored_world {
+            true => f.write_str(" --mirrored-world"),
+            false => Ok(()),
+        }
     }
 }

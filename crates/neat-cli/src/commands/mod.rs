@@ -2,8 +2,10 @@
 
 mod bench;
 mod compare_backends;
+mod convert;
 mod demo;
 mod distill;
+mod doctor;
 mod eval;
 mod info;
 mod reconstruct;
@@ -24,6 +26,8 @@ pub enum Command {
     Render(render::RenderArgs),
     Synth(synth::SynthArgs),
     Info(info::InfoArgs),
+    Doctor(doctor::DoctorArgs),
+    Convert(convert::ConvertArgs),
     Demo(demo::DemoArgs),
     CompareBackends(compare_backends::CompareBackendsArgs),
     Bench(bench::BenchArgs),
@@ -40,6 +44,8 @@ impl Command {
             Self::Render(args) => args.run(quiet),
             Self::Synth(args) => args.run(),
             Self::Info(args) => args.run(),
+            Self::Doctor(args) => args.run(),
+            Self::Convert(args) => args.run(),
             Self::Demo(args) => args.run(quiet),
             Self::CompareBackends(args) => args.run(quiet),
             Self::Bench(args) => args.run(quiet),

@@ -1,0 +1,135 @@
+//! `neat doctor`.
+
+use crate::arguments::BackendArg;
+use crate::cache::CacheArgs;
+use crate::error::CliError;
+use crate::scene_arguments::SceneArgs;
+use crate::{duration, output};
+use clap::Args;
+use neat_core::{LoadOptions, Scene, load_scene};
+use neat_doctor::{Depth, Examination, ExamineOptions, Verdict, examine_folder};
+use neat_pipeline::estimate::{Estimate, estimate, speed};
+use neat_pipeline::preset::Preset;
+use neat_tensor::Backend;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Examine a scene before hours are spent on it, and say what is wrong with it
+///
+/// Looks at poses and intrinsics against the images (inverted or mirrored poses, wrong camera
+/// axes, focal lengths, image sizes or order, single bad poses), at the images themselves
+/// (exposure, blur, duplicates), at the capture (coverage, baselines, the scene sphere), and at
+/// what the presets will take on this machine. Where a flag repairs what is wrong, it is named.
+///
+/// Exit code 2 if a run would be lost time.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  neat doctor SCENE
+  neat doctor SCENE --camera-axes right-up-back      try what was suggested
+  neat doctor SCENE --json > examination.json")]
+pub struct DoctorArgs {
+    /// Folder of the scene
+    #[arg(value_name = "SCENE")]
+    scene: PathBuf,
+    /// Take a second or two: look at some of the views only
+    #[arg(long)]
+    quick: bool,
+    /// Print JSON, for programs
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    backend: BackendArg,
+    #[command(flatten)]
+    cache: CacheArgs,
+    #[command(flatten)]
+    scene_args: SceneArgs,
+}
+
+/// What a preset takes.
+#[derive(Debug, Serialize)]
+struct Cost {
+    preset: Preset,
+    #[serde(flatten)]
+    estimate: Estimate,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    examination: &'a Examination,
+    costs: &'a [Cost],
+}
+
+impl DoctorArgs {
+    pub fn run(self) -> Result<(), CliError> {
+        let options = LoadOptions {
+            require_wireframes: false,
+            cache_dir: self.cache.open().map(|cache| cache.dir().into()),
+            ..self.scene_args.load_options()
+        };
+        let depth = match self.quick {
+            true => Depth::Quick,
+            false => Depth::Full,
+        };
+        let how = ExamineOptions {
+            depth,
+            ..ExamineOptions::default()
+        };
+        let examination = examine_folder(&self.scene, &options, &how);
+        // What cannot be read has been explained.
+        let costs = match load_scene(&self.scene, &options) {
+            Ok(loaded) => costs(&loaded.scene, self.backend.backend)?,
+            Err(_) => Vec::new(),
+        };
+        let text = match self.json {
+            true => json(&examination, &costs)?,
+            false => self.text(&examination, &costs),
+        };
+        output::print(&text)?;
+        match examination.verdict {
+            Verdict::Ready | Verdict::ReadyWithWarnings => Ok(()),
+            Verdict::NotReady => Err(CliError::NotReady),
+        }
+    }
+
+    fn text(&self, examination: &Examination, costs: &[Cost]) -> String {
+        let mut text = examination.to_string();
+        if !text.ends_with('\n') {
+            text.push('\n');
+        }
+        if !costs.is_empty() {
+            text.push_str("\nexpected on this machine, within a factor of two:\n");
+        }
+        for Cost { preset, estimate } in costs {
+            let time = duration::display(estimate.seconds);
+            let gib = estimate.bytes / 1024f64.powi(3);
+            text.push_str(&format!("  --preset {preset:<18} {time}, {gib:.1} GiB\n"));
+        }
+        if examination.verdict != Verdict::NotReady {
+            let scene = self.scene.display();
+            let flags = self.scene_args.to_string();
+            text.push_str(&format!("\nneat reconstruct {scene} --out RUN{flags}\n"));
+        }
+        text
+    }
+}
+
+/// What every preset takes, where that is known: on a CPU.
+fn costs(scene: &Scene, backend: Backend) -> Result<Vec<Cost>, CliError> {
+    let backend = backend.resolve();
+    if backend == Backend::Wgpu {
+        return Ok(Vec::new());
+    }
+    let speed = speed(&backend.device()?);
+    let cost = |preset: Preset| Cost {
+        preset,
+        estimate: estimate(&preset.config(), scene, speed),
+    };
+    Ok(Preset::ALL.map(cost).into())
+}
+
+fn json(examination: &Examination, costs: &[Cost]) -> Result<String, CliError> {
+    let report = Report { examination, costs };
+    serde_json::to_string_pretty(&report).map_err(|error| CliError::Output(error.into()))
+}
