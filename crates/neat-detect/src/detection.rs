@@ -59,6 +59,7 @@ fn graph_of(
             gap: config.max_gap * scale,
         },
     );
+    merging::drop_covered(&mut lines, MAX_OVERSHOOT_ANGLE.to_radians().sin());
     merging::trim_overshoots(&mut lines, MAX_OVERSHOOT_ANGLE.to_radians().sin());
     lines.retain(|line| {
         let length = line.segment.length();

@@ -116,6 +116,17 @@ impl LineFitter<'_> {
         self.describe(&segment, spread)
     }
 
+    /// As [`Self::fit`], but the ends stay where they are along the segment.
+    pub(crate) fn fit_between_ends(
+        &self,
+        segment: &LineSegment2,
+        search_width: f64,
+    ) -> Option<FittedSegment> {
+        let (segment, _) = self.refit(segment, search_width)?;
+        let (segment, spread) = self.refit(&segment, NARROW[1])?;
+        self.describe(&segment, spread)
+    }
+
     /// How well the image supports `segment` as it is: the share of its length,
     /// without `margin` at each end, along which there is an edge.
     pub(crate) fn support(&self, segment: &LineSegment2, margin: f64) -> f64 {

@@ -2,15 +2,15 @@
 //! and segments that run into each other under a small angle end where they meet.
 
 use crate::line_fitting::{FittedSegment, LineFitter, normal_of};
+use nalgebra::Vector2;
 use neat_core::LineSegment2;
 
 /// Edges of opposite contrast, such as the two sides of a thin line, are one
 /// only if they are nearer than this, in pixels.
 const SAME_EDGE: f64 = 0.75;
-/// A fit to joined pieces must keep so much of their joint length.
-const MIN_KEPT_LENGTH: f64 = 0.9;
-/// A fit to joined pieces has at most this spread, in pixels.
-const MAX_SPREAD: f64 = 0.6;
+/// The ends of joined pieces lie no farther from their common line, in pixels:
+/// else they meet under an angle.
+const MAX_BEND: f64 = 0.75;
 /// A segment that follows another edge beyond their crossing stays this near to
 /// it, in pixels.
 const OVERSHOOT: f64 = 1.5;
@@ -109,9 +109,40 @@ fn joined(
             long.segment.end
         },
     );
-    fitter.fit(&whole, limits.distance).filter(|fitted| {
-        fitted.spread <= MAX_SPREAD && fitted.segment.length() >= MIN_KEPT_LENGTH * whole.length()
-    })
+    fitter
+        .fit_between_ends(&whole, limits.distance)
+        .filter(|fitted| {
+            let line = &fitted.segment;
+            let off_line =
+                |end: &Vector2<f64>| (line.point_at(line.line_parameter(end)) - end).norm();
+            let all_ends = long.segment.ends().into_iter().chain(short_way.ends());
+            all_ends.map(|end| off_line(&end)).fold(0.0, f64::max) <= MAX_BEND
+        })
+}
+
+/// Drops segments of which longer ones of about the same direction cover all:
+/// chords across a corner between two long edges.
+pub(crate) fn drop_covered(segments: &mut Vec<FittedSegment>, max_sin_angle: f64) {
+    sort_by_length(segments);
+    for index in (0..segments.len()).rev() {
+        let (longer, rest) = segments.split_at(index);
+        let covered = rest.first().is_some_and(|segment| {
+            let covering: Vec<&LineSegment2> = (longer.iter())
+                .filter(|other| segment.direction().perp(&other.direction()).abs() <= max_sin_angle)
+                .map(|other| &other.segment)
+                .collect();
+            let steps = segment.segment.length().ceil() as usize;
+            (0..=steps).all(|step| {
+                let point = segment.segment.point_at(step as f64 / steps as f64);
+                covering
+                    .iter()
+                    .any(|other| other.distance_to_point(&point) <= OVERSHOOT)
+            })
+        });
+        if covered {
+            segments.remove(index);
+        }
+    }
 }
 
 /// Cuts off what runs on along another segment beyond the point where they meet:
