@@ -22,6 +22,9 @@ pub struct DetectorConfig {
     pub min_gradient: f64,
     /// How many standard deviations of the image's noise a gradient must have.
     pub noise_factor: f64,
+    /// How many times stronger than the image's median gradient an edge must be:
+    /// the texture of photographs is no edge.
+    pub texture_factor: f64,
     /// Images with a longer side than this are searched for segments at a
     /// reduced size, in pixels; lines are still fitted to the full image.
     pub max_search_side: u32,
@@ -53,6 +56,13 @@ pub struct DetectorConfig {
     /// Edges that bend more are curves and are dropped: the height of the arc as
     /// a share of its length.
     pub max_sagitta: f64,
+    /// Radius of the neighbourhood in which `clutter_count` is counted.
+    pub clutter_radius: f64,
+    /// Segments that meet no other are texture if so many others like them are
+    /// near and they are shorter than `clutter_length`.
+    pub clutter_count: usize,
+    /// See `clutter_count`.
+    pub clutter_length: f64,
     /// Segments with a lower score are dropped.
     pub min_score: f64,
 }
@@ -63,19 +73,23 @@ impl Default for DetectorConfig {
             smoothing_in_pixels: 0.8,
             min_gradient: 1.0,
             noise_factor: 3.0,
-            max_search_side: 1600,
+            texture_factor: 2.0,
+            max_search_side: 1024,
             min_length: 6.0,
             max_gap: 4.0,
             merge_distance: 1.5,
-            merge_angle: 5.0,
+            merge_angle: 8.0,
             max_extension: 8.0,
             max_retreat: 5.0,
             max_attraction: 25.0,
-            junction_distance: 1.5,
+            junction_distance: 1.2,
             min_junction_angle: 2.5,
-            max_completion: 40.0,
+            max_completion: 25.0,
             max_sagitta: 0.012,
             t_junction_distance: 4.0,
+            clutter_radius: 16.0,
+            clutter_count: 3,
+            clutter_length: 24.0,
             min_score: 0.06,
         }
     }

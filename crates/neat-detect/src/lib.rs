@@ -1,5 +1,7 @@
 //! From an image to its 2D wireframe.
 
+mod claimed_pixels;
+mod clutter;
 mod config;
 mod detection;
 mod edge_completion;

@@ -33,23 +33,37 @@ pub(crate) fn merge(
     fitter: &LineFitter,
     limits: &MergeLimits,
 ) -> Vec<FittedSegment> {
-    loop {
-        sort_by_length(&mut segments);
-        let before = segments.len();
-        let mut kept: Vec<FittedSegment> = Vec::new();
-        for segment in segments {
-            let merged = (kept.iter_mut()).find_map(|long| {
-                joined(long, &segment, fitter, limits).map(|joined| *long = joined)
+    // Two that did not belong together in one round need not be asked again.
+    let mut changed = vec![true; segments.len()];
+    while changed.contains(&true) {
+        let mut order: Vec<usize> = (0..segments.len()).collect();
+        order.sort_by(|&a, &b| {
+            segments[b]
+                .segment
+                .length()
+                .total_cmp(&segments[a].segment.length())
+        });
+        let mut kept: Vec<(FittedSegment, bool, bool)> = Vec::new();
+        for index in order {
+            let (segment, was_changed) = (&segments[index], changed[index]);
+            let merged = kept.iter_mut().find_map(|(long, long_changed, changes)| {
+                let asked = was_changed || *long_changed || *changes;
+                let joined = asked
+                    .then(|| joined(long, segment, fitter, limits))
+                    .flatten()?;
+                *changes |= joined != *long;
+                *long = joined;
+                Some(())
             });
             if merged.is_none() {
-                kept.push(segment);
+                kept.push((segment.clone(), was_changed, false));
             }
         }
-        segments = kept;
-        if segments.len() == before {
-            return segments;
-        }
+        changed = kept.iter().map(|(_, _, changes)| *changes).collect();
+        segments = kept.into_iter().map(|(segment, ..)| segment).collect();
     }
+    sort_by_length(&mut segments);
+    segments
 }
 
 /// Longest first.
@@ -65,6 +79,9 @@ fn joined(
     limits: &MergeLimits,
 ) -> Option<FittedSegment> {
     let direction = long.direction();
+    if direction.perp(&short.direction()).abs() > limits.sin_angle {
+        return None;
+    }
     let normal = normal_of(&direction);
     let length = long.segment.length();
     let same_way = direction.dot(&short.direction()) >= 0.0;
@@ -93,9 +110,6 @@ fn joined(
     }
     if first >= -limits.distance && last <= length + limits.distance {
         return Some(long.clone());
-    }
-    if direction.perp(&short.direction()).abs() > limits.sin_angle {
-        return None;
     }
     let whole = LineSegment2::new(
         if first < 0.0 {
