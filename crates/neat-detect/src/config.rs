@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 
 /// The side of the square image that the lengths of [`DetectorConfig`] are for.
 const REFERENCE_SIDE: f64 = 512.0;
+/// The smallest number of pixels in a reference pixel.
+const SMALLEST_SCALE: f64 = 0.5;
 
 /// Settings of [`crate::detect`] and of [`crate::wireframe_from_segments`].
 ///
@@ -97,7 +99,8 @@ impl Default for DetectorConfig {
 
 impl DetectorConfig {
     /// How many pixels of a `width`×`height` image a reference pixel is.
+    /// At least a half: corners do not get rounder in small images.
     pub fn pixels_per_reference_pixel(width: u32, height: u32) -> f64 {
-        (f64::from(width) * f64::from(height)).sqrt() / REFERENCE_SIDE
+        ((f64::from(width) * f64::from(height)).sqrt() / REFERENCE_SIDE).max(SMALLEST_SCALE)
     }
 }

@@ -28,36 +28,134 @@ const MAX_OVERSHOOT_ANGLE: f64 = 25.0;
 /// How far the lines of the detector lie from the edge, in pixels.
 const SEARCH_WIDTH: f64 = 3.0;
 
-/// The 2D wireframe of `image`.
+/// The 2D wireframe of `image`: its straight edges as segments that share
+/// junctions, with scores in [0, 1]. The centre of the first pixel is (0, 0): add
+/// the scene's pixel centre for image coordinates.
+///
+/// Runs on the calling thread, but for the search, and gives the same for the same
+/// input: call it for several images in parallel.
+///
+/// ```
+/// use image::{Rgb, RgbImage};
+/// use neat_detect::{DetectorConfig, detect};
+///
+/// // A bright square whose corners are at 19.5 and 43.5.
+/// let inside = |v: u32| (20..44).contains(&v);
+/// let image = RgbImage::from_fn(64, 64, |x, y| {
+///     Rgb([if inside(x) && inside(y) { 200 } else { 20 }; 3])
+/// });
+/// let wireframe = detect(&image, &DetectorConfig::default());
+/// assert_eq!((wireframe.vertices.len(), wireframe.edges.len()), (4, 4));
+/// for vertex in &wireframe.vertices {
+///     assert!((vertex.x - 31.5).abs() - 12.0 < 0.1 && (vertex.y - 31.5).abs() - 12.0 < 0.1);
+/// }
+/// ```
 pub fn detect(image: &RgbImage, config: &DetectorConfig) -> Wireframe2d {
     let (width, height) = image.dimensions();
     if width < MIN_SIDE || height < MIN_SIDE {
         return Wireframe2d::empty(width, height);
     }
-    let noise = noise::estimate(image);
-    let sigma = noise::smoothing(config.smoothing_in_pixels, noise);
-    let smoothed = SmoothedImage::new(image, sigma);
-    let min_gradient = (config.min_gradient)
-        .max(config.noise_factor * noise::gradient_noise(sigma, noise))
-        .max(config.texture_factor * smoothed.median_gradient());
+    let prepared = PreparedImage::new(image, config);
     let reduction = width
         .max(height)
         .div_ceil(config.max_search_side.max(MIN_SIDE));
     let segments = if reduction > 1 {
-        let reduced = SmoothedImage::new(&reduced(image, reduction), sigma);
+        let reduced = SmoothedImage::new(&reduced(image, reduction), prepared.sigma);
         // Between pixel centres of the two images.
         let [factor, shift] = [f64::from(reduction), f64::from(reduction - 1) / 2.0];
-        let segments = segment_search::search(&reduced, min_gradient);
+        let segments = segment_search::search(&reduced, prepared.min_gradient);
         let enlarged = |end: &Vector2<f64>| (end * factor).add_scalar(shift);
         segments
             .iter()
             .map(|segment| segment.map(enlarged))
             .collect()
     } else {
-        segment_search::search(&smoothed, min_gradient)
+        segment_search::search(&prepared.smoothed, prepared.min_gradient)
     };
     let search_width = SEARCH_WIDTH.max(1.5 * f64::from(reduction));
-    graph_of(&smoothed, &segments, min_gradient, search_width, config)
+    graph_of(&prepared, &segments, search_width, config)
+}
+
+/// The wireframe of segments that another detector found in `image`: they are
+/// fitted to the image and joined as [`detect`]'s own. Those that lie outside the
+/// image, and those along which it shows no edge, are dropped.
+///
+/// ```
+/// use image::{Rgb, RgbImage};
+/// use nalgebra::Vector2;
+/// use neat_core::LineSegment2;
+/// use neat_detect::{DetectorConfig, wireframe_from_segments};
+///
+/// let image = RgbImage::from_fn(64, 64, |x, _| Rgb([if x < 30 { 20 } else { 200 }; 3]));
+/// let rough = LineSegment2::new(Vector2::new(28.0, 5.0), Vector2::new(31.0, 55.0));
+/// let wireframe = wireframe_from_segments(&image, &[rough], &DetectorConfig::default());
+/// assert_eq!(wireframe.edges.len(), 1);
+/// assert!((wireframe.vertices[0].x - 29.5).abs() < 0.05);
+/// ```
+pub fn wireframe_from_segments(
+    image: &RgbImage,
+    segments: &[LineSegment2],
+    config: &DetectorConfig,
+) -> Wireframe2d {
+    let (width, height) = image.dimensions();
+    if width < MIN_SIDE || height < MIN_SIDE {
+        return Wireframe2d::empty(width, height);
+    }
+    let inside: Vec<LineSegment2> = (segments.iter())
+        .filter_map(|segment| clipped(segment, Vector2::new(width, height)))
+        .collect();
+    graph_of(
+        &PreparedImage::new(image, config),
+        &inside,
+        SEARCH_WIDTH,
+        config,
+    )
+}
+
+/// The part of a segment within the pixel centres of an image of this size.
+fn clipped(segment: &LineSegment2, size: Vector2<u32>) -> Option<LineSegment2> {
+    let direction = segment.end - segment.start;
+    let [mut first, mut last] = [0.0_f64, 1.0_f64];
+    for axis in 0..2 {
+        let [low, high] = [0.0, f64::from(size[axis]) - 1.0]
+            .map(|border| (border - segment.start[axis]) / direction[axis]);
+        if direction[axis] != 0.0 {
+            first = first.max(low.min(high));
+            last = last.min(low.max(high));
+        } else if !(0.0..f64::from(size[axis])).contains(&segment.start[axis]) {
+            return None;
+        }
+    }
+    let part = LineSegment2::new(segment.point_at(first), segment.point_at(last));
+    // Not so for NaN, and for numbers beyond those of images.
+    let within =
+        |end: &Vector2<f64>| (0..2).all(|axis| (-1.0..=f64::from(size[axis])).contains(&end[axis]));
+    (first < last && part.ends().iter().all(within)).then_some(part)
+}
+
+/// An image with what its noise and texture ask for.
+struct PreparedImage {
+    smoothed: SmoothedImage,
+    /// Standard deviation of its smoothing, in pixels.
+    sigma: f64,
+    /// The smallest strength of an edge, in grey levels per pixel.
+    min_gradient: f64,
+}
+
+impl PreparedImage {
+    fn new(image: &RgbImage, config: &DetectorConfig) -> Self {
+        let noise = noise::estimate(image);
+        let sigma = noise::smoothing(config.smoothing_in_pixels, noise);
+        let smoothed = SmoothedImage::new(image, sigma);
+        let min_gradient = (config.min_gradient)
+            .max(config.noise_factor * noise::gradient_noise(sigma, noise))
+            .max(config.texture_factor * smoothed.median_gradient());
+        Self {
+            smoothed,
+            sigma,
+            min_gradient,
+        }
+    }
 }
 
 /// The means over squares of `factor` pixels; pixels of a last, incomplete square
@@ -78,18 +176,18 @@ fn reduced(image: &RgbImage, factor: u32) -> RgbImage {
     })
 }
 
+/// Fits segments to the image, merges them and joins them to a graph.
 fn graph_of(
-    image: &SmoothedImage,
+    image: &PreparedImage,
     segments: &[LineSegment2],
-    min_gradient: f64,
     search_width: f64,
     config: &DetectorConfig,
 ) -> Wireframe2d {
-    let [width, height] = image.size().map(|side| side as u32);
+    let [width, height] = image.smoothed.size().map(|side| side as u32);
     let scale = DetectorConfig::pixels_per_reference_pixel(width, height);
     let fitter = LineFitter {
-        image,
-        min_gradient,
+        image: &image.smoothed,
+        min_gradient: image.min_gradient,
         max_gap: config.max_gap * scale,
     };
     let fitted = fit_all(segments, &fitter, search_width);
@@ -133,7 +231,7 @@ fn graph_of(
     let fitted_edges: Vec<FittedEdge> = (lines.iter().zip(&graph.edges))
         .map(|(line, &vertices)| FittedEdge {
             vertices,
-            score: score(line, min_gradient),
+            score: score(line, image.min_gradient),
         })
         .collect();
     let kept = clutter::remove(
