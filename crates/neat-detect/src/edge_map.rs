@@ -144,9 +144,9 @@ impl Mask {
             .count();
         let [up, right, down, left] = [around[0], around[2], around[4], around[6]];
         let open = if first_pass {
-            !(up && right && down) && !(right && down && left)
+            !(right && down && (up || left))
         } else {
-            !(up && right && left) && !(up && down && left)
+            !(up && left && (right || down))
         };
         (2..=6).contains(&count) && rises == 1 && open
     }

@@ -53,6 +53,17 @@ impl EdgeProfile {
         Some(Self { colors, reach })
     }
 
+    /// The strongest change along the profile, whether or not it is a maximum.
+    pub(crate) fn max_strength(&self) -> f64 {
+        let colors = &self.colors[..=2 * self.reach];
+        let changes = colors
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]) / SPACING as f32);
+        changes
+            .map(|change| strength(&change.cast()))
+            .fold(0.0, f64::max)
+    }
+
     /// The maximum of the colour's derivative; of several, a nearer one wins over
     /// a stronger one that is far off. With `contrast` only changes into that
     /// direction of the colour space count. `None` if there is no maximum.

@@ -154,8 +154,11 @@ impl LineFitter<'_> {
     /// stronger edge a weaker one cannot be told apart, but the image is not flat.
     pub(crate) fn is_nowhere_flat(&self, segment: &LineSegment2) -> bool {
         Axes::of(segment).is_none_or(|axes| {
-            axes.positions()
-                .all(|at| self.edge(&axes, at, NARROW[0]).is_some())
+            axes.positions().all(|position| {
+                let point = axes.point(position, 0.0);
+                EdgeProfile::sample(self.image, &point, &axes.normal, NARROW[0])
+                    .is_some_and(|profile| profile.max_strength() >= self.min_gradient)
+            })
         })
     }
 
