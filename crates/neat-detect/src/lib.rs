@@ -22,6 +22,8 @@ mod junction_graph;
 mod line_fitting;
 mod merging;
 mod noise;
+#[cfg(feature = "onnx")]
+pub mod onnx;
 mod robust_line;
 pub mod segment_file;
 mod segment_search;
