@@ -225,6 +225,9 @@ fn graph_of(
         &fitter,
     );
     for edge in completed {
+        for vertex in edge.vertices {
+            graph.meets_others[vertex] = true;
+        }
         graph.edges.push(edge.vertices);
         lines.push(edge.fitted);
     }
@@ -237,6 +240,7 @@ fn graph_of(
     let kept = clutter::remove(
         fitted_edges,
         &graph.vertices,
+        &graph.meets_others,
         &ClutterLimits {
             radius: config.clutter_radius * scale,
             count: config.clutter_count,

@@ -38,6 +38,8 @@ const T_SIN_ANGLE: f64 = 0.3;
 /// segment its two vertices.
 pub(crate) struct JunctionGraph {
     pub vertices: Vec<Vector2<f64>>,
+    /// Whether other segments end in each vertex, or it lies on one.
+    pub meets_others: Vec<bool>,
     /// Start and end vertex of every segment, in the order given.
     pub edges: Vec<[usize; 2]>,
 }
@@ -128,16 +130,19 @@ pub(crate) fn build(
             members[vertex].push(end);
         }
     }
+    let mut on_segment = vec![false; members.len()];
     for end in 0..ends.len() {
         if members[vertex_of[end]].len() == 1
             && let Some(position) = t_junction(end, &ends, segments, limits)
         {
             positions[vertex_of[end]] = position;
+            on_segment[vertex_of[end]] = true;
         }
     }
 
     let mut graph = JunctionGraph {
         vertices: Vec::new(),
+        meets_others: Vec::new(),
         edges: vec![[0; 2]; segments.len()],
     };
     for (vertex, members) in members
@@ -149,6 +154,7 @@ pub(crate) fn build(
             graph.edges[end / 2][end % 2] = graph.vertices.len();
         }
         graph.vertices.push(positions[vertex]);
+        (graph.meets_others).push(members.len() > 1 || on_segment[vertex]);
     }
     graph
 }
