@@ -195,7 +195,7 @@ fn graph_of(
         fitted,
         &fitter,
         &MergeLimits {
-            distance: config.merge_distance,
+            distance: config.merge_distance_in_pixels,
             sin_angle: config.merge_angle.to_radians().sin(),
             gap: config.max_gap * scale,
         },
@@ -204,7 +204,7 @@ fn graph_of(
     merging::trim_overshoots(&mut lines, MAX_OVERSHOOT_ANGLE.to_radians().sin());
     lines.retain(|line| {
         let length = line.segment.length();
-        length >= config.min_length * scale
+        length >= (config.min_length * scale).max(1.0)
             && (line.sagitta <= STRAIGHT || line.sagitta <= config.max_sagitta * length)
     });
     let limits = JunctionLimits {

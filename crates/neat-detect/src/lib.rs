@@ -29,5 +29,5 @@ pub mod segment_file;
 mod segment_search;
 mod smoothed_image;
 
-pub use config::DetectorConfig;
+pub use config::{DetectorConfig, DetectorConfigError};
 pub use detection::{detect, wireframe_from_segments};

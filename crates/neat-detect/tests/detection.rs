@@ -218,6 +218,12 @@ fn configurations_read_back_and_refuse_unknown_keys() {
     assert_eq!(toml::from_str::<DetectorConfig>(&text).unwrap(), config);
     assert_eq!(toml::from_str::<DetectorConfig>("").unwrap(), config);
     assert!(toml::from_str::<DetectorConfig>("min_lenght = 3.0").is_err());
+    assert_eq!(config.validate(), Ok(()));
+    let wrong = DetectorConfig {
+        min_gradient: f64::NAN,
+        ..config
+    };
+    assert_eq!(wrong.validate().unwrap_err().field, "min_gradient");
 }
 
 /// The toy object, or `None`, said aloud, where it is not at hand.
