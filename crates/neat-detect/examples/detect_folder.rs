@@ -84,12 +84,17 @@ fn on_black(image: DynamicImage) -> RgbImage {
 
 /// The photograph, darkened, with edges from red (unsure) to green (sure).
 fn draw(image: &RgbImage, wireframe: &Wireframe2d) -> RgbImage {
-    let mut picture = image.clone();
-    for value in picture.iter_mut() {
-        *value = *value / 5 * 3;
-    }
+    // Small images are enlarged, so that fractions of a pixel can be seen.
+    let zoom = (1500 / image.width().max(image.height())).max(1);
+    let mut picture = RgbImage::from_fn(image.width() * zoom, image.height() * zoom, |x, y| {
+        Rgb(image
+            .get_pixel(x / zoom, y / zoom)
+            .0
+            .map(|value| value / 5 * 3))
+    });
+    let zoomed = |point: &Vector2<f64>| (point.add_scalar(0.5) * f64::from(zoom)).add_scalar(-0.5);
     for ([a, b], score) in wireframe.edges.iter().zip(&wireframe.edge_scores) {
-        let [start, end] = [wireframe.vertices[*a], wireframe.vertices[*b]];
+        let [start, end] = [*a, *b].map(|end| zoomed(&wireframe.vertices[end]));
         let steps = (end - start).amax().ceil().max(1.0) as usize * 2;
         let color = [(255.0 * (1.0 - score)) as u8, (255.0 * score) as u8, 40];
         for step in 0..=steps {
@@ -104,7 +109,7 @@ fn draw(image: &RgbImage, wireframe: &Wireframe2d) -> RgbImage {
             [255, 255, 0]
         };
         for (x, y) in [(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
-            put(&mut picture, &(vertex + Vector2::new(x, y)), color);
+            put(&mut picture, &(zoomed(vertex) + Vector2::new(x, y)), color);
         }
     }
     picture

@@ -1,6 +1,8 @@
 //! The whole way from an image to its wireframe.
 
 use crate::DetectorConfig;
+use crate::claimed_pixels::ClaimedPixels;
+use crate::clutter::{self, ClutterLimits, FittedEdge};
 use crate::edge_completion;
 use crate::edge_profile::strength;
 use crate::junction_graph::{self, JunctionLimits};
@@ -9,61 +11,201 @@ use crate::merging::{self, MergeLimits};
 use crate::noise;
 use crate::segment_search;
 use crate::smoothed_image::SmoothedImage;
-use image::RgbImage;
+use image::{Rgb, RgbImage};
+use nalgebra::Vector2;
 use neat_core::{LineSegment2, Wireframe2d};
 
+/// The contrast, in smallest gradients, that halves an edge's score.
+const WEAK_CONTRAST: f64 = 1.0;
+/// Score of an end that meets no other segment, as a share of its edge's score.
+const FREE_END: f64 = 0.4;
+/// Edges that bend less than this, in pixels, are straight.
+const STRAIGHT: f64 = 0.3;
+/// Smaller images show no segment.
+const MIN_SIDE: u32 = 8;
 /// Segments under a smaller angle than this can follow one another's edge.
 const MAX_OVERSHOOT_ANGLE: f64 = 25.0;
 /// How far the lines of the detector lie from the edge, in pixels.
 const SEARCH_WIDTH: f64 = 3.0;
 
-/// The 2D wireframe of `image`.
+/// The 2D wireframe of `image`: its straight edges as segments that share
+/// junctions, with scores in [0, 1]. The centre of the first pixel is (0, 0): add
+/// the scene's pixel centre for image coordinates.
+///
+/// Runs on the calling thread, but for the search, and gives the same for the same
+/// input: call it for several images in parallel.
+///
+/// ```
+/// use image::{Rgb, RgbImage};
+/// use neat_detect::{DetectorConfig, detect};
+///
+/// // A bright square whose corners are at 19.5 and 43.5.
+/// let inside = |v: u32| (20..44).contains(&v);
+/// let image = RgbImage::from_fn(64, 64, |x, y| {
+///     Rgb([if inside(x) && inside(y) { 200 } else { 20 }; 3])
+/// });
+/// let wireframe = detect(&image, &DetectorConfig::default());
+/// assert_eq!((wireframe.vertices.len(), wireframe.edges.len()), (4, 4));
+/// for vertex in &wireframe.vertices {
+///     assert!((vertex.x - 31.5).abs() - 12.0 < 0.1 && (vertex.y - 31.5).abs() - 12.0 < 0.1);
+/// }
+/// ```
 pub fn detect(image: &RgbImage, config: &DetectorConfig) -> Wireframe2d {
     let (width, height) = image.dimensions();
-    if width < 8 || height < 8 {
+    if width < MIN_SIDE || height < MIN_SIDE {
         return Wireframe2d::empty(width, height);
     }
-    let noise = noise::estimate(image);
-    let sigma = noise::smoothing(config.smoothing_in_pixels, noise);
-    let min_gradient = config
-        .min_gradient
-        .max(config.noise_factor * noise::gradient_noise(sigma, noise));
-    let smoothed = SmoothedImage::new(image, sigma);
-    let segments = segment_search::search(&smoothed, min_gradient);
-    graph_of(&smoothed, &segments, min_gradient, SEARCH_WIDTH, config)
+    let prepared = PreparedImage::new(image, config);
+    let reduction = width
+        .max(height)
+        .div_ceil(config.max_search_side.max(MIN_SIDE));
+    let segments = if reduction > 1 {
+        let reduced = SmoothedImage::new(&reduced(image, reduction), prepared.sigma);
+        // Between pixel centres of the two images.
+        let [factor, shift] = [f64::from(reduction), f64::from(reduction - 1) / 2.0];
+        let segments = segment_search::search(&reduced, prepared.min_gradient);
+        let enlarged = |end: &Vector2<f64>| (end * factor).add_scalar(shift);
+        segments
+            .iter()
+            .map(|segment| segment.map(enlarged))
+            .collect()
+    } else {
+        segment_search::search(&prepared.smoothed, prepared.min_gradient)
+    };
+    let search_width = SEARCH_WIDTH.max(1.5 * f64::from(reduction));
+    graph_of(&prepared, &segments, search_width, config)
 }
 
-fn graph_of(
-    image: &SmoothedImage,
+/// The wireframe of segments that another detector found in `image`: they are
+/// fitted to the image and joined as [`detect`]'s own. Those that lie outside the
+/// image, and those along which it shows no edge, are dropped.
+///
+/// ```
+/// use image::{Rgb, RgbImage};
+/// use nalgebra::Vector2;
+/// use neat_core::LineSegment2;
+/// use neat_detect::{DetectorConfig, wireframe_from_segments};
+///
+/// let image = RgbImage::from_fn(64, 64, |x, _| Rgb([if x < 30 { 20 } else { 200 }; 3]));
+/// let rough = LineSegment2::new(Vector2::new(28.0, 5.0), Vector2::new(31.0, 55.0));
+/// let wireframe = wireframe_from_segments(&image, &[rough], &DetectorConfig::default());
+/// assert_eq!(wireframe.edges.len(), 1);
+/// assert!((wireframe.vertices[0].x - 29.5).abs() < 0.05);
+/// ```
+pub fn wireframe_from_segments(
+    image: &RgbImage,
     segments: &[LineSegment2],
+    config: &DetectorConfig,
+) -> Wireframe2d {
+    let (width, height) = image.dimensions();
+    if width < MIN_SIDE || height < MIN_SIDE {
+        return Wireframe2d::empty(width, height);
+    }
+    let inside: Vec<LineSegment2> = (segments.iter())
+        .filter_map(|segment| clipped(segment, Vector2::new(width, height)))
+        .collect();
+    graph_of(
+        &PreparedImage::new(image, config),
+        &inside,
+        SEARCH_WIDTH,
+        config,
+    )
+}
+
+/// The part of a segment within the pixel centres of an image of this size.
+fn clipped(segment: &LineSegment2, size: Vector2<u32>) -> Option<LineSegment2> {
+    let direction = segment.end - segment.start;
+    let [mut first, mut last] = [0.0_f64, 1.0_f64];
+    for axis in 0..2 {
+        let [low, high] = [0.0, f64::from(size[axis]) - 1.0]
+            .map(|border| (border - segment.start[axis]) / direction[axis]);
+        if direction[axis] != 0.0 {
+            first = first.max(low.min(high));
+            last = last.min(low.max(high));
+        } else if !(0.0..f64::from(size[axis])).contains(&segment.start[axis]) {
+            return None;
+        }
+    }
+    let part = LineSegment2::new(segment.point_at(first), segment.point_at(last));
+    // Not so for NaN, and for numbers beyond those of images.
+    let within =
+        |end: &Vector2<f64>| (0..2).all(|axis| (-1.0..=f64::from(size[axis])).contains(&end[axis]));
+    (first < last && part.ends().iter().all(within)).then_some(part)
+}
+
+/// An image with what its noise and texture ask for.
+struct PreparedImage {
+    smoothed: SmoothedImage,
+    /// Standard deviation of its smoothing, in pixels.
+    sigma: f64,
+    /// The smallest strength of an edge, in grey levels per pixel.
     min_gradient: f64,
+}
+
+impl PreparedImage {
+    fn new(image: &RgbImage, config: &DetectorConfig) -> Self {
+        let noise = noise::estimate(image);
+        let sigma = noise::smoothing(config.smoothing_in_pixels, noise);
+        let smoothed = SmoothedImage::new(image, sigma);
+        let min_gradient = (config.min_gradient)
+            .max(config.noise_factor * noise::gradient_noise(sigma, noise))
+            .max(config.texture_factor * smoothed.median_gradient());
+        Self {
+            smoothed,
+            sigma,
+            min_gradient,
+        }
+    }
+}
+
+/// The means over squares of `factor` pixels; pixels of a last, incomplete square
+/// are left out.
+fn reduced(image: &RgbImage, factor: u32) -> RgbImage {
+    let count = factor * factor;
+    RgbImage::from_fn(image.width() / factor, image.height() / factor, |x, y| {
+        let mut sum = [0; 3];
+        for dy in 0..factor {
+            for dx in 0..factor {
+                let pixel = image.get_pixel(x * factor + dx, y * factor + dy);
+                for (sum, value) in sum.iter_mut().zip(pixel.0) {
+                    *sum += u32::from(value);
+                }
+            }
+        }
+        Rgb(sum.map(|sum| ((sum + count / 2) / count) as u8))
+    })
+}
+
+/// Fits segments to the image, merges them and joins them to a graph.
+fn graph_of(
+    image: &PreparedImage,
+    segments: &[LineSegment2],
     search_width: f64,
     config: &DetectorConfig,
 ) -> Wireframe2d {
-    let [width, height] = image.size().map(|side| side as u32);
+    let [width, height] = image.smoothed.size().map(|side| side as u32);
     let scale = DetectorConfig::pixels_per_reference_pixel(width, height);
     let fitter = LineFitter {
-        image,
-        min_gradient,
+        image: &image.smoothed,
+        min_gradient: image.min_gradient,
         max_gap: config.max_gap * scale,
     };
-    let fitted: Vec<FittedSegment> = (segments.iter())
-        .filter_map(|segment| fitter.fit(segment, search_width))
-        .collect();
+    let fitted = fit_all(segments, &fitter, search_width);
     let mut lines = merging::merge(
         fitted,
         &fitter,
         &MergeLimits {
-            distance: config.merge_distance,
+            distance: config.merge_distance_in_pixels,
             sin_angle: config.merge_angle.to_radians().sin(),
             gap: config.max_gap * scale,
         },
     );
+    merging::drop_covered(&mut lines, MAX_OVERSHOOT_ANGLE.to_radians().sin());
     merging::trim_overshoots(&mut lines, MAX_OVERSHOOT_ANGLE.to_radians().sin());
     lines.retain(|line| {
         let length = line.segment.length();
-        length >= config.min_length * scale
-            && (line.sagitta <= 0.3 || line.sagitta <= config.max_sagitta * length)
+        length >= (config.min_length * scale).max(1.0)
+            && (line.sagitta <= STRAIGHT || line.sagitta <= config.max_sagitta * length)
     });
     let limits = JunctionLimits {
         extension: config.max_extension * scale,
@@ -84,28 +226,90 @@ fn graph_of(
     );
     for edge in completed {
         for vertex in edge.vertices {
-            graph.degrees[vertex] += 1;
+            graph.meets_others[vertex] = true;
         }
         graph.edges.push(edge.vertices);
         lines.push(edge.fitted);
     }
-    let edge_scores: Vec<f64> = lines.iter().map(|s| score(s, min_gradient)).collect();
-    let vertex_scores = graph
-        .degrees
-        .iter()
-        .map(|&degree| if degree > 1 { 0.9 } else { 0.3 })
+    let fitted_edges: Vec<FittedEdge> = (lines.iter().zip(&graph.edges))
+        .map(|(line, &vertices)| FittedEdge {
+            vertices,
+            score: score(line, image.min_gradient),
+        })
         .collect();
-    Wireframe2d {
-        vertices: graph.vertices,
-        vertex_scores,
-        edges: graph.edges,
-        edge_scores,
-        width,
-        height,
-    }
+    let kept = clutter::remove(
+        fitted_edges,
+        &graph.vertices,
+        &graph.meets_others,
+        &ClutterLimits {
+            radius: config.clutter_radius * scale,
+            count: config.clutter_count,
+            length: config.clutter_length * scale,
+        },
+    );
+    wireframe(&graph.vertices, kept, config.min_score, [width, height])
 }
 
-fn score(segment: &FittedSegment, min_gradient: f64) -> f64 {
-    let contrast = strength(&segment.change) / min_gradient;
-    segment.support.powi(2) * contrast / (contrast + 2.0)
+/// The wireframe of the edges with a score of at least `min_score` and their
+/// vertices.
+fn wireframe(
+    vertices: &[Vector2<f64>],
+    mut edges: Vec<FittedEdge>,
+    min_score: f64,
+    [width, height]: [u32; 2],
+) -> Wireframe2d {
+    edges.retain(|edge| edge.score >= min_score && edge.vertices[0] != edge.vertices[1]);
+    let mut wireframe = Wireframe2d::empty(width, height);
+    let mut scores_at: Vec<Vec<f64>> = vec![Vec::new(); vertices.len()];
+    for edge in &edges {
+        for vertex in edge.vertices {
+            scores_at[vertex].push(edge.score);
+        }
+    }
+    let mut renumbered = vec![0; vertices.len()];
+    for (vertex, scores) in scores_at
+        .iter()
+        .enumerate()
+        .filter(|(_, scores)| !scores.is_empty())
+    {
+        renumbered[vertex] = wireframe.vertices.len();
+        wireframe.vertices.push(vertices[vertex]);
+        let mean = scores.iter().sum::<f64>() / scores.len() as f64;
+        let certainty = if scores.len() > 1 { 1.0 } else { FREE_END };
+        wireframe.vertex_scores.push(certainty * mean);
+    }
+    for edge in edges {
+        wireframe
+            .edges
+            .push(edge.vertices.map(|vertex| renumbered[vertex]));
+        wireframe.edge_scores.push(edge.score);
+    }
+    wireframe
+}
+
+/// Fits segments, longest first, without those that lie on an earlier one.
+fn fit_all(
+    segments: &[LineSegment2],
+    fitter: &LineFitter,
+    search_width: f64,
+) -> Vec<FittedSegment> {
+    let mut longest_first: Vec<&LineSegment2> = segments.iter().collect();
+    longest_first.sort_by(|a, b| b.length().total_cmp(&a.length()));
+    let mut claimed = ClaimedPixels::new(fitter.image.size());
+    let mut fitted: Vec<FittedSegment> = Vec::new();
+    for segment in longest_first {
+        if !claimed.contain(segment)
+            && let Some(found) = fitter.fit(segment, search_width)
+        {
+            claimed.claim(&found);
+            fitted.push(found);
+        }
+    }
+    fitted
+}
+
+/// The score of an edge: how much of it the image shows, and how clearly.
+fn score(line: &FittedSegment, min_gradient: f64) -> f64 {
+    let contrast = strength(&line.change) / min_gradient;
+    line.support.powi(2) * contrast / (contrast + WEAK_CONTRAST)
 }

@@ -50,7 +50,7 @@ pub(crate) fn complete(
     let mut completed = Vec::new();
     for (_, [a, b]) in candidates {
         let segment = LineSegment2::new(vertices[a], vertices[b]);
-        if fitter.support(&segment, CORNER) < MIN_SUPPORT
+        if !fitter.supports(&segment, CORNER, MIN_SUPPORT)
             || belongs_to_another(&segment, [a, b], vertices, &all)
         {
             continue;

@@ -26,6 +26,11 @@ pub(crate) struct JunctionLimits {
     pub t_extension: f64,
 }
 
+/// Where a junction must lie on the line for certain, it lies this near, in pixels.
+const PRECISE: f64 = 1.0;
+/// Ends under a smaller angle can be the two sides of one thin bar, which do not
+/// meet: the cosine of that angle.
+const TWIN_COS_ANGLE: f64 = 0.97;
 /// The smallest sine of the angle at which a T-junction is made.
 const T_SIN_ANGLE: f64 = 0.3;
 
@@ -33,8 +38,8 @@ const T_SIN_ANGLE: f64 = 0.3;
 /// segment its two vertices.
 pub(crate) struct JunctionGraph {
     pub vertices: Vec<Vector2<f64>>,
-    /// How many segments end in each vertex.
-    pub degrees: Vec<usize>,
+    /// Whether other segments end in each vertex, or it lies on one.
+    pub meets_others: Vec<bool>,
     /// Start and end vertex of every segment, in the order given.
     pub edges: Vec<[usize; 2]>,
 }
@@ -125,17 +130,19 @@ pub(crate) fn build(
             members[vertex].push(end);
         }
     }
+    let mut on_segment = vec![false; members.len()];
     for end in 0..ends.len() {
         if members[vertex_of[end]].len() == 1
             && let Some(position) = t_junction(end, &ends, segments, limits)
         {
             positions[vertex_of[end]] = position;
+            on_segment[vertex_of[end]] = true;
         }
     }
 
     let mut graph = JunctionGraph {
         vertices: Vec::new(),
-        degrees: Vec::new(),
+        meets_others: Vec::new(),
         edges: vec![[0; 2]; segments.len()],
     };
     for (vertex, members) in members
@@ -147,7 +154,7 @@ pub(crate) fn build(
             graph.edges[end / 2][end % 2] = graph.vertices.len();
         }
         graph.vertices.push(positions[vertex]);
-        graph.degrees.push(members.len());
+        (graph.meets_others).push(members.len() > 1 || on_segment[vertex]);
     }
     graph
 }
@@ -219,8 +226,17 @@ fn junction_of(
     }
     let position = normal_matrix.try_inverse()? * right_side;
     let fits = members.iter().all(|&end| {
-        let [along, across] = ends[end].offset_to(&position);
-        across.abs() <= limits.distance && (-limits.retreat..=limits.extension).contains(&along)
+        let own = &ends[end];
+        let [along, across] = own.offset_to(&position);
+        let has_twin = members
+            .iter()
+            .any(|&other| other != end && ends[other].outward.dot(&own.outward) > TWIN_COS_ANGLE);
+        let distance = if has_twin {
+            limits.distance.min(PRECISE)
+        } else {
+            limits.distance
+        };
+        across.abs() <= distance && (-limits.retreat..=limits.extension).contains(&along)
     });
     fits.then_some(position)
 }

@@ -1,16 +1,33 @@
 //! From an image to its 2D wireframe.
+//!
+//! [`detect`] finds line segments (LSD), fits each to the gradient maxima along it
+//! to a few hundredths of a pixel, merges what belongs to one edge, and joins ends
+//! to shared junctions. [`wireframe_from_segments`] does the same with the segments
+//! of another detector, which [`segment_file`] and [`edge_map`] read.
+//!
+//! The stages, in order, each in a file of its name: `noise`, `smoothed_image`,
+//! `segment_search`, `line_fitting` (with `edge_profile` and `robust_line`),
+//! `merging`, `junction_graph`, `edge_completion`, `clutter`.
+//!
+//! Coordinates are those of HAWP's files: pixel centres are integers.
 
+mod claimed_pixels;
+mod clutter;
 mod config;
 mod detection;
 mod edge_completion;
+pub mod edge_map;
 mod edge_profile;
 mod junction_graph;
 mod line_fitting;
 mod merging;
 mod noise;
+#[cfg(feature = "onnx")]
+pub mod onnx;
 mod robust_line;
+pub mod segment_file;
 mod segment_search;
 mod smoothed_image;
 
-pub use config::DetectorConfig;
-pub use detection::detect;
+pub use config::{DetectorConfig, DetectorConfigError};
+pub use detection::{detect, wireframe_from_segments};

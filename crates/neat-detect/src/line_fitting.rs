@@ -1,6 +1,6 @@
 //! Segments fitted to the gradient maxima along them, to a fraction of a pixel.
 
-use crate::edge_profile::{EdgePoint, find_edge, strength};
+use crate::edge_profile::{EdgePoint, EdgeProfile, strength};
 use crate::robust_line::{MIN_POINTS, RobustLine, sagitta};
 use crate::smoothed_image::SmoothedImage;
 use nalgebra::{Vector2, Vector3};
@@ -19,6 +19,8 @@ const FOLLOWINGS: usize = 3;
 const CORNER: f64 = 2.0;
 /// Along an edge the colour changes at most so much for its change across it.
 const MAX_SLANT: f64 = 0.6;
+/// So many points determine a line as well as the image can.
+const MAX_POSITIONS: usize = 64;
 /// A fit that turns a segment by a larger slope has found another edge.
 const MAX_TURN: f64 = 0.5;
 
@@ -88,9 +90,11 @@ impl Axes {
         self.middle + self.direction * position + self.normal * offset
     }
 
-    /// Positions about a pixel apart, from one end to the other.
-    fn positions(&self) -> impl Iterator<Item = f64> {
-        let (steps, length) = ((self.length.round() as usize).max(MIN_POINTS), self.length);
+    /// Positions from one end to the other, about a pixel apart but not more than
+    /// [`MAX_POSITIONS`].
+    fn positions(&self) -> impl Iterator<Item = f64> + use<> {
+        let (length, pixels) = (self.length, self.length.round() as usize);
+        let steps = pixels.clamp(MIN_POINTS, MAX_POSITIONS - 1);
         (0..=steps).map(move |step| (step as f64 / steps as f64 - 0.5) * length)
     }
 }
@@ -116,27 +120,45 @@ impl LineFitter<'_> {
         self.describe(&segment, spread)
     }
 
-    /// How well the image supports `segment` as it is: the share of its length,
-    /// without `margin` at each end, along which there is an edge.
-    pub(crate) fn support(&self, segment: &LineSegment2, margin: f64) -> f64 {
+    /// As [`Self::fit`], but the ends stay where they are along the segment.
+    pub(crate) fn fit_between_ends(
+        &self,
+        segment: &LineSegment2,
+        search_width: f64,
+    ) -> Option<FittedSegment> {
+        let (segment, _) = self.refit(segment, search_width)?;
+        let (segment, spread) = self.refit(&segment, NARROW[1])?;
+        self.describe(&segment, spread)
+    }
+
+    /// Whether there is an edge along the share `min_support` of `segment`, without
+    /// `margin` at each end.
+    pub(crate) fn supports(&self, segment: &LineSegment2, margin: f64, min_support: f64) -> bool {
         let Some(axes) = Axes::of(segment) else {
-            return 0.0;
+            return false;
         };
         let limit = 0.5 * axes.length - margin;
-        let (mut supported, mut total) = (0, 0);
-        for position in axes.positions().filter(|position| position.abs() <= limit) {
-            total += 1;
-            supported += usize::from(self.has_edge(&axes, position, OFFSET_BOUNDS[1]));
-        }
-        supported as f64 / total.max(1) as f64
+        let inner: Vec<f64> = axes.positions().filter(|at| at.abs() <= limit).collect();
+        // Most segments that are asked for are none: the first misses tell.
+        let mut allowed = ((1.0 - min_support) * inner.len() as f64) as usize;
+        !inner.is_empty()
+            && inner.iter().all(|&position| {
+                let missed = !self.has_edge(&axes, position, OFFSET_BOUNDS[1]);
+                let within = !missed || allowed > 0;
+                allowed = allowed.saturating_sub(usize::from(missed));
+                within
+            })
     }
 
     /// Whether colours change all along `segment`, in whatever direction: near a
     /// stronger edge a weaker one cannot be told apart, but the image is not flat.
     pub(crate) fn is_nowhere_flat(&self, segment: &LineSegment2) -> bool {
         Axes::of(segment).is_none_or(|axes| {
-            axes.positions()
-                .all(|at| self.edge(&axes, at, NARROW[0], None).is_some())
+            axes.positions().all(|position| {
+                let point = axes.point(position, 0.0);
+                EdgeProfile::sample(self.image, &point, &axes.normal, NARROW[0])
+                    .is_some_and(|profile| profile.max_strength() >= self.min_gradient)
+            })
         })
     }
 
@@ -145,11 +167,14 @@ impl LineFitter<'_> {
         let axes = Axes::of(segment)?;
         let limit = max_offset(spread);
         let edges: Vec<(f64, EdgePoint)> = (axes.positions())
-            .filter_map(|position| Some((position, self.edge(&axes, position, limit, None)?)))
+            .filter_map(|position| Some((position, self.edge(&axes, position, limit)?)))
             .collect();
         if edges.len() < MIN_POINTS {
             return None;
         }
+        let supported = (axes.positions())
+            .filter(|&position| self.has_edge(&axes, position, OFFSET_BOUNDS[1]))
+            .count();
         let change: Vector3<f64> = edges.iter().map(|(_, edge)| edge.change).sum();
         let straight = 0.5 * axes.length - CORNER;
         let inner: Vec<[f64; 2]> = (edges.iter())
@@ -164,22 +189,18 @@ impl LineFitter<'_> {
         Some(FittedSegment {
             segment: *segment,
             change: change / edges.len() as f64,
-            support: self.support(segment, 0.0),
+            support: supported as f64 / axes.positions().count() as f64,
             spread,
             sagitta: bend,
         })
     }
 
-    /// The edge across the line at `position`, if it is strong enough.
-    fn edge(
-        &self,
-        axes: &Axes,
-        position: f64,
-        half_width: f64,
-        contrast: Option<&Vector3<f64>>,
-    ) -> Option<EdgePoint> {
+    /// The edge of either contrast across the line at `position`, if it is strong
+    /// enough.
+    fn edge(&self, axes: &Axes, position: f64, half_width: f64) -> Option<EdgePoint> {
         let point = axes.point(position, 0.0);
-        find_edge(self.image, &point, &axes.normal, half_width, contrast)
+        EdgeProfile::sample(self.image, &point, &axes.normal, half_width)?
+            .edge(None)
             .filter(|edge| strength(&edge.change) >= self.min_gradient)
     }
 
@@ -187,19 +208,25 @@ impl LineFitter<'_> {
     /// spread. The ends move only across the segment.
     fn refit(&self, segment: &LineSegment2, half_width: f64) -> Option<(LineSegment2, f64)> {
         let axes = Axes::of(segment)?;
-        // Edges of either contrast say which contrast is meant.
-        let any = axes
-            .positions()
-            .filter_map(|at| self.edge(&axes, at, half_width, None));
-        let change: Vector3<f64> = any.map(|edge| edge.change).sum();
-        let contrast = change.try_normalize(1e-9)?;
-        let points: Vec<[f64; 2]> = (axes.positions())
-            .filter_map(|at| {
-                Some([
-                    at,
-                    self.edge(&axes, at, half_width, Some(&contrast))?.offset,
-                ])
+        let profiles: Vec<(f64, EdgeProfile)> = (axes.positions())
+            .filter_map(|position| {
+                let point = axes.point(position, 0.0);
+                let profile = EdgeProfile::sample(self.image, &point, &axes.normal, half_width)?;
+                Some((position, profile))
             })
+            .collect();
+        let edges = |contrast: Option<Vector3<f64>>| {
+            (profiles.iter())
+                .filter_map(move |(position, profile)| {
+                    Some((*position, profile.edge(contrast.as_ref())?))
+                })
+                .filter(|(_, edge)| strength(&edge.change) >= self.min_gradient)
+        };
+        // Edges of either contrast say which contrast is meant.
+        let change: Vector3<f64> = edges(None).map(|(_, edge)| edge.change).sum();
+        let contrast = change.try_normalize(1e-9)?;
+        let points: Vec<[f64; 2]> = edges(Some(contrast))
+            .map(|(position, edge)| [position, edge.offset])
             .collect();
         let line = RobustLine::fit(&points)?;
         if line.slope.abs() > MAX_TURN {
@@ -212,16 +239,21 @@ impl LineFitter<'_> {
         Some((LineSegment2::new(start, end), line.spread))
     }
 
-    /// The stretch around the middle of `segment`, on its line, along which there
-    /// is an edge within `max_offset` of it. A gap is passed if the edge beyond it
-    /// is longer than the gap.
+    /// The stretch of `segment`'s line along which there is an edge within
+    /// `max_offset` of it. A gap is passed if the edge beyond it is longer than the
+    /// gap.
     fn follow(&self, segment: &LineSegment2, max_offset: f64) -> Option<LineSegment2> {
         let axes = Axes::of(segment)?;
-        let seed = (axes.positions())
-            .filter(|&position| self.has_edge(&axes, position, max_offset))
-            .min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+        let supported = |position: &f64| self.has_edge(&axes, *position, max_offset);
+        // From the middle outwards, so that the search ends early.
+        let mut from_middle: Vec<f64> = axes.positions().collect();
+        from_middle.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let inner = from_middle.into_iter().find(supported);
         let walk = |sign: f64| {
-            let (mut end, mut position) = (seed, seed);
+            // From the end, or where that hangs in the air, from the inside.
+            let near_end = [0.0, 1.0, 2.0].map(|inwards| sign * (0.5 * axes.length - inwards));
+            let first = near_end.into_iter().find(supported).or(inner)?;
+            let (mut end, mut position) = (first, first);
             let (mut gap, mut run) = (0.0, 0.0);
             while gap <= self.max_gap {
                 position += sign;
@@ -238,9 +270,9 @@ impl LineFitter<'_> {
                     run = 0.0;
                 }
             }
-            end
+            Some(end)
         };
-        let [start, end] = [walk(-1.0), walk(1.0)];
+        let [start, end] = [walk(-1.0)?, walk(1.0)?];
         Some(LineSegment2::new(
             axes.point(start, 0.0),
             axes.point(end, 0.0),
@@ -249,7 +281,7 @@ impl LineFitter<'_> {
 
     /// Whether an edge along the line passes it at `position`.
     fn has_edge(&self, axes: &Axes, position: f64, max_offset: f64) -> bool {
-        let Some(edge) = self.edge(axes, position, max_offset, None) else {
+        let Some(edge) = self.edge(axes, position, max_offset) else {
             return false;
         };
         if edge.offset.abs() > max_offset {

@@ -2,15 +2,15 @@
 //! and segments that run into each other under a small angle end where they meet.
 
 use crate::line_fitting::{FittedSegment, LineFitter, normal_of};
+use nalgebra::Vector2;
 use neat_core::LineSegment2;
 
 /// Edges of opposite contrast, such as the two sides of a thin line, are one
 /// only if they are nearer than this, in pixels.
 const SAME_EDGE: f64 = 0.75;
-/// A fit to joined pieces must keep so much of their joint length.
-const MIN_KEPT_LENGTH: f64 = 0.9;
-/// A fit to joined pieces has at most this spread, in pixels.
-const MAX_SPREAD: f64 = 0.6;
+/// The ends of joined pieces lie no farther from their common line, in pixels:
+/// else they meet under an angle.
+const MAX_BEND: f64 = 0.75;
 /// A segment that follows another edge beyond their crossing stays this near to
 /// it, in pixels.
 const OVERSHOOT: f64 = 1.5;
@@ -33,23 +33,37 @@ pub(crate) fn merge(
     fitter: &LineFitter,
     limits: &MergeLimits,
 ) -> Vec<FittedSegment> {
-    loop {
-        sort_by_length(&mut segments);
-        let before = segments.len();
-        let mut kept: Vec<FittedSegment> = Vec::new();
-        for segment in segments {
-            let merged = (kept.iter_mut()).find_map(|long| {
-                joined(long, &segment, fitter, limits).map(|joined| *long = joined)
+    // Two that did not belong together in one round need not be asked again.
+    let mut changed = vec![true; segments.len()];
+    while changed.contains(&true) {
+        let mut order: Vec<usize> = (0..segments.len()).collect();
+        order.sort_by(|&a, &b| {
+            segments[b]
+                .segment
+                .length()
+                .total_cmp(&segments[a].segment.length())
+        });
+        let mut kept: Vec<(FittedSegment, bool, bool)> = Vec::new();
+        for index in order {
+            let (segment, was_changed) = (&segments[index], changed[index]);
+            let merged = kept.iter_mut().find_map(|(long, long_changed, changes)| {
+                let asked = was_changed || *long_changed || *changes;
+                let joined = asked
+                    .then(|| joined(long, segment, fitter, limits))
+                    .flatten()?;
+                *changes |= joined != *long;
+                *long = joined;
+                Some(())
             });
             if merged.is_none() {
-                kept.push(segment);
+                kept.push((segment.clone(), was_changed, false));
             }
         }
-        segments = kept;
-        if segments.len() == before {
-            return segments;
-        }
+        changed = kept.iter().map(|(_, _, changes)| *changes).collect();
+        segments = kept.into_iter().map(|(segment, ..)| segment).collect();
     }
+    sort_by_length(&mut segments);
+    segments
 }
 
 /// Longest first.
@@ -65,6 +79,9 @@ fn joined(
     limits: &MergeLimits,
 ) -> Option<FittedSegment> {
     let direction = long.direction();
+    if direction.perp(&short.direction()).abs() > limits.sin_angle {
+        return None;
+    }
     let normal = normal_of(&direction);
     let length = long.segment.length();
     let same_way = direction.dot(&short.direction()) >= 0.0;
@@ -94,9 +111,6 @@ fn joined(
     if first >= -limits.distance && last <= length + limits.distance {
         return Some(long.clone());
     }
-    if direction.perp(&short.direction()).abs() > limits.sin_angle {
-        return None;
-    }
     let whole = LineSegment2::new(
         if first < 0.0 {
             short_way.start
@@ -109,9 +123,40 @@ fn joined(
             long.segment.end
         },
     );
-    fitter.fit(&whole, limits.distance).filter(|fitted| {
-        fitted.spread <= MAX_SPREAD && fitted.segment.length() >= MIN_KEPT_LENGTH * whole.length()
-    })
+    fitter
+        .fit_between_ends(&whole, limits.distance)
+        .filter(|fitted| {
+            let line = &fitted.segment;
+            let off_line =
+                |end: &Vector2<f64>| (line.point_at(line.line_parameter(end)) - end).norm();
+            let all_ends = long.segment.ends().into_iter().chain(short_way.ends());
+            all_ends.map(|end| off_line(&end)).fold(0.0, f64::max) <= MAX_BEND
+        })
+}
+
+/// Drops segments of which longer ones of about the same direction cover all:
+/// chords across a corner between two long edges.
+pub(crate) fn drop_covered(segments: &mut Vec<FittedSegment>, max_sin_angle: f64) {
+    sort_by_length(segments);
+    for index in (0..segments.len()).rev() {
+        let (longer, rest) = segments.split_at(index);
+        let covered = rest.first().is_some_and(|segment| {
+            let covering: Vec<&LineSegment2> = (longer.iter())
+                .filter(|other| segment.direction().perp(&other.direction()).abs() <= max_sin_angle)
+                .map(|other| &other.segment)
+                .collect();
+            let steps = segment.segment.length().ceil() as usize;
+            (0..=steps).all(|step| {
+                let point = segment.segment.point_at(step as f64 / steps as f64);
+                covering
+                    .iter()
+                    .any(|other| other.distance_to_point(&point) <= OVERSHOOT)
+            })
+        });
+        if covered {
+            segments.remove(index);
+        }
+    }
 }
 
 /// Cuts off what runs on along another segment beyond the point where they meet:

@@ -3,12 +3,13 @@
 use image::RgbImage;
 use nalgebra::{Vector2, Vector3};
 
-/// Red, green and blue planes of an image after a Gaussian filter, in grey
-/// levels from 0 to 255. The centre of the first pixel is (0, 0).
+/// An image after a Gaussian filter, in grey levels from 0 to 255. The centre of
+/// the first pixel is (0, 0).
 pub(crate) struct SmoothedImage {
     width: usize,
     height: usize,
-    planes: [Vec<f32>; 3],
+    /// Red, green, blue, and a zero that makes a pixel one vector register.
+    pixels: Vec<[f32; 4]>,
 }
 
 impl SmoothedImage {
@@ -17,16 +18,19 @@ impl SmoothedImage {
     pub(crate) fn new(image: &RgbImage, sigma: f64) -> Self {
         let (width, height) = (image.width() as usize, image.height() as usize);
         let kernel = gaussian_kernel(sigma);
-        let planes = std::array::from_fn(|channel| {
-            let plane: Vec<f32> = (image.as_raw().iter().skip(channel).step_by(3))
-                .map(|&value| f32::from(value))
-                .collect();
-            smooth(&plane, width, height, &kernel)
-        });
+        let mut pixels = vec![[0.0; 4]; width * height];
+        for channel in 0..3 {
+            let values = image.as_raw().iter().skip(channel).step_by(3);
+            let plane: Vec<f32> = values.map(|&value| f32::from(value)).collect();
+            let smoothed = smooth(&plane, width, height, &kernel);
+            for (pixel, value) in pixels.iter_mut().zip(smoothed) {
+                pixel[channel] = value;
+            }
+        }
         Self {
             width,
             height,
-            planes,
+            pixels,
         }
     }
 
@@ -52,25 +56,48 @@ impl SmoothedImage {
         let x_weights = catmull_rom((point.x - column as f64) as f32);
         let y_weights = catmull_rom((point.y - row as f64) as f32);
         let first = (row - 1) * self.width + column - 1;
-        let sample_plane = |plane: &[f32]| {
-            let mut sum = 0.0;
-            for (i, y_weight) in y_weights.iter().enumerate() {
-                let taps = &plane[first + i * self.width..][..4];
-                let along_x: f32 = taps.iter().zip(&x_weights).map(|(tap, w)| tap * w).sum();
-                sum += along_x * y_weight;
+        let mut sum = [0.0; 4];
+        for (i, y_weight) in y_weights.iter().enumerate() {
+            let taps = &self.pixels[first + i * self.width..][..4];
+            for (tap, x_weight) in taps.iter().zip(&x_weights) {
+                let weight = x_weight * y_weight;
+                for channel in 0..4 {
+                    sum[channel] += tap[channel] * weight;
+                }
             }
-            sum
-        };
-        Vector3::from_fn(|channel, _| sample_plane(&self.planes[channel]))
+        }
+        Vector3::new(sum[0], sum[1], sum[2])
     }
 
     /// The components of all colours along a direction of the colour space, in
     /// row order.
     pub(crate) fn projected(&self, direction: &Vector3<f32>) -> Vec<f64> {
-        let [red, green, blue] = &self.planes;
-        (red.iter().zip(green).zip(blue))
-            .map(|((r, g), b)| f64::from(direction.x * r + direction.y * g + direction.z * b))
+        (self.pixels.iter())
+            .map(|[r, g, b, _]| f64::from(direction.x * r + direction.y * g + direction.z * b))
             .collect()
+    }
+
+    /// The median over a grid of pixels of the change of colour to the next pixel
+    /// to the right and below, root mean square over the channels.
+    pub(crate) fn median_gradient(&self) -> f64 {
+        const STEP: usize = 4;
+        let mut gradients: Vec<f32> = Vec::new();
+        for row in (0..self.height.saturating_sub(1)).step_by(STEP) {
+            for column in (0..self.width.saturating_sub(1)).step_by(STEP) {
+                let at = row * self.width + column;
+                let squares = (0..3).map(|channel| {
+                    let change =
+                        |other: usize| self.pixels[other][channel] - self.pixels[at][channel];
+                    change(at + 1).powi(2) + change(at + self.width).powi(2)
+                });
+                gradients.push((squares.sum::<f32>() / 3.0).sqrt());
+            }
+        }
+        let middle = gradients.len() / 2;
+        if gradients.is_empty() {
+            return 0.0;
+        }
+        f64::from(*gradients.select_nth_unstable_by(middle, f32::total_cmp).1)
     }
 }
 

@@ -1,0 +1,290 @@
+//! Segments of edge maps: images in which edges are bright lines on black.
+//!
+//! Lines are thinned to one pixel (Zhang and Suen, 1984), followed from end to end
+//! and split where they bend (Douglas and Peucker, 1973).
+
+use image::{GrayImage, ImageReader};
+use nalgebra::Vector2;
+use neat_core::{LineSegment2, SceneError};
+use std::io::Cursor;
+use std::path::Path;
+
+/// Pixels at least this bright are edges, as a share of the brightest.
+const THRESHOLD: f64 = 0.5;
+/// A piece of a line is straight if it keeps this near to its chord, in pixels.
+const STRAIGHT: f64 = 1.5;
+/// Shorter pieces are dropped, in pixels.
+const MIN_LENGTH: f64 = 5.0;
+/// Thicker lines than twice this, in pixels, are no lines: thinning stops.
+const MAX_THINNING: usize = 32;
+/// The longest side of an edge map, in pixels.
+const MAX_SIDE: u32 = 1 << 14;
+/// Neighbours of a pixel, clockwise from the one above.
+const NEIGHBORS: [[isize; 2]; 8] = [
+    [0, -1],
+    [1, -1],
+    [1, 0],
+    [1, 1],
+    [0, 1],
+    [-1, 1],
+    [-1, 0],
+    [-1, -1],
+];
+
+/// Reads an edge map.
+///
+/// # Errors
+/// If the file is missing, empty or no image.
+pub fn read(path: &Path) -> Result<GrayImage, SceneError> {
+    parse(
+        &neat_core::file::read(path, "give one edge map per image")?,
+        path,
+    )
+}
+
+/// [`read`] from bytes; `path` is for messages.
+///
+/// # Errors
+/// As [`read`].
+pub fn parse(bytes: &[u8], path: &Path) -> Result<GrayImage, SceneError> {
+    let decode = || {
+        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
+        let mut limits = image::Limits::default();
+        limits.max_image_width = Some(MAX_SIDE);
+        limits.max_image_height = Some(MAX_SIDE);
+        reader.limits(limits);
+        reader.decode()
+    };
+    match decode() {
+        Ok(map) => Ok(map.into_luma8()),
+        Err(source) => Err(SceneError::Image {
+            path: path.into(),
+            source,
+        }),
+    }
+}
+
+/// The straight pieces of the lines of an edge map.
+///
+/// ```
+/// let mut map = image::GrayImage::new(60, 40);
+/// for x in 10..50 {
+///     map.put_pixel(x, 20, image::Luma([255]));
+/// }
+/// let segments = neat_detect::edge_map::segments(&map);
+/// assert_eq!(segments.len(), 1);
+/// assert!(segments[0].length() > 35.0);
+/// ```
+pub fn segments(map: &GrayImage) -> Vec<LineSegment2> {
+    let brightest = map.iter().copied().max().unwrap_or(0);
+    let threshold = (f64::from(brightest) * THRESHOLD).max(1.0);
+    let mut lines = Mask::new(map, |value| f64::from(value) >= threshold);
+    lines.thin();
+    let mut segments = Vec::new();
+    for chain in lines.chains() {
+        split(&chain, &mut segments);
+    }
+    segments.retain(|segment| segment.length() >= MIN_LENGTH);
+    segments
+}
+
+/// A binary image with a margin of one pixel, which is never set.
+struct Mask {
+    width: usize,
+    set: Vec<bool>,
+}
+
+impl Mask {
+    fn new(map: &GrayImage, is_set: impl Fn(u8) -> bool) -> Self {
+        let (width, height) = (map.width() as usize + 2, map.height() as usize + 2);
+        let mut set = vec![false; width * height];
+        for (x, y, value) in map.enumerate_pixels() {
+            set[(y as usize + 1) * width + x as usize + 1] = is_set(value.0[0]);
+        }
+        Self { width, set }
+    }
+
+    /// The indices of the eight neighbours of an inner pixel.
+    fn neighbors(&self, index: usize) -> [usize; 8] {
+        NEIGHBORS.map(|[x, y]| index.wrapping_add_signed(y * self.width as isize + x))
+    }
+
+    fn indices(&self) -> Vec<usize> {
+        (0..self.set.len())
+            .filter(|&index| self.set[index])
+            .collect()
+    }
+
+    /// Thins lines to one pixel.
+    fn thin(&mut self) {
+        let mut candidates = self.indices();
+        for _ in 0..MAX_THINNING {
+            let before = candidates.len();
+            for first_pass in [true, false] {
+                let removed: Vec<usize> = (candidates.iter().copied())
+                    .filter(|&index| self.is_removable(index, first_pass))
+                    .collect();
+                for index in removed {
+                    self.set[index] = false;
+                }
+                candidates.retain(|&index| self.set[index]);
+            }
+            if candidates.len() == before {
+                return;
+            }
+        }
+    }
+
+    /// The condition of Zhang and Suen.
+    fn is_removable(&self, index: usize, first_pass: bool) -> bool {
+        let around = self.neighbors(index).map(|neighbor| self.set[neighbor]);
+        let count = around.iter().filter(|set| **set).count();
+        let rises = (0..8)
+            .filter(|&i| !around[i] && around[(i + 1) % 8])
+            .count();
+        let [up, right, down, left] = [around[0], around[2], around[4], around[6]];
+        let open = if first_pass {
+            !(right && down && (up || left))
+        } else {
+            !(up && left && (right || down))
+        };
+        (2..=6).contains(&count) && rises == 1 && open
+    }
+
+    /// The lines as chains of pixel positions: from ends and branches first, then
+    /// what is left, which is closed.
+    fn chains(mut self) -> Vec<Vec<Vector2<f64>>> {
+        let indices = self.indices();
+        let degree = |mask: &Self, index: usize| {
+            mask.neighbors(index)
+                .iter()
+                .filter(|&&neighbor| mask.set[neighbor])
+                .count()
+        };
+        let is_node: Vec<bool> = (indices.iter())
+            .map(|&index| degree(&self, index) != 2)
+            .collect();
+        let mut nodes = vec![false; self.set.len()];
+        for (&index, &is_node) in indices.iter().zip(&is_node) {
+            nodes[index] = is_node;
+        }
+        let mut chains = Vec::new();
+        for &start in indices.iter().filter(|&&index| nodes[index]) {
+            for next in self.neighbors(start) {
+                if self.set[next] && !nodes[next] {
+                    chains.push(self.walk(start, next, &nodes));
+                }
+            }
+        }
+        for &start in &indices {
+            if self.set[start] && !nodes[start] {
+                self.set[start] = false;
+                let next = self
+                    .neighbors(start)
+                    .into_iter()
+                    .find(|&next| self.set[next]);
+                chains.extend(next.map(|next| self.walk(start, next, &nodes)));
+            }
+        }
+        let width = self.width;
+        let position =
+            |index: usize| Vector2::new((index % width) as f64 - 1.0, (index / width) as f64 - 1.0);
+        chains
+            .into_iter()
+            .map(|chain| chain.into_iter().map(position).collect())
+            .collect()
+    }
+
+    /// Follows and erases a line from `start` over `next` to the next node.
+    fn walk(&mut self, start: usize, next: usize, nodes: &[bool]) -> Vec<usize> {
+        let mut chain = vec![start, next];
+        let mut at = next;
+        self.set[at] = false;
+        loop {
+            let neighbors = self.neighbors(at);
+            if let Some(&next) = neighbors
+                .iter()
+                .find(|&&next| self.set[next] && !nodes[next])
+            {
+                self.set[next] = false;
+                chain.push(next);
+                at = next;
+                continue;
+            }
+            let end = neighbors
+                .iter()
+                .find(|&&next| nodes[next] && !chain[..2].contains(&next));
+            chain.extend(end);
+            return chain;
+        }
+    }
+}
+
+/// Splits a chain into straight pieces, in order.
+fn split(chain: &[Vector2<f64>], segments: &mut Vec<LineSegment2>) {
+    // A stack, not recursion: a file must not decide how deep it goes.
+    let mut pieces = vec![chain];
+    while let Some(piece) = pieces.pop() {
+        let [first, .., last] = piece else {
+            continue;
+        };
+        let chord = LineSegment2::new(*first, *last);
+        let farthest = (piece.iter().enumerate())
+            .map(|(index, point)| (chord.distance_to_point(point), index))
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        match farthest {
+            Some((distance, index)) if distance > STRAIGHT => {
+                pieces.push(&piece[index..]);
+                pieces.push(&piece[..=index]);
+            }
+            _ => segments.push(chord),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Luma;
+
+    /// Draws a line of the given thickness.
+    fn draw(map: &mut GrayImage, from: [f64; 2], to: [f64; 2], thickness: f64) {
+        let line = LineSegment2::new(from.into(), to.into());
+        for (x, y, value) in map.enumerate_pixels_mut() {
+            let point = Vector2::new(f64::from(x), f64::from(y));
+            if line.distance_to_point(&point) <= thickness / 2.0 {
+                *value = Luma([200]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_thick_triangle_gives_its_three_sides() {
+        let corners = [[15.0, 20.0], [110.0, 30.0], [50.0, 90.0]];
+        let mut map = GrayImage::new(128, 100);
+        for i in 0..3 {
+            draw(&mut map, corners[i], corners[(i + 1) % 3], 3.0);
+        }
+        let found = segments(&map);
+        for i in 0..3 {
+            let side = LineSegment2::new(corners[i].into(), corners[(i + 1) % 3].into());
+            let near = |end| side.distance_to_point(&end) < 2.5;
+            let length: f64 = (found.iter())
+                .filter(|segment| segment.ends().into_iter().all(near))
+                .map(LineSegment2::length)
+                .sum();
+            assert!(
+                length > 0.8 * side.length(),
+                "{length} of {}",
+                side.length()
+            );
+        }
+    }
+
+    #[test]
+    fn maps_without_lines_have_no_segments() {
+        assert_eq!(segments(&GrayImage::new(0, 0)), []);
+        assert_eq!(segments(&GrayImage::new(30, 30)), []);
+        segments(&GrayImage::from_pixel(30, 30, Luma([255])));
+    }
+}
