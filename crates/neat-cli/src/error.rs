@@ -91,7 +91,9 @@ impl CliError {
         match self {
             Self::Pipeline(PipelineError::Interrupted { .. }) => INTERRUPTED,
             Self::Pipeline(error) if error.is_bad_input() => BAD_INPUT,
-            Self::Override(_) | Self::UnknownView { .. } | Self::Threads(_) => BAD_INPUT,
+            Self::Override(_) | Self::UnknownView { .. } | Self::Threads(_) | Self::NotReady => {
+                BAD_INPUT
+            }
             // `neat info SCENE | head` is no failure.
             Self::Output(_) if self.is_closed_pipe() => 0,
             _ => FAILED,

@@ -2,8 +2,8 @@
 
 use crate::arguments::positive;
 use clap::Args;
-use neat_core::{LoadOptions, SphereChoice};
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
+use neat_core::{LoadOptions, SphereChoice};
 use neat_pipeline::config::DataConfig;
 use neat_pipeline::preset::Preset;
 use neat_pipeline::scene::load_options;
@@ -80,7 +80,10 @@ impl fmt::Display for SceneArgs {
         flag("poses", self.poses.map(|x| x.to_string()))?;
         flag("camera-axes", self.camera_axes.map(|x| x.to_string()))?;
         flag("focal-scale", self.focal_scale.map(|x| x.to_string()))?;
-        flag("intrinsics-scale", self.intrinsics_scale.map(|x| x.to_string()))?;
+        flag(
+            "intrinsics-scale",
+            self.intrinsics_scale.map(|x| x.to_string()),
+        )?;
         match self.mirrored_world {
             true => f.write_str(" --mirrored-world"),
             false => Ok(()),

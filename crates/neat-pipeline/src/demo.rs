@@ -2,8 +2,8 @@
 //! evaluate.
 
 use crate::error::PipelineError;
-use crate::event::{Event, OnEvent, Stage};
-use crate::reconstruct::{Reconstruction, RunOptions, reconstruct, timed};
+use crate::event::{Event, OnEvent, Stage, timed};
+use crate::reconstruct::{Reconstruction, RunOptions, reconstruct};
 use crate::run_dir::{Existing, RunDir};
 use neat_core::ground_truth::{GroundTruth, write_ground_truth};
 use neat_core::layout::abc;

@@ -1,5 +1,10 @@
 //! 2D wireframes for scenes that come without: detected, and kept for next time.
 
+mod folder;
+
+pub use folder::{DetectOptions, Detected, SegmentSource, detect_folder};
+
+use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage};
 use neat_core::file_cache::{CacheKey, FileCache};
 use neat_core::{Scene, SceneError, View, Wireframe2d, hawp_json};
@@ -7,6 +12,8 @@ use neat_detect::{DetectorConfig, detect};
 use rayon::prelude::*;
 use std::path::Path;
 
+/// Files and detectors have pixel centres at integers.
+const DETECTED_WITH_PIXEL_CENTER: f64 = 0.0;
 /// Raised when the detector finds something else in the same image.
 const DETECTOR_VERSION: u32 = 1;
 
@@ -17,14 +24,15 @@ const DETECTOR_VERSION: u32 = 1;
 /// What `cache` holds for an image and this configuration is not detected again.
 ///
 /// # Errors
-/// If no view has a segment.
+/// If the configuration is out of range, or no view has a segment.
 pub fn detect_wireframes(
     scene: &mut Scene,
     config: &DetectorConfig,
     min_segment_score: f64,
     cache: Option<&FileCache>,
     on_event: OnEvent<'_>,
-) -> Result<Vec<String>, SceneError> {
+) -> Result<Vec<String>, PipelineError> {
+    config.validate()?;
     let mut warnings = Vec::new();
     let views = scene.views.len();
     let mut done = 0;
@@ -57,11 +65,11 @@ pub fn detect_wireframes(
     }));
     scene.retain_views(has_segments);
     if scene.views.is_empty() {
-        return Err(SceneError::NoUsableView {
+        return Err(PipelineError::Scene(SceneError::NoUsableView {
             path: scene.name.clone().into(),
             views,
             min_segment_score,
-        });
+        }));
     }
     Ok(warnings)
 }
@@ -80,12 +88,15 @@ fn detect_in(
     let name = Path::new("2D wireframe");
     let stored = cache
         .get(&key)
-        .and_then(|bytes| hawp_json::parse(&bytes, 0.0, name).ok());
+        .and_then(|bytes| hawp_json::parse(&bytes, DETECTED_WITH_PIXEL_CENTER, name).ok());
     if let Some(wireframe) = stored {
         return (wireframe, None);
     }
     let wireframe = detect(&view.image, config);
-    let stored = cache.put(&key, &hawp_json::to_bytes(&wireframe, 0.0));
+    let stored = cache.put(
+        &key,
+        &hawp_json::to_bytes(&wireframe, DETECTED_WITH_PIXEL_CENTER),
+    );
     let warning = stored
         .err()
         .map(|error| format!("detected 2D wireframes are not kept for the next run: {error}"));
@@ -94,7 +105,7 @@ fn detect_in(
 
 fn key(view: &View, config: &DetectorConfig) -> CacheKey {
     let (width, height) = view.image.dimensions();
-    let settings = toml::to_string(config).unwrap_or_default();
+    let settings = toml::to_string(config).expect("detection::key: settings can be written");
     let inputs = [
         &width.to_le_bytes(),
         &height.to_le_bytes(),
@@ -122,7 +133,10 @@ mod tests {
         scene
     }
 
-    fn detected(scene: &mut Scene, cache: Option<&FileCache>) -> Result<Vec<String>, SceneError> {
+    fn detected(
+        scene: &mut Scene,
+        cache: Option<&FileCache>,
+    ) -> Result<Vec<String>, PipelineError> {
         detect_wireframes(scene, &DetectorConfig::default(), 0.05, cache, &mut |_| {})
     }
 

@@ -29,6 +29,14 @@ pub enum PipelineError {
     /// A synthetic scene cannot be made as asked for.
     #[error(transparent)]
     Synthetic(#[from] SyntheticError),
+    /// The settings of the detector are out of range.
+    #[error("the section `detect` of the configuration: {0}")]
+    Detector(#[from] neat_detect::DetectorConfigError),
+    /// The scene would be lost time: what stands against it, line by line.
+    #[error(
+        "the scene is not fit for a run:\n{0}\n`neat doctor` explains it; --no-doctor runs it nevertheless"
+    )]
+    NotReady(String),
     /// The optimisation failed.
     #[error(transparent)]
     Train(#[from] TrainError),
@@ -65,7 +73,9 @@ impl PipelineError {
             | Self::Backend(_)
             | Self::SceneDirNotEmpty(_)
             | Self::Synthetic(_)
-            | Self::Metrics(_) => true,
+            | Self::Metrics(_)
+            | Self::Detector(_)
+            | Self::NotReady(_) => true,
             Self::Train(error) => matches!(
                 error,
                 TrainError::Config(_)

@@ -1,10 +1,12 @@
 //! What a run tells while it works. Libraries report; only a user interface
 //! draws.
 
+use crate::error::PipelineError;
 use crate::trainer::StepReport;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// A part of a run that takes time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -16,6 +18,8 @@ pub enum Stage {
     Load,
     /// 2D wireframes are detected, where the scene has none.
     Detect,
+    /// Poses and images are examined, see the crate `neat-doctor`.
+    Examine,
     /// The fields are optimised.
     Train,
     /// The wireframe is taken out of the fields.
@@ -32,6 +36,7 @@ impl fmt::Display for Stage {
             Self::Synthesise => "synthesise",
             Self::Load => "load",
             Self::Detect => "detect",
+            Self::Examine => "examine",
             Self::Train => "train",
             Self::Distill => "distill",
             Self::Export => "export",
@@ -77,3 +82,17 @@ pub enum Event<'a> {
 
 /// Who listens to the events of a run.
 pub type OnEvent<'a> = &'a mut dyn FnMut(Event<'_>);
+
+/// Does a stage, tells when it begins and ends, and returns its time too.
+pub(crate) fn timed<T>(
+    on_event: OnEvent<'_>,
+    stage: Stage,
+    work: impl FnOnce(OnEvent<'_>) -> Result<T, PipelineError>,
+) -> Result<(T, f64), PipelineError> {
+    on_event(Event::StageStarted(stage));
+    let start = Instant::now();
+    let value = work(on_event)?;
+    let seconds = start.elapsed().as_secs_f64();
+    on_event(Event::StageFinished { stage, seconds });
+    Ok((value, seconds))
+}

@@ -8,7 +8,7 @@ pub use picture::draw_wireframe;
 use image::RgbImage;
 use line_drawing::{Pen, draw_disc, draw_segment};
 use nalgebra::Vector2;
-use neat_core::{Camera, LineSegment2, LineSegment3, View, Wireframe3d};
+use neat_core::{Camera, LineSegment2, LineSegment3, View, Wireframe2d, Wireframe3d};
 
 /// Line width relative to the larger side of the image.
 const WIDTH_PER_SIZE: f64 = 1.0 / 400.0;
@@ -45,6 +45,36 @@ pub fn draw_overlay(view: &View, pixel_center: f64, wireframe: &Wireframe3d) -> 
         }
     }
     image
+}
+
+/// An image with a 2D wireframe on it, whose pixel centres are integers: the more
+/// certain a segment, the brighter.
+pub fn draw_detection(image: &RgbImage, wireframe: &Wireframe2d) -> RgbImage {
+    const CERTAIN: [f64; 3] = [64.0, 255.0, 64.0];
+    const DOUBTFUL: [f64; 3] = [255.0, 64.0, 32.0];
+    let mut drawn = image.clone();
+    let size = f64::from(image.width().max(image.height()));
+    let radius = (size * WIDTH_PER_SIZE / 4.0).max(0.5);
+    for scored in wireframe.segments(f64::NEG_INFINITY) {
+        let certain = Pen {
+            color: CERTAIN,
+            radius,
+        };
+        let doubtful = Pen {
+            color: DOUBTFUL,
+            radius,
+        };
+        let pen = doubtful.mix(&certain, scored.score.clamp(0.0, 1.0));
+        draw_segment(&mut drawn, &scored.segment, &[pen; 2]);
+    }
+    let dot = Pen {
+        color: JUNCTION_COLOR,
+        radius: 2.0 * radius,
+    };
+    for vertex in &wireframe.vertices {
+        draw_disc(&mut drawn, vertex, &dot);
+    }
+    drawn
 }
 
 /// The part of a segment that is in front of the camera, in pixels with the

@@ -4,7 +4,6 @@ mod results;
 mod session;
 mod training;
 
-pub(crate) use session::timed;
 pub use session::{OpenedRun, open_run, software_warning};
 
 use crate::config::Config;
@@ -39,6 +38,9 @@ pub struct RunOptions {
     /// Training ends after this long, if its steps are not done before; the
     /// schedules of the optimisation are shortened with it.
     pub time_budget: Option<Duration>,
+    /// Whether the scene is examined first, quickly: problems end the run before it
+    /// begins.
+    pub examine: bool,
     /// Keeps what takes long, such as detected 2D wireframes, for the next run.
     pub cache: Option<FileCache>,
     /// The arguments of the program, for the manifest.

@@ -187,9 +187,14 @@ impl RunDir {
         self.root.join(OVERLAYS).join(format!("{view}.png"))
     }
 
+    /// The folder of 2D wireframes that were detected, for want of files.
+    pub fn detections(&self) -> PathBuf {
+        self.root.join(DETECTIONS)
+    }
+
     /// The 2D wireframe that was detected in `view`.
     pub fn detection(&self, view: &str) -> PathBuf {
-        self.root.join(DETECTIONS).join(format!("{view}.json"))
+        self.detections().join(format!("{view}.json"))
     }
 
     /// Writes `config.toml`.

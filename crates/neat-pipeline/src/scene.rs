@@ -3,11 +3,11 @@
 use crate::config::{Config, DataConfig};
 use crate::detection::detect_wireframes;
 use crate::error::PipelineError;
-use crate::event::{Event, OnEvent, Stage};
-use crate::reconstruct::timed;
+use crate::event::{Event, OnEvent, Stage, timed};
 use neat_core::file_cache::FileCache;
 use neat_core::layout::HAWP_DIR;
 use neat_core::{LoadOptions, Scene, SceneSphere, load_scene};
+use neat_doctor::{Depth, ExamineOptions, Finding, Level, Repair, Verdict};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -77,6 +77,40 @@ pub fn prepare_scene(
         warnings,
         seconds,
     })
+}
+
+/// Examines a scene for a second or two: warnings are told and returned.
+///
+/// # Errors
+/// If a run would be lost time.
+pub fn examine_quickly(
+    scene: &Scene,
+    config: &DataConfig,
+    on_event: OnEvent<'_>,
+) -> Result<Vec<String>, PipelineError> {
+    let examination = neat_doctor::examine(
+        scene,
+        &ExamineOptions {
+            depth: Depth::Quick,
+            read_with: Repair::of(&load_options(config)),
+            ..ExamineOptions::default()
+        },
+    );
+    let lines = |level: Level| -> Vec<String> {
+        let sentence = |finding: &Finding| match &finding.remedy {
+            Some(remedy) => format!("{}: {remedy}", finding.message),
+            None => finding.message.clone(),
+        };
+        examination.at(level).map(sentence).collect()
+    };
+    let warnings = lines(Level::Warning);
+    for warning in &warnings {
+        on_event(Event::Warning(warning.clone()));
+    }
+    match examination.verdict {
+        Verdict::NotReady => Err(PipelineError::NotReady(lines(Level::Problem).join("\n"))),
+        Verdict::Ready | Verdict::ReadyWithWarnings => Ok(warnings),
+    }
 }
 
 /// How a configuration wants a scene to be read.

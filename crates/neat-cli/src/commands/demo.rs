@@ -50,6 +50,7 @@ impl DemoArgs {
             backend: self.compute.backend.backend,
             seed: self.seed,
             time_budget: self.compute.time_budget,
+            examine: false,
             cache: None,
             command_line: command_line(),
         };

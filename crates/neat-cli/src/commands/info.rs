@@ -2,6 +2,7 @@
 
 use crate::error::CliError;
 use crate::output;
+use crate::scene_arguments::SceneArgs;
 use clap::Args;
 use neat_core::{LoadOptions, LoadedScene, View, load_scene};
 use std::collections::BTreeSet;
@@ -33,6 +34,8 @@ pub struct InfoArgs {
     /// Count only segments with a score above this
     #[arg(long, value_name = "SCORE", default_value_t = LoadOptions::default().min_segment_score)]
     min_score: f64,
+    #[command(flatten)]
+    scene_args: SceneArgs,
 }
 
 impl InfoArgs {
@@ -40,7 +43,7 @@ impl InfoArgs {
         let options = LoadOptions {
             min_segment_score: self.min_score,
             require_wireframes: false,
-            ..LoadOptions::default()
+            ..self.scene_args.load_options()
         };
         let loaded = load_scene(&self.scene, &options)?;
         output::print(&describe(&loaded, self.min_score))?;
@@ -117,7 +120,7 @@ fn warnings(loaded: &LoadedScene, min_score: f64) -> Vec<String> {
         .collect();
     if empty.len() == scene.views.len() {
         warnings.push(format!(
-            "no view has a segment with a score above {min_score}: detect 2D wireframes and put them into hawp/"
+            "there are no 2D wireframes with a segment above {min_score} in hawp/: `neat reconstruct` detects them if there is no such folder"
         ));
     } else if !empty.is_empty() {
         warnings.push(format!(
@@ -125,31 +128,5 @@ fn warnings(loaded: &LoadedScene, min_score: f64) -> Vec<String> {
             empty.join(", ")
         ));
     }
-    let radius = scene.sphere_radius;
-    let inside = scene
-        .views
-        .iter()
-        .filter(|view| view.camera.center_in_world.norm() < radius)
-        .count();
-    if inside > 0 {
-        warnings.push(format!(
-            "{inside} cameras stand within the scene ball: set data.scene_radius to the object's size"
-        ));
-    }
-    let blind = scene.views.iter().filter(|view| !sees_origin(view)).count();
-    if blind > 0 {
-        warnings.push(format!(
-            "{blind} cameras do not see the world origin: a ball around it is modelled, so move the origin of the poses into the object"
-        ));
-    }
     warnings
-}
-
-fn sees_origin(view: &View) -> bool {
-    let camera = &view.camera;
-    let projection = camera.project(&Default::default());
-    let within = |x: f64, size: u32| (0.0..f64::from(size)).contains(&x);
-    projection.depth > 0.0
-        && within(projection.pixel.x, camera.width)
-        && within(projection.pixel.y, camera.height)
 }

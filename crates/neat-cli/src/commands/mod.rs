@@ -4,6 +4,7 @@ mod bench;
 mod compare_backends;
 mod convert;
 mod demo;
+mod detect;
 mod distill;
 mod doctor;
 mod eval;
@@ -27,6 +28,7 @@ pub enum Command {
     Synth(synth::SynthArgs),
     Info(info::InfoArgs),
     Doctor(doctor::DoctorArgs),
+    Detect(detect::DetectArgs),
     Convert(convert::ConvertArgs),
     Demo(demo::DemoArgs),
     CompareBackends(compare_backends::CompareBackendsArgs),
@@ -45,6 +47,7 @@ impl Command {
             Self::Synth(args) => args.run(),
             Self::Info(args) => args.run(),
             Self::Doctor(args) => args.run(),
+            Self::Detect(args) => args.run(quiet),
             Self::Convert(args) => args.run(),
             Self::Demo(args) => args.run(quiet),
             Self::CompareBackends(args) => args.run(quiet),

@@ -49,6 +49,9 @@ pub struct RunArgs {
     seed: u64,
     #[command(flatten)]
     compute: ComputeArgs,
+    /// Begin without a look at whether poses and images agree (see `neat doctor`)
+    #[arg(long)]
+    no_doctor: bool,
     #[command(flatten)]
     cache: CacheArgs,
     #[command(flatten)]
@@ -78,6 +81,7 @@ impl RunArgs {
             backend: self.compute.backend.backend,
             seed,
             time_budget: self.compute.time_budget,
+            examine: !self.no_doctor,
             cache: self.cache.open(),
             command_line: command_line(),
         })

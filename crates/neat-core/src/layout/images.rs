@@ -23,7 +23,10 @@ pub(super) fn first_with_ending(dir: &Path, ending: &str) -> Option<PathBuf> {
 }
 
 /// The images in a folder, sorted by file name. Hidden files are no images.
-pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, SceneError> {
+///
+/// # Errors
+/// If the folder cannot be read.
+pub fn list(dir: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let read_error = |source: io::Error| {
         file::read_error(dir, "a scene needs this folder with its images", source)
     };
@@ -147,6 +150,14 @@ pub(super) fn locate(path: &Path, dirs: &[PathBuf], name: &str) -> Result<PathBu
 /// The bytes of an image's file.
 pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, SceneError> {
     file::read(path, REMEDY)
+}
+
+/// Reads an image; transparent pixels are blended with `background`.
+///
+/// # Errors
+/// If it is missing, truncated or no image.
+pub fn read_rgb(path: &Path, background: [u8; 3]) -> Result<RgbImage, SceneError> {
+    decode_rgb(&read_bytes(path)?, path, background)
 }
 
 /// Decodes the bytes of an image; transparent pixels are blended with

@@ -4,14 +4,14 @@ use super::RunOptions;
 use crate::background::fit_background;
 use crate::config::Config;
 use crate::error::PipelineError;
-use crate::event::{Event, OnEvent, Stage};
+use crate::event::{Event, OnEvent, Stage, timed};
 use crate::field::TrainedField;
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
 use crate::run_dir::{Existing, RunDir};
-use crate::scene::prepare_scene;
+use crate::scene::{examine_quickly, prepare_scene};
 use burn::tensor::Device;
 use neat_core::file_cache::FileCache;
-use neat_core::{Scene, SceneError, hawp_json};
+use neat_core::{Scene, SceneError, file, hawp_json};
 use neat_tensor::Backend;
 use neat_tensor::backend::software_driver;
 use std::collections::BTreeMap;
@@ -48,8 +48,17 @@ impl<'a> Session<'a> {
         }
         let cache = options.cache.as_ref();
         let prepared = prepare_scene(&scene_dir, &options.config, cache, on_event)?;
-        let inputs = hash_inputs(&scene_dir)?;
         warnings.extend(prepared.warnings);
+        let mut seconds = prepared.seconds;
+        if options.examine && options.existing != Existing::Resume {
+            let data = &options.config.data;
+            let (found, time) = timed(on_event, Stage::Examine, |on_event| {
+                examine_quickly(&prepared.scene, data, on_event)
+            })?;
+            warnings.extend(found);
+            seconds.insert(Stage::Examine, time);
+        }
+        let inputs = hash_inputs(&scene_dir)?;
         if earlier.as_ref().is_some_and(|e| e.inputs != inputs) {
             let warning = "the files of the scene have changed since the run began".to_owned();
             on_event(Event::Warning(warning.clone()));
@@ -91,7 +100,7 @@ impl<'a> Session<'a> {
             device,
             on_event,
         };
-        for (stage, seconds) in prepared.seconds {
+        for (stage, seconds) in seconds {
             session.add_seconds(stage, seconds);
         }
         if prepared.detected {
@@ -136,6 +145,7 @@ impl<'a> Session<'a> {
 
     /// Writes the 2D wireframes that were detected, as files that a scene can have.
     fn write_detections(&mut self) -> Result<(), PipelineError> {
+        file::create_dir(&self.dir.detections())?;
         for view in &self.scene.views {
             let path = self.dir.detection(&view.name);
             hawp_json::write(&path, &view.wireframe, self.scene.pixel_center)?;
@@ -229,20 +239,6 @@ fn read_run(
         device,
         field,
     })
-}
-
-/// Does a stage outside of a session; returns its time too.
-pub(crate) fn timed<T>(
-    on_event: OnEvent<'_>,
-    stage: Stage,
-    work: impl FnOnce(OnEvent<'_>) -> Result<T, PipelineError>,
-) -> Result<(T, f64), PipelineError> {
-    on_event(Event::StageStarted(stage));
-    let start = Instant::now();
-    let value = work(on_event)?;
-    let seconds = start.elapsed().as_secs_f64();
-    on_event(Event::StageFinished { stage, seconds });
-    Ok((value, seconds))
 }
 
 /// What a person should know who computes through a software driver.
