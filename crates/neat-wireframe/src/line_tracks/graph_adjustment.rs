@@ -1,11 +1,8 @@
-//! Bundle adjustment of the graph with known correspondences, and the final test
-//! of every edge against its 2D segments.
+//! Bundle adjustment of the graph with known correspondences.
 
-use super::clustering::{ClusteringConfig, lies_on, view_count};
 use super::junction_graph::{GraphEdge, JunctionGraph};
-use super::projected_line::ProjectedLine;
 use super::track_merging::project_segment;
-use super::view_segments::{SegmentId, TrackView, segment_of};
+use super::view_segments::{TrackView, segment_of};
 use crate::bundle_adjustment::{
     BundleAdjustmentConfig, EdgeObservation, ObservedEdge, adjust_observed,
 };
@@ -13,7 +10,7 @@ use neat_core::LineSegment3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Settings of the adjustment and of the final test.
+/// Settings of the adjustment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GraphAdjustmentConfig {
@@ -21,8 +18,6 @@ pub struct GraphAdjustmentConfig {
     pub adjustment: BundleAdjustmentConfig,
     /// Ends of 2D segments this near to a projected junction pull it.
     pub end_distance_in_pixels: f64,
-    /// Edges whose supports lie farther from them in the mean are dropped.
-    pub max_mean_distance_in_pixels: f64,
 }
 
 impl Default for GraphAdjustmentConfig {
@@ -33,7 +28,6 @@ impl Default for GraphAdjustmentConfig {
                 ..Default::default()
             },
             end_distance_in_pixels: 4.0,
-            max_mean_distance_in_pixels: 1.5,
         }
     }
 }
@@ -86,74 +80,8 @@ fn observations(
         .collect()
 }
 
-fn segment_of_edge(graph: &JunctionGraph, edge: &GraphEdge) -> LineSegment3 {
+/// The 3D segment of an edge.
+pub(super) fn segment_of_edge(graph: &JunctionGraph, edge: &GraphEdge) -> LineSegment3 {
     let [a, b] = edge.junctions.map(|junction| graph.junctions[junction]);
     LineSegment3::new(a, b)
-}
-
-/// Gathers the supports of every edge anew, from all views, and drops edges that
-/// too few views show or that lie beside their supports.
-pub(super) fn confirm_edges(
-    views: &[TrackView],
-    graph: &mut JunctionGraph,
-    min_views: usize,
-    clustering: &ClusteringConfig,
-    config: &GraphAdjustmentConfig,
-) {
-    let confirmed: Vec<Option<GraphEdge>> = graph
-        .edges
-        .par_iter()
-        .map(|edge| {
-            let line = segment_of_edge(graph, edge);
-            let supports = supports_of(views, &line, clustering);
-            let enough = view_count(&supports) >= min_views
-                && mean_distance(views, &supports, &line) <= config.max_mean_distance_in_pixels;
-            enough.then_some(GraphEdge {
-                junctions: edge.junctions,
-                supports,
-            })
-        })
-        .collect();
-    graph.edges = confirmed.into_iter().flatten().collect();
-}
-
-/// All 2D segments that lie on a 3D segment, ascending.
-fn supports_of(
-    views: &[TrackView],
-    line: &LineSegment3,
-    clustering: &ClusteringConfig,
-) -> Vec<SegmentId> {
-    let mut supports = Vec::new();
-    for (view, prepared) in views.iter().enumerate() {
-        let Some(projected) = project_segment(prepared, line) else {
-            continue;
-        };
-        supports.extend(
-            prepared
-                .index
-                .near(&projected)
-                .into_iter()
-                .map(|segment| SegmentId { view, segment })
-                .filter(|id| lies_on(views, *id, line, clustering)),
-        );
-    }
-    supports
-}
-
-/// Mean distance of the supports' ends from the projected line.
-fn mean_distance(views: &[TrackView], supports: &[SegmentId], line: &LineSegment3) -> f64 {
-    let sum: f64 = supports
-        .iter()
-        .map(|id| {
-            let segment = &segment_of(views, *id).segment;
-            ProjectedLine::new(&views[id.view].camera, line).map_or(f64::INFINITY, |line| {
-                0.5 * segment
-                    .ends()
-                    .iter()
-                    .map(|end| line.distance(end).abs())
-                    .sum::<f64>()
-            })
-        })
-        .sum();
-    sum / supports.len().max(1) as f64
 }

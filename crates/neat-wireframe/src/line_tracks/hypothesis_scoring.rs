@@ -151,11 +151,17 @@ impl<'a> Scorer<'a> {
 
     /// The alternatives with support in enough views.
     fn best(&self, min_views: usize) -> Vec<Hypothesis> {
+        let mut nearest = vec![(f64::INFINITY, 0); self.neighbours.len()];
         let from_matches = self.matches.iter().map(|m| m.depths);
         let from_prior = self.prior.iter().map(|prior| prior.depths);
         let mut ranked: Vec<([f64; 2], f64)> = from_matches
             .chain(from_prior)
-            .map(|depths| (depths, self.score(&depths, &self.agreements(&depths))))
+            .map(|depths| {
+                nearest.fill((f64::INFINITY, 0));
+                self.find_nearest(&depths, &mut nearest);
+                let weights = nearest.iter().filter_map(|(d, _)| self.weight(*d));
+                (depths, self.score(&depths, weights))
+            })
             .filter(|(_, score)| *score > 1.0)
             .collect();
         ranked.sort_by(|(_, a), (_, b)| b.total_cmp(a));
@@ -195,10 +201,19 @@ impl<'a> Scorer<'a> {
 
     /// The best agreement with `depths` in every neighbour.
     fn agreements(&self, depths: &[f64; 2]) -> BestPerSlot {
-        let mut best: BestPerSlot = vec![None; self.neighbours.len()];
+        let mut nearest = vec![(f64::INFINITY, 0); self.neighbours.len()];
+        self.find_nearest(depths, &mut nearest);
+        nearest
+            .into_iter()
+            .map(|(distance, index)| Some((self.weight(distance)?, index)))
+            .collect()
+    }
+
+    /// For every neighbour the distance in pixels of its nearest partner, and the
+    /// partner.
+    fn find_nearest(&self, depths: &[f64; 2], nearest: &mut [(f64, usize)]) {
         let lowest = depths[0] - self.window;
         let first = self.matches.partition_point(|m| m.depths[0] < lowest);
-        let tolerance = self.config.tolerance_in_pixels;
         for (offset, m) in self.matches[first..]
             .iter()
             .take_while(|m| m.depths[0] <= depths[0] + self.window)
@@ -207,20 +222,20 @@ impl<'a> Scorer<'a> {
             let in_pixels =
                 |side: usize| (m.depths[side] - depths[side]).abs() / m.depth_per_pixel[side];
             let distance = in_pixels(0).max(in_pixels(1));
-            if distance > tolerance {
-                continue;
-            }
-            let relative = 2.0 * distance / tolerance;
-            let weight = (-0.5 * relative * relative).exp();
-            if best[m.slot].is_none_or(|(other, _)| weight > other) {
-                best[m.slot] = Some((weight, first + offset));
+            if distance < nearest[m.slot].0 {
+                nearest[m.slot] = (distance, first + offset);
             }
         }
-        best
     }
 
-    fn score(&self, depths: &[f64; 2], agreements: &BestPerSlot) -> f64 {
-        let views: f64 = agreements.iter().flatten().map(|(weight, _)| weight).sum();
+    /// Agreement at a distance in pixels; `None` beyond the tolerance.
+    fn weight(&self, distance: f64) -> Option<f64> {
+        let relative = 2.0 * distance / self.config.tolerance_in_pixels;
+        (relative <= 2.0).then(|| (-0.5 * relative * relative).exp())
+    }
+
+    fn score(&self, depths: &[f64; 2], weights: impl Iterator<Item = f64>) -> f64 {
+        let views: f64 = weights.sum();
         let prior = self.prior.map_or(0.0, |prior| {
             let relative = (0..2)
                 .map(|side| {
@@ -256,7 +271,10 @@ impl<'a> Scorer<'a> {
             }
         }
         let agreements = self.agreements(&depths);
-        let score = self.score(&depths, &agreements);
+        let score = self.score(
+            &depths,
+            agreements.iter().flatten().map(|(weight, _)| *weight),
+        );
         let mut supports: Vec<Support> = agreements
             .into_iter()
             .flatten()

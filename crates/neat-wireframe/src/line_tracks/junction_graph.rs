@@ -26,8 +26,13 @@ pub struct JunctionGraphConfig {
     pub attach_relative: f64,
     /// A junction lies this near to the line of each of its tracks.
     pub max_line_distance_in_pixels: f64,
-    /// Ends nearer to each other than this are joined without any vote.
+    /// Ends nearer to each other than this are joined without any vote …
     pub near_in_pixels: f64,
+    /// … and ends of lines that cross at a clear angle up to this distance:
+    /// detectors stop short of corners.
+    pub near_corner_in_pixels: f64,
+    /// Cosine of that angle at most.
+    pub max_corner_cosine: f64,
     /// Joining moves no end along its track by more than this share of it.
     pub max_relative_shift: f64,
 }
@@ -40,6 +45,8 @@ impl Default for JunctionGraphConfig {
             attach_relative: 0.15,
             max_line_distance_in_pixels: 2.5,
             near_in_pixels: 6.0,
+            near_corner_in_pixels: 12.0,
+            max_corner_cosine: 0.9,
             max_relative_shift: 0.35,
         }
     }
@@ -82,7 +89,7 @@ pub(super) fn junction_graph(
         joining.join(a, b, f64::INFINITY);
     }
     for (_, [a, b]) in near_pairs(&ends, config) {
-        joining.join(a, b, config.near_in_pixels);
+        joining.join(a, b, config.near_corner_in_pixels);
     }
     let (junctions, junction_of_end) = joining.junctions();
 
@@ -244,12 +251,19 @@ fn near_pairs(ends: &TrackEnds, config: &JunctionGraphConfig) -> Vec<(f64, [usiz
     let index = PointIndex::new(ends.positions.clone());
     let mut pairs = Vec::new();
     for (a, position) in ends.positions.iter().enumerate() {
-        let radius = config.near_in_pixels * ends.pixel_sizes[a];
+        let farthest = config.near_in_pixels.max(config.near_corner_in_pixels);
+        let radius = farthest * ends.pixel_sizes[a];
         for neighbour in index.within(position, radius) {
             let b = neighbour.index;
             let size = ends.pixel_sizes[a].min(ends.pixel_sizes[b]);
             let distance = neighbour.distance / size;
-            if a < b && a / 2 != b / 2 && distance <= config.near_in_pixels {
+            let cosine = ends.directions[a].dot(&ends.directions[b]).abs();
+            let reach = if cosine <= config.max_corner_cosine {
+                farthest
+            } else {
+                config.near_in_pixels
+            };
+            if a < b && a / 2 != b / 2 && distance <= reach {
                 pairs.push((distance, [a, b]));
             }
         }

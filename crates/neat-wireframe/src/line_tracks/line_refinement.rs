@@ -15,8 +15,11 @@ pub struct LineRefinementConfig {
     pub cauchy_scale_in_pixels: f64,
     /// Accepted steps at most.
     pub max_iterations: usize,
-    /// A part of the line counts if this many views show it.
+    /// A part of the line counts if this many views show it …
     pub min_cover: usize,
+    /// … and at least this share of the views that show its best shown part:
+    /// single detections often run on past the end.
+    pub min_cover_share: f64,
     /// Parts with a smaller gap between them are one.
     pub max_gap_in_pixels: f64,
     /// The same as a share of the shorter part.
@@ -29,6 +32,7 @@ impl Default for LineRefinementConfig {
             cauchy_scale_in_pixels: 1.0,
             max_iterations: 15,
             min_cover: 2,
+            min_cover_share: 0.34,
             max_gap_in_pixels: 6.0,
             max_relative_gap: 0.15,
         }
@@ -188,7 +192,14 @@ pub(super) fn covered_parts(
         .collect();
     steps.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
 
-    let min_cover = config.min_cover as i32;
+    let mut cover = 0;
+    let mut most = 0;
+    for (_, step) in &steps {
+        cover += step;
+        most = most.max(cover);
+    }
+    let share = (config.min_cover_share * f64::from(most)).ceil() as i32;
+    let min_cover = share.max(config.min_cover as i32);
     let mut parts: Vec<[f64; 2]> = Vec::new();
     let mut cover = 0;
     let mut begin = None;

@@ -19,6 +19,7 @@
 
 mod clustering;
 mod consensus;
+mod edge_confirmation;
 mod epipolar_matching;
 mod graph_adjustment;
 mod hypothesis_scoring;
@@ -27,17 +28,20 @@ mod line_refinement;
 mod neighbours;
 mod projected_line;
 mod segment_index;
+mod straight_junctions;
 mod track_merging;
 mod view_segments;
 
 pub use clustering::ClusteringConfig;
 pub use consensus::ConsensusConfig;
+pub use edge_confirmation::EdgeConfirmationConfig;
 pub use epipolar_matching::EpipolarMatchingConfig;
 pub use graph_adjustment::GraphAdjustmentConfig;
 pub use hypothesis_scoring::HypothesisScoringConfig;
 pub use junction_graph::JunctionGraphConfig;
 pub use line_refinement::LineRefinementConfig;
 pub use neighbours::NeighboursConfig;
+pub use straight_junctions::StraightJunctionsConfig;
 pub use track_merging::TrackMergingConfig;
 
 use crate::fast_back_end::UnitBallSurface;
@@ -45,12 +49,14 @@ use crate::occlusion::{OcclusionConfig, visible_views};
 use crate::{SegmentProposal, SignedDistance, ViewObservation, Wireframe3d};
 use clustering::{grow_tracks, view_count};
 use consensus::find_consensus;
-use graph_adjustment::{adjust_graph, confirm_edges};
+use edge_confirmation::confirm_edges;
+use graph_adjustment::adjust_graph;
 use hypothesis_scoring::{DepthPrior, score_hypotheses};
 use junction_graph::{GraphEdge, JunctionGraph, junction_graph};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
+use straight_junctions::dissolve_straight;
 use track_merging::{gather_unclaimed, merge_duplicates};
 use view_segments::{SegmentId, TrackView, segment_of};
 
@@ -80,8 +86,12 @@ pub struct LineTracksConfig {
     pub merging: TrackMergingConfig,
     /// Which ends of tracks are one junction.
     pub junctions: JunctionGraphConfig,
-    /// Bundle adjustment and the final test.
+    /// Which junctions are none.
+    pub straight: StraightJunctionsConfig,
+    /// Bundle adjustment of the graph.
     pub adjustment: GraphAdjustmentConfig,
+    /// The final test of every edge.
+    pub confirmation: EdgeConfirmationConfig,
     /// Drop edges supported in too few of the views in which the surface leaves
     /// them visible; without a surface it says nothing.
     pub occlusion_test: bool,
@@ -103,7 +113,9 @@ impl Default for LineTracksConfig {
             refinement: LineRefinementConfig::default(),
             merging: TrackMergingConfig::default(),
             junctions: JunctionGraphConfig::default(),
+            straight: StraightJunctionsConfig::default(),
             adjustment: GraphAdjustmentConfig::default(),
+            confirmation: EdgeConfirmationConfig::default(),
             occlusion_test: false,
             occlusion: OcclusionConfig::default(),
         }
@@ -283,6 +295,7 @@ pub fn run(
     clock.end_of("merging");
 
     let mut graph = junction_graph(&views, &tracks, min_views, &config.junctions);
+    dissolve_straight(&views, &mut graph, &config.straight);
     report.graph_edges = graph.edges.len();
     clock.end_of("junctions");
 
@@ -292,7 +305,7 @@ pub fn run(
         &mut graph,
         min_views,
         &config.clustering,
-        &config.adjustment,
+        &config.confirmation,
     );
     report.confirmed_edges = graph.edges.len();
     clock.end_of("adjustment");

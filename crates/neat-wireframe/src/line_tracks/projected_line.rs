@@ -82,8 +82,12 @@ impl ProjectedLine {
     }
 }
 
+/// Rays under a smaller angle to a line (squared sine, about 8°) do not tell where
+/// on it they meet it: a pixel of noise moves the place by far too much.
+const MIN_SQUARED_SINE: f64 = 0.02;
+
 /// Parameter along `line` (0 at its start, 1 at its end) of its point nearest to
-/// the ray from `origin`; `None` where both are all but parallel.
+/// the ray from `origin`; `None` where the ray runs too much along the line.
 pub(super) fn line_parameter_of_ray(
     line: &LineSegment3,
     origin: &Vector3<f64>,
@@ -94,7 +98,7 @@ pub(super) fn line_parameter_of_ray(
     let unit = direction / length;
     let cosine = unit.dot(ray);
     let squared_sine = 1.0 - cosine * cosine;
-    if squared_sine.is_nan() || squared_sine < 1e-4 {
+    if squared_sine.is_nan() || squared_sine < MIN_SQUARED_SINE {
         return None;
     }
     let offset = origin - line.start;

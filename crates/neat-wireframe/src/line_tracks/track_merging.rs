@@ -21,9 +21,12 @@ pub struct TrackMergingConfig {
     /// Tracks are one if the members of each lie this near, in the mean, to the
     /// projected line of the other.
     pub max_distance_in_pixels: f64,
-    /// Views that show both next to each other …
-    pub min_separate_views: usize,
-    /// … at this distance forbid the merge.
+    /// The same for tracks that no view shows next to each other.
+    pub max_exclusive_distance_in_pixels: f64,
+    /// Views that show both next to each other forbid the merge if they are at
+    /// least this share of the views of the track that fewer show …
+    pub min_separate_share: f64,
+    /// … and the two lie this far apart there.
     pub separate_in_pixels: f64,
 }
 
@@ -31,11 +34,16 @@ impl Default for TrackMergingConfig {
     fn default() -> Self {
         Self {
             max_distance_in_pixels: 1.5,
-            min_separate_views: 2,
+            max_exclusive_distance_in_pixels: 3.0,
+            min_separate_share: 0.34,
             separate_in_pixels: 1.2,
         }
     }
 }
+
+/// Tracks of the same 3D segment are parallel within about 18 degrees: short ones
+/// have no better direction.
+const MIN_PARALLEL_COSINE: f64 = 0.95;
 
 /// For each segment of each view the track it belongs to.
 pub(super) type TrackOfSegment = Vec<Vec<Option<usize>>>;
@@ -200,7 +208,15 @@ fn duplicate_pairs(
                 .filter(|b| a < *b)
                 .filter_map(|b| {
                     let distance = mutual_distance(views, track, &tracks[b], config)?;
-                    (!are_separate(views, track, &tracks[b], config)).then_some((distance, [a, b]))
+                    let separate = separate_views(views, track, &tracks[b], config);
+                    let fewer = track.view_count().min(tracks[b].view_count());
+                    let same = if separate == 0 {
+                        distance <= config.max_exclusive_distance_in_pixels
+                    } else {
+                        distance <= config.max_distance_in_pixels
+                            && (separate as f64) < config.min_separate_share * fewer as f64
+                    };
+                    same.then_some((distance, [a, b]))
                 })
                 .collect()
         })
@@ -238,32 +254,37 @@ fn mutual_distance(
     config: &TrackMergingConfig,
 ) -> Option<f64> {
     let [first, second] = [a, b].map(|track| (track.line.end - track.line.start).normalize());
-    if !(first.dot(&second).abs() > 0.95) {
+    let parallel = first.dot(&second).abs() > MIN_PARALLEL_COSINE;
+    if !parallel {
         return None;
     }
+    let farthest = config
+        .max_distance_in_pixels
+        .max(config.max_exclusive_distance_in_pixels);
     let mut worst = 0.0_f64;
     for (fixed, other) in [(a, b), (b, a)] {
-        let (mut sum, mut count) = (0.0, 0);
+        // Only the part of the other that lies along this one.
+        let part = overlapping_part(&fixed.line, &other.line)?;
+        let (mut sum, mut count) = (0.0, 0.0);
         for id in other.members.iter().chain(&fixed.members) {
             let view = &views[id.view];
-            let Some(line) = ProjectedLine::new(&view.camera, &fixed.line) else {
-                continue;
-            };
-            // Only the part of the other that lies along this one.
-            let Some(part) = overlapping_part(&fixed.line, &other.line) else {
-                return None;
-            };
-            if let Some(part) = project_segment(view, &part) {
-                sum += line.segment_distance(&part);
-                count += 1;
+            let line = ProjectedLine::new(&view.camera, &fixed.line);
+            if let (Some(line), Some(part)) = (line, project_segment(view, &part)) {
+                let distance = line.segment_distance(&part);
+                // So far off that the mean cannot be small: most pairs end here.
+                if count == 0.0 && distance > 4.0 * farthest {
+                    return None;
+                }
+                sum += distance;
+                count += 1.0;
             }
         }
-        if count == 0 {
+        if count == 0.0 {
             return None;
         }
-        worst = worst.max(sum / f64::from(count));
+        worst = worst.max(sum / count);
     }
-    (worst <= config.max_distance_in_pixels).then_some(worst)
+    (worst <= farthest).then_some(worst)
 }
 
 /// The part of `other` that lies along `line`; `None` if there is none.
@@ -276,15 +297,15 @@ fn overlapping_part(line: &LineSegment3, other: &LineSegment3) -> Option<LineSeg
     (low < high).then(|| LineSegment3::new(other.point_at(low), other.point_at(high)))
 }
 
-/// Whether enough views show members of both tracks side by side.
-fn are_separate(views: &[TrackView], a: &Track, b: &Track, config: &TrackMergingConfig) -> bool {
+/// The number of views that show members of both tracks side by side.
+fn separate_views(views: &[TrackView], a: &Track, b: &Track, config: &TrackMergingConfig) -> usize {
     let mut by_view: BTreeMap<usize, [Vec<SegmentId>; 2]> = BTreeMap::new();
     for (side, track) in [a, b].into_iter().enumerate() {
         for id in &track.members {
             by_view.entry(id.view).or_default()[side].push(*id);
         }
     }
-    let separate = by_view
+    by_view
         .values()
         .filter(|[of_a, of_b]| {
             of_a.iter().any(|p| {
@@ -292,8 +313,7 @@ fn are_separate(views: &[TrackView], a: &Track, b: &Track, config: &TrackMerging
                     .any(|q| side_by_side(views, *p, *q, &a.line, config))
             })
         })
-        .count();
-    separate >= config.min_separate_views
+        .count()
 }
 
 /// Whether two segments of one view run along the same part of a line, apart.
