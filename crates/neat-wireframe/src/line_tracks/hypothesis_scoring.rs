@@ -10,6 +10,7 @@ use super::epipolar_matching::{EpipolarMatchingConfig, LineMatch, ViewPair};
 use super::view_segments::{SegmentId, TrackView};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Settings of the scores of hypotheses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -112,12 +113,20 @@ pub(super) fn score_hypotheses(
 
 /// The partners of one segment.
 struct Scorer<'a> {
-    /// By ascending depth of the first end.
+    /// By neighbour, then by ascending depth of the first end.
     matches: Vec<LineMatch>,
+    /// The part of `matches` of each neighbour.
+    slots: Vec<Slot>,
     neighbours: &'a [usize],
     prior: Option<DepthPrior>,
     config: &'a HypothesisScoringConfig,
-    /// No partner farther than this in the first depth can agree.
+}
+
+/// The partners in one neighbour.
+struct Slot {
+    range: Range<usize>,
+    /// No partner farther than this in the first depth can agree. Neighbours with
+    /// a wide baseline have small ones.
     window: f64,
 }
 
@@ -132,17 +141,27 @@ impl<'a> Scorer<'a> {
         config: &'a HypothesisScoringConfig,
     ) -> Self {
         matches.sort_by(|a, b| {
-            a.depths[0]
-                .total_cmp(&b.depths[0])
-                .then((a.slot, a.segment).cmp(&(b.slot, b.segment)))
+            (a.slot.cmp(&b.slot))
+                .then(a.depths[0].total_cmp(&b.depths[0]))
+                .then(a.segment.cmp(&b.segment))
         });
-        let widest = matches
-            .iter()
-            .map(|m| m.depth_per_pixel[0])
-            .fold(0.0, f64::max);
+        let slots = (0..neighbours.len())
+            .map(|slot| {
+                let start = matches.partition_point(|m| m.slot < slot);
+                let end = matches.partition_point(|m| m.slot <= slot);
+                let widest = matches[start..end]
+                    .iter()
+                    .map(|m| m.depth_per_pixel[0])
+                    .fold(0.0, f64::max);
+                Slot {
+                    range: start..end,
+                    window: config.tolerance_in_pixels * widest,
+                }
+            })
+            .collect();
         Self {
-            window: config.tolerance_in_pixels * widest,
             matches,
+            slots,
             neighbours,
             prior,
             config,
@@ -212,18 +231,21 @@ impl<'a> Scorer<'a> {
     /// For every neighbour the distance in pixels of its nearest partner, and the
     /// partner.
     fn find_nearest(&self, depths: &[f64; 2], nearest: &mut [(f64, usize)]) {
-        let lowest = depths[0] - self.window;
-        let first = self.matches.partition_point(|m| m.depths[0] < lowest);
-        for (offset, m) in self.matches[first..]
-            .iter()
-            .take_while(|m| m.depths[0] <= depths[0] + self.window)
-            .enumerate()
-        {
-            let in_pixels =
-                |side: usize| (m.depths[side] - depths[side]).abs() / m.depth_per_pixel[side];
-            let distance = in_pixels(0).max(in_pixels(1));
-            if distance < nearest[m.slot].0 {
-                nearest[m.slot] = (distance, first + offset);
+        for (slot, nearest) in self.slots.iter().zip(nearest) {
+            let matches = &self.matches[slot.range.clone()];
+            let lowest = depths[0] - slot.window;
+            let first = matches.partition_point(|m| m.depths[0] < lowest);
+            for (offset, m) in matches[first..]
+                .iter()
+                .take_while(|m| m.depths[0] <= depths[0] + slot.window)
+                .enumerate()
+            {
+                let in_pixels =
+                    |side: usize| (m.depths[side] - depths[side]).abs() / m.depth_per_pixel[side];
+                let distance = in_pixels(0).max(in_pixels(1));
+                if distance < nearest.0 {
+                    *nearest = (distance, slot.range.start + first + offset);
+                }
             }
         }
     }

@@ -23,6 +23,7 @@ mod edge_confirmation;
 mod epipolar_matching;
 mod graph_adjustment;
 mod hypothesis_scoring;
+mod isolated_edges;
 mod junction_graph;
 mod line_refinement;
 mod neighbours;
@@ -38,6 +39,7 @@ pub use edge_confirmation::EdgeConfirmationConfig;
 pub use epipolar_matching::EpipolarMatchingConfig;
 pub use graph_adjustment::GraphAdjustmentConfig;
 pub use hypothesis_scoring::HypothesisScoringConfig;
+pub use isolated_edges::IsolatedEdgesConfig;
 pub use junction_graph::JunctionGraphConfig;
 pub use line_refinement::LineRefinementConfig;
 pub use neighbours::NeighboursConfig;
@@ -52,6 +54,7 @@ use consensus::find_consensus;
 use edge_confirmation::confirm_edges;
 use graph_adjustment::adjust_graph;
 use hypothesis_scoring::{DepthPrior, score_hypotheses};
+use isolated_edges::drop_isolated;
 use junction_graph::{GraphEdge, JunctionGraph, junction_graph};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -92,6 +95,8 @@ pub struct LineTracksConfig {
     pub adjustment: GraphAdjustmentConfig,
     /// The final test of every edge.
     pub confirmation: EdgeConfirmationConfig,
+    /// Which edges float alone.
+    pub isolation: IsolatedEdgesConfig,
     /// Drop edges supported in too few of the views in which the surface leaves
     /// them visible; without a surface it says nothing.
     pub occlusion_test: bool,
@@ -116,6 +121,7 @@ impl Default for LineTracksConfig {
             straight: StraightJunctionsConfig::default(),
             adjustment: GraphAdjustmentConfig::default(),
             confirmation: EdgeConfirmationConfig::default(),
+            isolation: IsolatedEdgesConfig::default(),
             occlusion_test: false,
             occlusion: OcclusionConfig::default(),
         }
@@ -180,6 +186,8 @@ pub struct LineTracksReport {
     pub graph_edges: usize,
     /// Edges that the adjusted graph confirms.
     pub confirmed_edges: usize,
+    /// Edges that do not float alone.
+    pub accompanied_edges: usize,
     /// Edges left by the occlusion test.
     pub unoccluded_edges: usize,
     /// Junctions of the result.
@@ -308,6 +316,8 @@ pub fn run(
         &config.confirmation,
     );
     report.confirmed_edges = graph.edges.len();
+    drop_isolated(&views, &mut graph, &config.isolation);
+    report.accompanied_edges = graph.edges.len();
     clock.end_of("adjustment");
 
     let mut visible = None;
