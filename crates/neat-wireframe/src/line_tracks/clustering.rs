@@ -207,3 +207,70 @@ pub(super) fn split_by_cover(
     }
     parts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::line_tracks::consensus::{ConsensusConfig, find_consensus};
+    use crate::line_tracks::epipolar_matching::EpipolarMatchingConfig;
+    use crate::line_tracks::hypothesis_scoring::{HypothesisScoringConfig, score_hypotheses};
+    use crate::line_tracks::neighbours::{NeighboursConfig, neighbours};
+    use crate::line_tracks::test_tracks::{cube_edge, cube_views, end_distance};
+
+    #[test]
+    fn matching_consensus_and_growth_find_the_edges_of_a_cube() {
+        let views = cube_views(20);
+        let neighbours = neighbours(&views, 1.2, &NeighboursConfig::default());
+        let alternatives = score_hypotheses(
+            &views,
+            &neighbours,
+            &[],
+            1.2,
+            3,
+            &EpipolarMatchingConfig::default(),
+            &HypothesisScoringConfig::default(),
+        );
+        let consensus = find_consensus(&views, &alternatives, 3, &ConsensusConfig::default());
+        // The choice of nearly every segment is the true one.
+        let mut right = 0;
+        for (view, choices) in consensus.iter().enumerate() {
+            for (segment, choice) in choices.iter().enumerate() {
+                let Some(choice) = choice else {
+                    continue;
+                };
+                let found = views[view].back_project(segment, choice.hypothesis.depths);
+                right += usize::from(end_distance(&found, &cube_edge(segment)) < 1e-3);
+                assert!(choice.partners.len() >= 2);
+            }
+        }
+        assert!(right >= 220, "{right} of 240");
+
+        let config = ClusteringConfig::default();
+        let refinement = LineRefinementConfig::default();
+        let tracks = grow_tracks(&views, &consensus, 3, &config, &refinement);
+        for edge in 0..12 {
+            let found = tracks
+                .iter()
+                .find(|track| end_distance(&track.line, &cube_edge(edge)) < 1e-3)
+                .unwrap_or_else(|| panic!("edge {edge} has no track"));
+            assert!(found.view_count() >= 15);
+            assert!(found.members.iter().all(|id| id.segment == edge));
+        }
+    }
+
+    #[test]
+    fn segments_beside_or_beyond_a_line_do_not_lie_on_it() {
+        let views = cube_views(3);
+        let config = ClusteringConfig::default();
+        let id = SegmentId {
+            view: 0,
+            segment: 4,
+        };
+        let truth = cube_edge(4);
+        assert!(lies_on(&views, id, &truth, &config));
+        let beside = truth.map(|end| end + nalgebra::Vector3::repeat(0.03));
+        assert!(!lies_on(&views, id, &beside, &config));
+        let beyond = LineSegment3::new(truth.point_at(1.1), truth.point_at(2.0));
+        assert!(!lies_on(&views, id, &beyond, &config));
+    }
+}

@@ -21,8 +21,11 @@ use serde::{Deserialize, Serialize};
 pub struct EdgeConfirmationConfig {
     /// Supports lie this near to the edge in the mean.
     pub max_mean_distance_in_pixels: f64,
-    /// Share of the views that ought to show the edge which do.
+    /// Share of the views that ought to show the edge which do …
     pub min_support_share: f64,
+    /// … and the same with the detector's score in the place of each view: texture
+    /// and curves make many weak detections.
+    pub min_score_share: f64,
     /// Views within this angle of a view that shows the edge, with the whole edge
     /// in the image, ought to show it too: what hides it would hide it there.
     pub expected_angle_in_degrees: f64,
@@ -35,6 +38,7 @@ impl Default for EdgeConfirmationConfig {
         Self {
             max_mean_distance_in_pixels: 1.5,
             min_support_share: 0.4,
+            min_score_share: 0.15,
             expected_angle_in_degrees: 15.0,
             min_explained_share: 0.5,
         }
@@ -100,9 +104,13 @@ fn candidate(
 ) -> Option<Candidate> {
     let line = segment_of_edge(graph, edge);
     let supports = supports_of(views, &line, clustering);
-    let enough = view_count(&supports) >= min_views
-        && mean_distance(views, &supports, &line) <= config.max_mean_distance_in_pixels
-        && support_share(views, &supports, &line, config) >= config.min_support_share;
+    if view_count(&supports) < min_views {
+        return None;
+    }
+    let (views_share, score_share) = support_shares(views, &supports, &line, config);
+    let enough = views_share >= config.min_support_share
+        && score_share >= config.min_score_share
+        && mean_distance(views, &supports, &line) <= config.max_mean_distance_in_pixels;
     if !enough {
         return None;
     }
@@ -165,20 +173,26 @@ fn mean_distance(views: &[TrackView], supports: &[SegmentId], line: &LineSegment
     supports.iter().map(of_support).sum::<f64>() / supports.len().max(1) as f64
 }
 
-/// The views that show an edge as a share of those that ought to.
-fn support_share(
+/// The views that show an edge as a share of those that ought to: as they are, and
+/// weighted by the score of the best detection.
+fn support_shares(
     views: &[TrackView],
     supports: &[SegmentId],
     line: &LineSegment3,
     config: &EdgeConfirmationConfig,
-) -> f64 {
+) -> (f64, f64) {
     let middle = line.point_at(0.5);
     let toward =
         |view: usize| -> Vector3<f64> { (views[view].camera.center_in_world - middle).normalize() };
-    let showing: Vec<usize> = supports
-        .chunk_by(|a, b| a.view == b.view)
-        .map(|group| group[0].view)
-        .collect();
+    let mut showing = Vec::new();
+    let mut scores = 0.0;
+    for group in supports.chunk_by(|a, b| a.view == b.view) {
+        showing.push(group[0].view);
+        scores += group
+            .iter()
+            .map(|id| segment_of(views, *id).score)
+            .fold(0.0, f64::max);
+    }
     let directions: Vec<Vector3<f64>> = showing.iter().map(|view| toward(*view)).collect();
     let min_cosine = config.expected_angle_in_degrees.to_radians().cos();
     let expected = (0..views.len())
@@ -190,6 +204,75 @@ fn support_share(
                         .iter()
                         .any(|d| d.dot(&toward(*view)) >= min_cosine))
         })
-        .count();
-    showing.len() as f64 / expected.max(1) as f64
+        .count()
+        .max(1) as f64;
+    (showing.len() as f64 / expected, scores / expected)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::line_tracks::junction_graph::{JunctionGraphConfig, junction_graph};
+    use crate::line_tracks::test_tracks::{cube_tracks, cube_views};
+
+    fn confirmed(views: &[TrackView], mut graph: JunctionGraph) -> JunctionGraph {
+        confirm_edges(
+            views,
+            &mut graph,
+            3,
+            &ClusteringConfig::default(),
+            &EdgeConfirmationConfig::default(),
+        );
+        graph
+    }
+
+    fn cube_graph(views: &[TrackView]) -> JunctionGraph {
+        junction_graph(
+            views,
+            &cube_tracks(views),
+            3,
+            &JunctionGraphConfig::default(),
+        )
+    }
+
+    #[test]
+    fn true_edges_stay_and_others_go() {
+        let views = cube_views(12);
+        let graph = cube_graph(&views);
+        let mut with_false = graph.clone();
+        // The diagonal, and a near copy of an edge.
+        with_false.edges.push(GraphEdge {
+            junctions: [0, 7],
+            supports: graph.edges[0].supports.clone(),
+        });
+        let [a, b] = graph.edges[3].junctions;
+        let copies = [a, b].map(|junction| {
+            with_false
+                .junctions
+                .push(graph.junctions[junction].add_scalar(1e-3));
+            with_false.junctions.len() - 1
+        });
+        with_false.edges.push(GraphEdge {
+            junctions: copies,
+            supports: graph.edges[3].supports.clone(),
+        });
+        let found = confirmed(&views, with_false);
+        assert_eq!(found.edges.len(), 12);
+        let pairs =
+            |graph: &JunctionGraph| graph.edges.iter().map(|e| e.junctions).collect::<Vec<_>>();
+        assert_eq!(pairs(&found), pairs(&graph));
+    }
+
+    #[test]
+    fn edges_that_most_views_ought_to_show_and_do_not_go() {
+        let mut views = cube_views(60);
+        let graph = cube_graph(&views);
+        // Only every tenth view shows edge 4.
+        for (i, view) in views.iter_mut().enumerate() {
+            if i % 10 != 0 {
+                view.segments[4].score = 0.0;
+            }
+        }
+        assert_eq!(confirmed(&views, graph).edges.len(), 11);
+    }
 }

@@ -85,3 +85,26 @@ pub(super) fn segment_of_edge(graph: &JunctionGraph, edge: &GraphEdge) -> LineSe
     let [a, b] = edge.junctions.map(|junction| graph.junctions[junction]);
     LineSegment3::new(a, b)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::line_tracks::junction_graph::{JunctionGraphConfig, junction_graph};
+    use crate::line_tracks::test_tracks::{cube_tracks, cube_views};
+    use crate::test_scenes::{Noise, cube};
+
+    #[test]
+    fn displaced_corners_return() {
+        let views = cube_views(12);
+        let tracks = cube_tracks(&views);
+        let mut graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        let mut noise = Noise(5);
+        for junction in &mut graph.junctions {
+            *junction += 0.01 * noise.vector();
+        }
+        adjust_graph(&views, &mut graph, &GraphAdjustmentConfig::default());
+        for corner in cube().0 {
+            assert!(graph.junctions.iter().any(|x| (x - corner).norm() < 1e-4));
+        }
+    }
+}

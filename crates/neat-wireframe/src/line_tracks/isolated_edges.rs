@@ -117,3 +117,45 @@ fn neighbours_in_image(
     neighbours.dedup_by_key(|(_, other)| *other);
     neighbours
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::line_tracks::junction_graph::GraphEdge;
+    use crate::test_scenes::{cameras_on_sphere, views_of_edges};
+    use nalgebra::Vector3;
+
+    #[test]
+    fn an_edge_alone_before_a_wall_goes_and_the_wall_stays() {
+        // Bars of a wall, all single, and one bar halfway to the cameras.
+        let mut junctions = Vec::new();
+        for i in 0..12 {
+            let x = 0.05 * f64::from(i - 6);
+            junctions.extend([-0.4, 0.4].map(|y| Vector3::new(x, y, -0.2)));
+        }
+        junctions.extend([-0.2, 0.2].map(|y| Vector3::new(0.01, y, 0.9)));
+        let pairs: Vec<[usize; 2]> = (0..13).map(|i| [2 * i, 2 * i + 1]).collect();
+        let cameras: Vec<_> = cameras_on_sphere(160)
+            .into_iter()
+            .filter(|camera| camera.center_in_world.z > 2.2)
+            .collect();
+        let views: Vec<TrackView> = views_of_edges(&cameras, &junctions, &pairs)
+            .iter()
+            .map(|observation| TrackView::new(observation, 1.0, 1.0))
+            .collect();
+        let edges = pairs
+            .iter()
+            .enumerate()
+            .map(|(segment, pair)| GraphEdge {
+                junctions: *pair,
+                supports: (0..views.len())
+                    .map(|view| SegmentId { view, segment })
+                    .collect(),
+            })
+            .collect();
+        let mut graph = JunctionGraph { junctions, edges };
+        drop_isolated(&views, &mut graph, &IsolatedEdgesConfig::default());
+        assert_eq!(graph.edges.len(), 12);
+        assert!(graph.edges.iter().all(|edge| edge.junctions != [24, 25]));
+    }
+}

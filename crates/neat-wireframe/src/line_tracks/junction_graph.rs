@@ -409,3 +409,49 @@ fn drawn_edges(
     }
     drawn
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::line_tracks::test_tracks::{cube_tracks, cube_views};
+    use crate::test_scenes::cube;
+
+    #[test]
+    fn the_ends_of_a_cube_meet_in_its_corners() {
+        let views = cube_views(12);
+        let tracks = cube_tracks(&views);
+        let graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        assert_eq!((graph.junctions.len(), graph.edges.len()), (8, 12));
+        for corner in cube().0 {
+            assert!(graph.junctions.iter().any(|x| (x - corner).norm() < 1e-9));
+        }
+    }
+
+    #[test]
+    fn edges_without_a_track_are_drawn_between_known_corners() {
+        let views = cube_views(12);
+        let mut tracks = cube_tracks(&views);
+        tracks.remove(7);
+        tracks.remove(2);
+        let graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        assert_eq!((graph.junctions.len(), graph.edges.len()), (8, 12));
+        assert!(graph.edges.iter().all(|edge| edge.supports.len() == 12));
+    }
+
+    #[test]
+    fn both_ends_of_a_track_never_become_one_junction() {
+        let views = cube_views(12);
+        let mut tracks = cube_tracks(&views);
+        let short = tracks[0].line;
+        tracks[0].line.end = short.point_at(1e-3);
+        let graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        assert!(
+            graph
+                .edges
+                .iter()
+                .all(|edge| edge.junctions[0] != edge.junctions[1])
+        );
+        let nothing = junction_graph(&[], &[], 3, &JunctionGraphConfig::default());
+        assert_eq!(nothing, JunctionGraph::default());
+    }
+}

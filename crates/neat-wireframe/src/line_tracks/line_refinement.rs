@@ -245,3 +245,52 @@ fn close_gaps(parts: Vec<[f64; 2]>, pixel: f64, config: &LineRefinementConfig) -
     }
     closed
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::line_tracks::test_tracks::{cube_edge, cube_views, end_distance, members_of_edge};
+
+    #[test]
+    fn a_displaced_line_returns_in_spite_of_a_false_member() {
+        let views = cube_views(12);
+        let mut members = members_of_edge(&views, 5);
+        members[3].segment = 6;
+        let truth = cube_edge(5);
+        let offset = Vector3::new(0.02, -0.015, 0.01);
+        let displaced = LineSegment3::new(truth.start + offset, truth.end - offset);
+        let config = LineRefinementConfig {
+            max_iterations: 60,
+            ..Default::default()
+        };
+        let refined = refine_line(&views, &members, &displaced, &config);
+        for end in truth.ends() {
+            let foot = refined.point_at(refined.line_parameter(&end));
+            assert!((foot - end).norm() < 2e-3, "{}", (foot - end).norm());
+        }
+    }
+
+    #[test]
+    fn covered_parts_are_what_enough_views_show() {
+        let views = cube_views(12);
+        let members = members_of_edge(&views, 5);
+        let truth = cube_edge(5);
+        // A line twice as long: the edge is its middle half.
+        let long = LineSegment3::new(truth.point_at(-0.5), truth.point_at(1.5));
+        let config = LineRefinementConfig::default();
+        let parts = covered_parts(&views, &members, &long, &config);
+        let [[low, high]] = parts[..] else {
+            panic!("{parts:?}");
+        };
+        let part = LineSegment3::new(long.point_at(low), long.point_at(high));
+        assert!(end_distance(&part, &truth) < 1e-6);
+        assert!(covered_parts(&views, &members[..1], &long, &config).is_empty());
+    }
+
+    #[test]
+    fn small_gaps_close_and_large_ones_do_not() {
+        let config = LineRefinementConfig::default();
+        let parts = vec![[0.0, 0.2], [0.21, 0.4], [0.7, 1.0]];
+        assert_eq!(close_gaps(parts, 0.001, &config), [[0.0, 0.4], [0.7, 1.0]]);
+    }
+}

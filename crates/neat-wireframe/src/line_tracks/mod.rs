@@ -33,6 +33,9 @@ mod straight_junctions;
 mod track_merging;
 mod view_segments;
 
+#[cfg(test)]
+mod test_tracks;
+
 pub use clustering::ClusteringConfig;
 pub use consensus::ConsensusConfig;
 pub use edge_confirmation::EdgeConfirmationConfig;
@@ -499,5 +502,28 @@ fn evidence(views: &[TrackView], edge: &GraphEdge, visible_views: Option<usize>)
             .collect(),
         views: view_count(&edge.supports),
         visible_views,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_configuration_names_only_what_it_changes_and_nothing_unknown() {
+        let text = r#"{"min_views": 4, "clustering": {"tolerance_in_pixels": 1.5}}"#;
+        let config: LineTracksConfig = serde_json::from_str(text).unwrap();
+        let mut expected = LineTracksConfig {
+            min_views: 4,
+            ..Default::default()
+        };
+        expected.clustering.tolerance_in_pixels = 1.5;
+        assert_eq!(config, expected);
+        let text = serde_json::to_string(&config).unwrap();
+        assert_eq!(
+            serde_json::from_str::<LineTracksConfig>(&text).unwrap(),
+            config
+        );
+        assert!(serde_json::from_str::<LineTracksConfig>(r#"{"min_view": 4}"#).is_err());
     }
 }

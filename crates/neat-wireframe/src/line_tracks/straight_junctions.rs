@@ -88,3 +88,34 @@ pub(super) fn dissolve_straight(
         })
         .collect();
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::line_tracks::junction_graph::{JunctionGraphConfig, junction_graph};
+    use crate::line_tracks::test_tracks::{cube_tracks, cube_views};
+
+    #[test]
+    fn two_halves_become_one_edge_and_corners_stay() {
+        let views = cube_views(12);
+        let tracks = cube_tracks(&views);
+        let whole = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        let mut cut = whole.clone();
+        let [a, b] = cut.edges[5].junctions;
+        let middle = cut.junctions.len();
+        cut.junctions
+            .push(0.5 * (cut.junctions[a] + cut.junctions[b]));
+        cut.edges[5].junctions = [a, middle];
+        let second = GraphEdge {
+            junctions: [b, middle],
+            supports: cut.edges[5].supports.clone(),
+        };
+        cut.edges.push(second);
+        dissolve_straight(&views, &mut cut, &StraightJunctionsConfig::default());
+        assert_eq!(cut.edges, whole.edges);
+
+        let mut untouched = whole.clone();
+        dissolve_straight(&views, &mut untouched, &StraightJunctionsConfig::default());
+        assert_eq!(untouched, whole);
+    }
+}

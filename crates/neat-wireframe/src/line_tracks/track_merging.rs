@@ -224,21 +224,15 @@ fn duplicate_pairs(
     found.into_iter().flatten().collect()
 }
 
-/// The tracks that have a member near the track's projection in any of its
-/// views, ascending.
+/// The tracks that have a member near the track's projection in any view,
+/// ascending: two halves of one track may have no view in common.
 fn near_tracks(views: &[TrackView], track: &Track, track_of: &TrackOfSegment) -> Vec<usize> {
     let mut near = Vec::new();
-    for group in track.members.chunk_by(|a, b| a.view == b.view) {
-        let view = group[0].view;
-        let Some(projected) = project_segment(&views[view], &track.line) else {
-            continue;
-        };
-        let segments = views[view].index.near(&projected);
-        near.extend(
-            segments
-                .into_iter()
-                .filter_map(|segment| track_of[view][segment]),
-        );
+    for (view, track_of) in views.iter().zip(track_of) {
+        if let Some(projected) = project_segment(view, &track.line) {
+            let segments = view.index.near(&projected);
+            near.extend(segments.into_iter().filter_map(|segment| track_of[segment]));
+        }
     }
     near.sort_unstable();
     near.dedup();
@@ -344,4 +338,79 @@ fn side_by_side(
     let middle = short.point_at(0.5);
     let foot = long.point_at(long.line_parameter(&middle));
     (middle - foot).norm() > config.separate_in_pixels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::line_tracks::test_tracks::{cube_edge, cube_tracks, cube_views, end_distance};
+
+    #[test]
+    fn halves_of_a_track_become_one_and_different_edges_stay() {
+        let views = cube_views(12);
+        let mut tracks = cube_tracks(&views);
+        let members = tracks[5].members.split_off(6);
+        let line = tracks[5]
+            .line
+            .map(|end| end + nalgebra::Vector3::repeat(5e-4));
+        tracks.push(Track { line, members });
+        let merged = merge_duplicates(
+            &views,
+            tracks,
+            3,
+            &TrackMergingConfig::default(),
+            &LineRefinementConfig::default(),
+        );
+        assert_eq!(merged.len(), 12);
+        for edge in 0..12 {
+            let of_edge: Vec<_> = merged
+                .iter()
+                .filter(|track| end_distance(&track.line, &cube_edge(edge)) < 1e-3)
+                .collect();
+            assert_eq!(of_edge.len(), 1);
+            assert_eq!(of_edge[0].view_count(), 12);
+        }
+    }
+
+    #[test]
+    fn close_parallel_edges_that_views_show_side_by_side_stay_apart() {
+        use crate::ViewObservation;
+        use crate::test_scenes::{cameras_on_sphere, views_of_edges};
+        use nalgebra::Vector3;
+        // 0.012 apart: 3 to 4 pixels.
+        let junctions = [-0.006, 0.006].map(|z| [-0.4, 0.4].map(|x| Vector3::new(x, 0.0, z)));
+        let junctions: Vec<_> = junctions.into_iter().flatten().collect();
+        let observations: Vec<ViewObservation> =
+            views_of_edges(&cameras_on_sphere(12), &junctions, &[[0, 1], [2, 3]]);
+        let views: Vec<_> = observations
+            .iter()
+            .map(|observation| TrackView::new(observation, 1.0, 1.0))
+            .collect();
+        let tracks: Vec<Track> = (0..2)
+            .map(|segment| Track {
+                line: LineSegment3::new(junctions[2 * segment], junctions[2 * segment + 1]),
+                members: (0..12).map(|view| SegmentId { view, segment }).collect(),
+            })
+            .collect();
+        let config = TrackMergingConfig::default();
+        let merged = merge_duplicates(&views, tracks, 3, &config, &LineRefinementConfig::default());
+        assert_eq!(merged.len(), 2);
+    }
+
+    #[test]
+    fn unclaimed_segments_join_the_track_that_they_lie_on() {
+        let views = cube_views(12);
+        let mut tracks = cube_tracks(&views);
+        for track in &mut tracks {
+            track.members.truncate(5);
+        }
+        let gathered = gather_unclaimed(
+            &views,
+            tracks,
+            3,
+            &ClusteringConfig::default(),
+            &LineRefinementConfig::default(),
+        );
+        assert!(gathered.iter().all(|track| track.view_count() >= 11));
+    }
 }

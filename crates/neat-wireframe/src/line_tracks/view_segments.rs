@@ -27,6 +27,8 @@ pub(super) struct ViewSegment {
     pub rays: [Vector3<f64>; 2],
     /// Unit normal of the plane of both rays, in the world.
     pub plane_normal: Vector3<f64>,
+    /// The detector's confidence, in [0, 1].
+    pub score: f64,
     /// Which vertices of the view the ends are.
     pub vertices: [usize; 2],
 }
@@ -101,6 +103,7 @@ impl TrackView {
                     segment,
                     rays,
                     plane_normal,
+                    score: detection.score.clamp(0.0, 1.0),
                     vertices,
                 });
             }
