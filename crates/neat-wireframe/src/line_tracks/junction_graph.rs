@@ -41,11 +41,11 @@ impl Default for JunctionGraphConfig {
     fn default() -> Self {
         Self {
             min_votes: 2,
-            attach_in_pixels: 8.0,
+            attach_in_pixels: 12.0,
             attach_relative: 0.15,
             max_line_distance_in_pixels: 2.5,
             near_in_pixels: 6.0,
-            near_corner_in_pixels: 12.0,
+            near_corner_in_pixels: 18.0,
             max_corner_cosine: 0.9,
             max_relative_shift: 0.35,
         }

@@ -1,9 +1,9 @@
 //! Solids with noisy, incomplete and false detections.
 
 use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
-use neat_wireframe::ViewObservation;
 use neat_wireframe::line_tracks::{LineTracksConfig, LineTracksResult, run};
 use neat_wireframe::metrics::EvaluationConfig;
+use neat_wireframe::{SegmentProposal, ViewObservation};
 
 fn scene(solid: Solid, seed: u64) -> SyntheticData {
     let config = SyntheticScene {
@@ -63,6 +63,47 @@ fn a_box_comes_back_exactly() {
     assert_eq!(result.wireframe.junctions.len(), 8);
     assert_eq!(result.wireframe.edges.len(), 12);
     assert_eq!(precision_and_recall(&data, &result), (1.0, 1.0));
+}
+
+#[test]
+fn right_priors_do_no_harm_and_wrong_ones_little() {
+    let data = scene(Solid::Box, 4);
+    let observations = ViewObservation::from_scene(&data.scene, 0.05);
+    let truth = data.truth.segments();
+    let mut right = Vec::new();
+    let mut wrong = Vec::new();
+    for (view, observation) in observations.iter().enumerate() {
+        let sources = &data.view_truths[view].sources;
+        for (segment_in_view, detection) in observation.segments.iter().enumerate() {
+            let Some(part) = sources[detection.edge] else {
+                continue;
+            };
+            let edge = truth[data.view_truths[view].visible[part].edge];
+            let projected = edge.map(|end| observation.camera.project(end).pixel);
+            let oriented = if detection.segment.with_nearest_order(&projected) == projected {
+                edge
+            } else {
+                edge.reversed()
+            };
+            let mut proposal = SegmentProposal {
+                view,
+                segment_in_view,
+                segment: oriented,
+                end_error_in_pixels: [0.0; 2],
+                end_spread: [0.01; 2],
+            };
+            right.push(proposal);
+            proposal.segment = oriented.map(|end| end * 0.8);
+            wrong.push(proposal);
+        }
+    }
+    let config = LineTracksConfig::default();
+    let radius = data.scene.sphere_radius;
+    for priors in [&right, &wrong] {
+        let result = run(&observations, priors, None, radius, &config);
+        assert_eq!(result.report.usable_priors, priors.len());
+        assert_eq!(precision_and_recall(&data, &result), (1.0, 1.0));
+    }
 }
 
 #[test]

@@ -24,7 +24,7 @@ fn toy_dir() -> Option<PathBuf> {
 }
 
 #[test]
-fn every_true_edge_is_found() {
+fn the_true_graph_comes_back_and_little_else() {
     let Some(dir) = toy_dir() else {
         return;
     };
@@ -47,5 +47,6 @@ fn every_true_edge_is_found() {
     assert_eq!(scores.junctions[0].recall, 1.0);
     assert_eq!(scores.segments_max[0].recall, 1.0);
     // Chords of the round hole are seen by many views too; they are no truth.
-    assert!(result.wireframe.edges.len() <= 60);
+    assert!(scores.junctions[0].precision >= 0.8);
+    assert!(scores.segments_max[0].precision >= 0.9);
 }
