@@ -30,6 +30,7 @@ mod neighbours;
 mod projected_line;
 mod segment_index;
 mod straight_junctions;
+mod t_junctions;
 mod track_merging;
 mod view_segments;
 
@@ -47,6 +48,7 @@ pub use junction_graph::JunctionGraphConfig;
 pub use line_refinement::LineRefinementConfig;
 pub use neighbours::NeighboursConfig;
 pub use straight_junctions::StraightJunctionsConfig;
+pub use t_junctions::TJunctionsConfig;
 pub use track_merging::TrackMergingConfig;
 
 use crate::fast_back_end::UnitBallSurface;
@@ -63,6 +65,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
 use straight_junctions::dissolve_straight;
+use t_junctions::snap_free_ends;
 use track_merging::{gather_unclaimed, merge_duplicates};
 use view_segments::{SegmentId, TrackView, segment_of};
 
@@ -100,6 +103,8 @@ pub struct LineTracksConfig {
     pub confirmation: EdgeConfirmationConfig,
     /// Which edges float alone.
     pub isolation: IsolatedEdgesConfig,
+    /// Which ends stop on other edges.
+    pub t_junctions: TJunctionsConfig,
     /// Drop edges supported in too few of the views in which the surface leaves
     /// them visible; without a surface it says nothing.
     pub occlusion_test: bool,
@@ -125,6 +130,7 @@ impl Default for LineTracksConfig {
             adjustment: GraphAdjustmentConfig::default(),
             confirmation: EdgeConfirmationConfig::default(),
             isolation: IsolatedEdgesConfig::default(),
+            t_junctions: TJunctionsConfig::default(),
             occlusion_test: false,
             occlusion: OcclusionConfig::default(),
         }
@@ -191,6 +197,8 @@ pub struct LineTracksReport {
     pub confirmed_edges: usize,
     /// Edges that do not float alone.
     pub accompanied_edges: usize,
+    /// Free ends moved to the edges that they touch.
+    pub snapped_ends: usize,
     /// Edges left by the occlusion test.
     pub unoccluded_edges: usize,
     /// Junctions of the result.
@@ -321,6 +329,7 @@ pub fn run(
     report.confirmed_edges = graph.edges.len();
     drop_isolated(&views, &mut graph, &config.isolation);
     report.accompanied_edges = graph.edges.len();
+    report.snapped_ends = snap_free_ends(&views, &mut graph, &config.t_junctions);
     clock.end_of("adjustment");
 
     let mut visible = None;
