@@ -94,11 +94,13 @@ pub fn bundle_adjust(
         .map(|edge| ObservedEdge::associate(*edge, views, junctions, association_in_pixels, config))
         .filter(|edge| !edge.observations.is_empty())
         .collect();
-    minimise(&observed, junctions, config)
+    adjust_observed(&observed, junctions, config)
 }
 
-/// Levenberg–Marquardt on all junctions.
-fn minimise(
+/// Levenberg–Marquardt on all junctions, with the correspondences as they are.
+///
+/// Edges must name two different existing junctions.
+pub(crate) fn adjust_observed(
     edges: &[ObservedEdge],
     junctions: &[Vector3<f64>],
     config: &BundleAdjustmentConfig,
@@ -182,21 +184,24 @@ struct EdgeBlocks {
     gradient: [Vector3<f64>; 2],
 }
 
-/// An edge with its best detection in every view that observes it.
-struct ObservedEdge {
-    junctions: [usize; 2],
-    observations: Vec<EdgeObservation>,
+/// An edge with the detections that observe it.
+pub(crate) struct ObservedEdge {
+    /// Indices of its junctions.
+    pub junctions: [usize; 2],
+    /// One for each detection.
+    pub observations: Vec<EdgeObservation>,
 }
 
-/// What one view says about an edge.
-struct EdgeObservation {
-    camera: Camera,
+/// What one detection says about an edge.
+pub(crate) struct EdgeObservation {
+    /// The view's camera. Both junctions lie in front of it.
+    pub camera: Camera,
     /// Both ends lie on the edge's line.
-    detection: LineSegment2,
+    pub detection: LineSegment2,
     /// The detection's end that belongs to each junction, where one is near.
-    ends: [Option<Vector2<f64>>; 2],
+    pub ends: [Option<Vector2<f64>>; 2],
     /// Factor of all residuals.
-    weight: f64,
+    pub weight: f64,
 }
 
 impl ObservedEdge {

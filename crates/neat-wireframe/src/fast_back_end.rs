@@ -381,9 +381,11 @@ fn canonical_order(
 }
 
 /// A surface in the world whose scene ball is the unit ball.
-struct UnitBallSurface<'a> {
-    surface: &'a dyn SignedDistance,
-    scene_radius: f64,
+pub(crate) struct UnitBallSurface<'a> {
+    /// Asked in the original world.
+    pub surface: &'a dyn SignedDistance,
+    /// The original radius of the scene ball.
+    pub scene_radius: f64,
 }
 
 impl UnitBallSurface<'_> {

@@ -14,6 +14,7 @@ pub mod fast_back_end;
 pub mod junction_modes;
 pub mod junction_refinement;
 pub mod junction_voting;
+pub mod line_tracks;
 pub mod metrics;
 pub mod neat_lines;
 pub mod normal_equations;

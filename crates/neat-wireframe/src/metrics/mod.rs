@@ -1,7 +1,9 @@
 //! How good a wireframe is: precision and recall against a true wireframe,
-//! accuracy and completeness against a scanned surface.
+//! accuracy and completeness against a scanned surface, agreement with the images
+//! where there is no truth.
 
 mod evaluation;
+mod image_evidence;
 mod precision_recall;
 mod surface_distance;
 mod table;
@@ -9,6 +11,7 @@ mod table;
 pub use evaluation::{
     Evaluation, EvaluationConfig, SurfaceScores, WireframeCounts, WireframeScores,
 };
+pub use image_evidence::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 pub use precision_recall::{
     Matching, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,
     segment_distances,

@@ -1,0 +1,133 @@
+//! A scene folder with 2D wireframes → a 3D wireframe, by the line-track back end
+//! alone: no training.
+//!
+//! ```text
+//! cargo run --release -p neat-wireframe --example line_tracks -- SCENE \
+//!     [--out DIR] [--overlays DIR] [--config FILE.json] [--truth gt_wireframe.json]
+//! ```
+//!
+//! Writes `wireframe.json`, `.obj` and `.ply` in the frame and the unit of the
+//! scene's own files, and prints what each step kept, how long it took, and how
+//! well the result agrees with the images and with the truth, if there is one.
+
+#![expect(clippy::print_stdout, reason = "an example shows its results")]
+
+mod drawing;
+
+use neat_core::ground_truth::read_wireframe;
+use neat_core::{LoadOptions, load_scene};
+use neat_wireframe::ViewObservation;
+use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
+use neat_wireframe::line_tracks::{LineTracksConfig, run};
+use neat_wireframe::metrics::{EvaluationConfig, ImageEvidenceConfig, image_evidence};
+use std::path::PathBuf;
+
+type AnyError = Box<dyn std::error::Error>;
+
+/// What the command line asks for.
+#[derive(Default)]
+struct Arguments {
+    scene: PathBuf,
+    out: Option<PathBuf>,
+    overlays: Option<PathBuf>,
+    config: Option<PathBuf>,
+    truth: Option<PathBuf>,
+}
+
+impl Arguments {
+    fn parse() -> Result<Self, AnyError> {
+        let mut parsed = Self::default();
+        let mut arguments = std::env::args_os().skip(1);
+        while let Some(argument) = arguments.next() {
+            let option = match argument.to_str() {
+                Some("--out") => &mut parsed.out,
+                Some("--overlays") => &mut parsed.overlays,
+                Some("--config") => &mut parsed.config,
+                Some("--truth") => &mut parsed.truth,
+                _ => {
+                    parsed.scene = argument.into();
+                    continue;
+                }
+            };
+            let value = arguments.next().ok_or("the last option lacks its value")?;
+            *option = Some(value.into());
+        }
+        if parsed.scene.as_os_str().is_empty() {
+            return Err("name the folder of a scene".into());
+        }
+        Ok(parsed)
+    }
+}
+
+fn main() -> Result<(), AnyError> {
+    let arguments = Arguments::parse()?;
+    let config: LineTracksConfig = match &arguments.config {
+        Some(path) => serde_json::from_slice(&std::fs::read(path)?)?,
+        None => LineTracksConfig::default(),
+    };
+    let loaded = load_scene(&arguments.scene, &LoadOptions::default())?;
+    for warning in &loaded.warnings {
+        println!("warning: {warning}");
+    }
+    let scene = loaded.scene;
+    let observations = ViewObservation::from_scene(&scene, 0.05);
+
+    let result = run(&observations, &[], None, scene.sphere_radius, &config);
+
+    println!("{}", serde_json::to_string_pretty(&result.report)?);
+    let mut total = 0.0;
+    for timing in &result.timings {
+        println!(
+            "{:>12} {:8.3} s",
+            timing.step,
+            timing.duration.as_secs_f64()
+        );
+        total += timing.duration.as_secs_f64();
+    }
+    println!("{:>12} {total:8.3} s", "total");
+
+    let points: Vec<_> = scene
+        .sparse_points
+        .iter()
+        .map(|point| point.position_in_world)
+        .collect();
+    let evidence = image_evidence(
+        &result.wireframe,
+        &observations,
+        &points,
+        &ImageEvidenceConfig::default(),
+    )?;
+    println!("{}", serde_json::to_string_pretty(&evidence)?);
+    println!(
+        "explained share of segments: {:?}",
+        evidence.explained_share()
+    );
+    println!(
+        "scene radius {:.4}, unit of the files {:.4}",
+        scene.sphere_radius, scene.original_from_world.scale
+    );
+
+    let wireframe = result
+        .wireframe
+        .map(|junction| scene.original_from_world.apply(junction));
+    if let Some(path) = &arguments.truth {
+        let truth = read_wireframe(path)?;
+        let evaluation = EvaluationConfig::default().evaluate(&wireframe, Some(&truth), None)?;
+        println!("{}", evaluation.to_markdown());
+    }
+    let views_per_edge: Vec<usize> = result.edges.iter().map(|edge| edge.views).collect();
+    if let Some(dir) = &arguments.out {
+        std::fs::create_dir_all(dir)?;
+        let mut document = WireframeDocument::from(&wireframe);
+        let views = views_per_edge.iter().map(|views| *views as f64).collect();
+        document.edge_fields.insert("views".into(), views);
+        write_json(&dir.join("wireframe.json"), &document)?;
+        write_obj(&dir.join("wireframe.obj"), &wireframe)?;
+        write_ply(&dir.join("wireframe.ply"), &wireframe)?;
+    }
+    if let Some(dir) = &arguments.overlays {
+        drawing::draw_overlays(dir, &scene, &result.wireframe, &views_per_edge)?;
+        drawing::draw_plans(dir, &result.wireframe)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,110 @@
+//! Bundle adjustment of the graph with known correspondences.
+
+use super::junction_graph::{GraphEdge, JunctionGraph};
+use super::track_merging::project_segment;
+use super::view_segments::{TrackView, segment_of};
+use crate::bundle_adjustment::{
+    BundleAdjustmentConfig, EdgeObservation, ObservedEdge, adjust_observed,
+};
+use neat_core::LineSegment3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Settings of the adjustment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GraphAdjustmentConfig {
+    /// Loss and iteration; its association settings play no role here.
+    pub adjustment: BundleAdjustmentConfig,
+    /// Ends of 2D segments this near to a projected junction pull it.
+    pub end_distance_in_pixels: f64,
+}
+
+impl Default for GraphAdjustmentConfig {
+    fn default() -> Self {
+        Self {
+            adjustment: BundleAdjustmentConfig {
+                end_weight: 0.3,
+                ..Default::default()
+            },
+            end_distance_in_pixels: 4.0,
+        }
+    }
+}
+
+/// Moves all junctions until the projected edges lie on their supports.
+pub(super) fn adjust_graph(
+    views: &[TrackView],
+    graph: &mut JunctionGraph,
+    config: &GraphAdjustmentConfig,
+) {
+    let observed: Vec<ObservedEdge> = graph
+        .edges
+        .par_iter()
+        .map(|edge| ObservedEdge {
+            junctions: edge.junctions,
+            observations: observations(views, graph, edge, config),
+        })
+        .collect();
+    graph.junctions = adjust_observed(&observed, &graph.junctions, &config.adjustment);
+}
+
+fn observations(
+    views: &[TrackView],
+    graph: &JunctionGraph,
+    edge: &GraphEdge,
+    config: &GraphAdjustmentConfig,
+) -> Vec<EdgeObservation> {
+    let line = segment_of_edge(graph, edge);
+    edge.supports
+        .iter()
+        .filter_map(|id| {
+            let view = &views[id.view];
+            let projected = project_segment(view, &line)?;
+            let support = segment_of(views, *id);
+            let nearest_end = |pixel: &nalgebra::Vector2<f64>| {
+                support
+                    .segment
+                    .ends()
+                    .into_iter()
+                    .min_by(|a, b| (a - pixel).norm().total_cmp(&(b - pixel).norm()))
+                    .filter(|end| (end - pixel).norm() <= config.end_distance_in_pixels)
+            };
+            Some(EdgeObservation {
+                camera: view.camera,
+                detection: support.segment,
+                ends: [nearest_end(&projected.start), nearest_end(&projected.end)],
+                weight: 1.0,
+            })
+        })
+        .collect()
+}
+
+/// The 3D segment of an edge.
+pub(super) fn segment_of_edge(graph: &JunctionGraph, edge: &GraphEdge) -> LineSegment3 {
+    let [a, b] = edge.junctions.map(|junction| graph.junctions[junction]);
+    LineSegment3::new(a, b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::line_tracks::junction_graph::{JunctionGraphConfig, junction_graph};
+    use crate::line_tracks::test_tracks::{cube_tracks, cube_views};
+    use crate::test_scenes::{Noise, cube};
+
+    #[test]
+    fn displaced_corners_return() {
+        let views = cube_views(12);
+        let tracks = cube_tracks(&views);
+        let mut graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        let mut noise = Noise(5);
+        for junction in &mut graph.junctions {
+            *junction += 0.01 * noise.vector();
+        }
+        adjust_graph(&views, &mut graph, &GraphAdjustmentConfig::default());
+        for corner in cube().0 {
+            assert!(graph.junctions.iter().any(|x| (x - corner).norm() < 1e-4));
+        }
+    }
+}

@@ -1,0 +1,457 @@
+//! From tracks to a graph: which ends of tracks are one junction, and where it
+//! is.
+//!
+//! The 2D wireframes are graphs themselves. Where their vertices join members of
+//! two tracks in several views, the tracks' ends are one junction; ends that all
+//! but meet in space are joined as well.
+
+use super::clustering::Track;
+use super::track_merging::{TrackOfSegment, tracks_of_segments};
+use super::view_segments::{SegmentId, TrackView, VertexEnd};
+use crate::point_index::PointIndex;
+use crate::projection::project_in_front;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Settings of the junctions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct JunctionGraphConfig {
+    /// Views whose vertices must join two ends.
+    pub min_votes: usize,
+    /// A vertex belongs to a track's end if it lies this near to its projection …
+    pub attach_in_pixels: f64,
+    /// … or nearer than this share of the track's length, at most twice as far.
+    pub attach_relative: f64,
+    /// A junction lies this near to the line of each of its tracks.
+    pub max_line_distance_in_pixels: f64,
+    /// Ends nearer to each other than this are joined without any vote …
+    pub near_in_pixels: f64,
+    /// … and ends of lines that cross at a clear angle up to this distance:
+    /// detectors stop short of corners.
+    pub near_corner_in_pixels: f64,
+    /// Cosine of that angle at most.
+    pub max_corner_cosine: f64,
+    /// Joining moves no end along its track by more than this share of it.
+    pub max_relative_shift: f64,
+}
+
+impl Default for JunctionGraphConfig {
+    fn default() -> Self {
+        Self {
+            min_votes: 2,
+            attach_in_pixels: 12.0,
+            attach_relative: 0.15,
+            max_line_distance_in_pixels: 2.5,
+            near_in_pixels: 6.0,
+            near_corner_in_pixels: 18.0,
+            max_corner_cosine: 0.9,
+            max_relative_shift: 0.35,
+        }
+    }
+}
+
+/// An edge between two junctions with the 2D segments that show it.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct GraphEdge {
+    /// Indices of its junctions, ascending.
+    pub junctions: [usize; 2],
+    /// The 2D segments, ascending.
+    pub supports: Vec<SegmentId>,
+}
+
+/// Junctions and edges with their evidence.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct JunctionGraph {
+    /// Positions, in the world whose scene ball has radius 1.
+    pub junctions: Vec<Vector3<f64>>,
+    /// No two edges have the same junctions.
+    pub edges: Vec<GraphEdge>,
+}
+
+/// The graph of the tracks, completed by edges that 2D segments without a track
+/// draw between its junctions in at least `min_views` views.
+///
+/// These are above all edges along the cameras' baseline, which no pair of views
+/// can triangulate: their junctions, found through other edges, hold them.
+pub(super) fn junction_graph(
+    views: &[TrackView],
+    tracks: &[Track],
+    min_views: usize,
+    config: &JunctionGraphConfig,
+) -> JunctionGraph {
+    let track_of = tracks_of_segments(views, tracks);
+    let ends = TrackEnds::new(views, tracks);
+    let attached = attached_vertices(views, &ends, &track_of, config);
+    let mut joining = Joining::new(&ends, config);
+    for (_, [a, b]) in votes(&attached, config) {
+        joining.join(a, b, f64::INFINITY);
+    }
+    for (_, [a, b]) in near_pairs(&ends, config) {
+        joining.join(a, b, config.near_corner_in_pixels);
+    }
+    let (junctions, junction_of_end) = joining.junctions();
+
+    let mut edges: BTreeMap<[usize; 2], Vec<SegmentId>> = BTreeMap::new();
+    for (track, of_track) in tracks.iter().enumerate() {
+        let [a, b] = [0, 1].map(|side| junction_of_end[2 * track + side]);
+        if a != b {
+            let supports = edges.entry([a.min(b), a.max(b)]).or_default();
+            supports.extend(&of_track.members);
+        }
+    }
+    let drawn = drawn_edges(
+        views,
+        &track_of,
+        &attached,
+        &junctions,
+        &junction_of_end,
+        config,
+    );
+    for (pair, supports) in drawn {
+        if super::clustering::view_count(&supports) >= min_views {
+            edges.entry(pair).or_default().extend(supports);
+        }
+    }
+    JunctionGraph {
+        junctions,
+        edges: edges
+            .into_iter()
+            .map(|(junctions, mut supports)| {
+                supports.sort_unstable();
+                supports.dedup();
+                GraphEdge {
+                    junctions,
+                    supports,
+                }
+            })
+            .collect(),
+    }
+}
+
+/// The two ends of every track: end `2 t + s` is side s of track t.
+struct TrackEnds<'a> {
+    tracks: &'a [Track],
+    positions: Vec<Vector3<f64>>,
+    /// Unit directions of the lines.
+    directions: Vec<Vector3<f64>>,
+    /// Length of a pixel at the end, in the world.
+    pixel_sizes: Vec<f64>,
+}
+
+impl<'a> TrackEnds<'a> {
+    fn new(views: &[TrackView], tracks: &'a [Track]) -> Self {
+        let mut ends = Self {
+            tracks,
+            positions: Vec::new(),
+            directions: Vec::new(),
+            pixel_sizes: Vec::new(),
+        };
+        for track in tracks {
+            let direction = (track.line.end - track.line.start).normalize();
+            for position in track.line.ends() {
+                let mut sizes: Vec<f64> = track
+                    .members
+                    .iter()
+                    .map(|id| views[id.view].pixel_size_at(&position))
+                    .collect();
+                sizes.sort_by(f64::total_cmp);
+                ends.positions.push(position);
+                ends.directions.push(direction);
+                ends.pixel_sizes.push(sizes[sizes.len() / 2]);
+            }
+        }
+        ends
+    }
+
+    fn length(&self, end: usize) -> f64 {
+        self.tracks[end / 2].line.length()
+    }
+}
+
+/// A 2D vertex at an end of a track.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Attached {
+    view: usize,
+    vertex: usize,
+    end: usize,
+}
+
+/// The vertices of all members at the ends of their tracks, ascending.
+fn attached_vertices(
+    views: &[TrackView],
+    ends: &TrackEnds,
+    track_of: &TrackOfSegment,
+    config: &JunctionGraphConfig,
+) -> Vec<Attached> {
+    let mut attached = Vec::new();
+    for (view, prepared) in views.iter().enumerate() {
+        for (vertex, vertex_ends) in prepared.vertices.iter().enumerate() {
+            let pixel = prepared.vertex_position(vertex);
+            for VertexEnd { segment, .. } in vertex_ends {
+                let Some(track) = track_of[view][*segment] else {
+                    continue;
+                };
+                let projected = Option::zip(
+                    project_in_front(&prepared.camera, &ends.positions[2 * track]),
+                    project_in_front(&prepared.camera, &ends.positions[2 * track + 1]),
+                );
+                let Some((start, stop)) = projected else {
+                    continue;
+                };
+                let distances = [(start - pixel).norm(), (stop - pixel).norm()];
+                let side = usize::from(distances[1] < distances[0]);
+                let relative = config.attach_relative * (stop - start).norm();
+                let reach = relative.clamp(config.attach_in_pixels, 2.0 * config.attach_in_pixels);
+                if distances[side] <= reach {
+                    attached.push(Attached {
+                        view,
+                        vertex,
+                        end: 2 * track + side,
+                    });
+                }
+            }
+        }
+    }
+    attached.sort_unstable();
+    attached.dedup();
+    attached
+}
+
+/// Pairs of ends that enough views join, most views first.
+fn votes(attached: &[Attached], config: &JunctionGraphConfig) -> Vec<(usize, [usize; 2])> {
+    // The last view that voted, so that a view counts once.
+    let mut votes: BTreeMap<[usize; 2], (usize, usize)> = BTreeMap::new();
+    for group in attached.chunk_by(|a, b| (a.view, a.vertex) == (b.view, b.vertex)) {
+        for (i, a) in group.iter().enumerate() {
+            for b in &group[i + 1..] {
+                if a.end / 2 == b.end / 2 {
+                    continue;
+                }
+                let (count, last) = votes.entry([a.end, b.end]).or_insert((0, usize::MAX));
+                if *last != a.view {
+                    *count += 1;
+                    *last = a.view;
+                }
+            }
+        }
+    }
+    let mut pairs: Vec<(usize, [usize; 2])> = votes
+        .into_iter()
+        .filter(|(_, (count, _))| *count >= config.min_votes)
+        .map(|(pair, (count, _))| (count, pair))
+        .collect();
+    pairs.sort_by(|(x, a), (y, b)| y.cmp(x).then(a.cmp(b)));
+    pairs
+}
+
+/// Pairs of ends that all but meet, nearest first.
+fn near_pairs(ends: &TrackEnds, config: &JunctionGraphConfig) -> Vec<(f64, [usize; 2])> {
+    let index = PointIndex::new(ends.positions.clone());
+    let mut pairs = Vec::new();
+    for (a, position) in ends.positions.iter().enumerate() {
+        let farthest = config.near_in_pixels.max(config.near_corner_in_pixels);
+        let radius = farthest * ends.pixel_sizes[a];
+        for neighbour in index.within(position, radius) {
+            let b = neighbour.index;
+            let size = ends.pixel_sizes[a].min(ends.pixel_sizes[b]);
+            let distance = neighbour.distance / size;
+            let cosine = ends.directions[a].dot(&ends.directions[b]).abs();
+            let reach = if cosine <= config.max_corner_cosine {
+                farthest
+            } else {
+                config.near_in_pixels
+            };
+            if a < b && a / 2 != b / 2 && distance <= reach {
+                pairs.push((distance, [a, b]));
+            }
+        }
+    }
+    pairs.sort_by(|(x, a), (y, b)| x.total_cmp(y).then(a.cmp(b)));
+    pairs
+}
+
+/// Clusters of ends that grow by joining.
+struct Joining<'a> {
+    ends: &'a TrackEnds<'a>,
+    config: &'a JunctionGraphConfig,
+    cluster_of: Vec<usize>,
+    /// Members of each cluster, ascending, and its position.
+    clusters: Vec<(Vec<usize>, Vector3<f64>)>,
+}
+
+impl<'a> Joining<'a> {
+    fn new(ends: &'a TrackEnds<'a>, config: &'a JunctionGraphConfig) -> Self {
+        Self {
+            ends,
+            config,
+            cluster_of: (0..ends.positions.len()).collect(),
+            clusters: ends
+                .positions
+                .iter()
+                .enumerate()
+                .map(|(end, position)| (vec![end], *position))
+                .collect(),
+        }
+    }
+
+    /// Joins the clusters of two ends, if one point fits all their lines without
+    /// moving any end by more than `max_shift_in_pixels` or its share.
+    fn join(&mut self, a: usize, b: usize, max_shift_in_pixels: f64) {
+        let [a, b] = [self.cluster_of[a], self.cluster_of[b]];
+        if a == b {
+            return;
+        }
+        let mut members = [self.clusters[a].0.as_slice(), &self.clusters[b].0].concat();
+        members.sort_unstable();
+        if members.windows(2).any(|pair| pair[0] / 2 == pair[1] / 2) {
+            return;
+        }
+        let Some(position) = self.meeting_point(&members) else {
+            return;
+        };
+        if !members
+            .iter()
+            .all(|end| self.fits(*end, &position, max_shift_in_pixels))
+        {
+            return;
+        }
+        for end in &members {
+            self.cluster_of[*end] = a;
+        }
+        self.clusters[a] = (members, position);
+        self.clusters[b].0.clear();
+    }
+
+    /// The point nearest to all lines; along lines that are all but parallel it
+    /// stays near the ends.
+    fn meeting_point(&self, members: &[usize]) -> Option<Vector3<f64>> {
+        /// Weight of an end's own position along its line.
+        const ALONG: f64 = 1e-2;
+        let mut matrix = Matrix3::zeros();
+        let mut right = Vector3::zeros();
+        for &end in members {
+            let direction = self.ends.directions[end];
+            let along = direction * direction.transpose();
+            let weight = self.ends.pixel_sizes[end].powi(-2);
+            let block = (Matrix3::identity() - along + ALONG * along) * weight;
+            matrix += block;
+            right += block * self.ends.positions[end];
+        }
+        matrix.cholesky().map(|factor| factor.solve(&right))
+    }
+
+    fn fits(&self, end: usize, position: &Vector3<f64>, max_shift_in_pixels: f64) -> bool {
+        let offset = position - self.ends.positions[end];
+        let along = offset.dot(&self.ends.directions[end]);
+        let across = (offset - along * self.ends.directions[end]).norm();
+        let pixel = self.ends.pixel_sizes[end];
+        let attach = 2.0 * self.config.attach_in_pixels;
+        let shift = (self.config.max_relative_shift * self.ends.length(end))
+            .min(attach.min(max_shift_in_pixels) * pixel);
+        across <= self.config.max_line_distance_in_pixels * pixel && along.abs() <= shift
+    }
+
+    /// The positions of all clusters and the cluster of every end.
+    fn junctions(self) -> (Vec<Vector3<f64>>, Vec<usize>) {
+        let mut new_index = vec![0; self.clusters.len()];
+        let mut junctions = Vec::new();
+        for (cluster, (members, position)) in self.clusters.iter().enumerate() {
+            if !members.is_empty() {
+                new_index[cluster] = junctions.len();
+                junctions.push(*position);
+            }
+        }
+        let of_end = self.cluster_of.iter().map(|c| new_index[*c]).collect();
+        (junctions, of_end)
+    }
+}
+
+/// The 2D segments without a track between two vertices that show junctions, by
+/// the pair of junctions.
+fn drawn_edges(
+    views: &[TrackView],
+    track_of: &TrackOfSegment,
+    attached: &[Attached],
+    junctions: &[Vector3<f64>],
+    junction_of_end: &[usize],
+    config: &JunctionGraphConfig,
+) -> BTreeMap<[usize; 2], Vec<SegmentId>> {
+    let mut drawn: BTreeMap<[usize; 2], Vec<SegmentId>> = BTreeMap::new();
+    for (view, prepared) in views.iter().enumerate() {
+        let mut junction_of_vertex: Vec<Option<(f64, usize)>> = vec![None; prepared.vertices.len()];
+        let first = attached.partition_point(|a| a.view < view);
+        for a in attached[first..].iter().take_while(|a| a.view == view) {
+            let junction = junction_of_end[a.end];
+            let Some(pixel) = project_in_front(&prepared.camera, &junctions[junction]) else {
+                continue;
+            };
+            let distance = (pixel - prepared.vertex_position(a.vertex)).norm();
+            let known = &mut junction_of_vertex[a.vertex];
+            if distance <= config.near_in_pixels && known.is_none_or(|(other, _)| distance < other)
+            {
+                *known = Some((distance, junction));
+            }
+        }
+        for (segment, shape) in prepared.segments.iter().enumerate() {
+            if track_of[view][segment].is_some() {
+                continue;
+            }
+            let [a, b] = shape.vertices.map(|vertex| junction_of_vertex[vertex]);
+            if let (Some((_, a)), Some((_, b))) = (a, b)
+                && a != b
+            {
+                let id = SegmentId { view, segment };
+                drawn.entry([a.min(b), a.max(b)]).or_default().push(id);
+            }
+        }
+    }
+    drawn
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::line_tracks::test_tracks::{cube_tracks, cube_views};
+    use crate::test_scenes::cube;
+
+    #[test]
+    fn the_ends_of_a_cube_meet_in_its_corners() {
+        let views = cube_views(12);
+        let tracks = cube_tracks(&views);
+        let graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        assert_eq!((graph.junctions.len(), graph.edges.len()), (8, 12));
+        for corner in cube().0 {
+            assert!(graph.junctions.iter().any(|x| (x - corner).norm() < 1e-9));
+        }
+    }
+
+    #[test]
+    fn edges_without_a_track_are_drawn_between_known_corners() {
+        let views = cube_views(12);
+        let mut tracks = cube_tracks(&views);
+        tracks.remove(7);
+        tracks.remove(2);
+        let graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        assert_eq!((graph.junctions.len(), graph.edges.len()), (8, 12));
+        assert!(graph.edges.iter().all(|edge| edge.supports.len() == 12));
+    }
+
+    #[test]
+    fn both_ends_of_a_track_never_become_one_junction() {
+        let views = cube_views(12);
+        let mut tracks = cube_tracks(&views);
+        let short = tracks[0].line;
+        tracks[0].line.end = short.point_at(1e-3);
+        let graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        assert!(
+            graph
+                .edges
+                .iter()
+                .all(|edge| edge.junctions[0] != edge.junctions[1])
+        );
+        let nothing = junction_graph(&[], &[], 3, &JunctionGraphConfig::default());
+        assert_eq!(nothing, JunctionGraph::default());
+    }
+}

@@ -1,0 +1,538 @@
+//! The line-track back end: 2D wireframes of posed views, matched across views,
+//! give the 3D wireframe directly.
+//!
+//! Where the other back ends take positions or neighbourhoods from a neural
+//! field, this one takes them from the images alone, so its cost grows with the
+//! number of 2D segments and not with what a field can memorise. The field, if
+//! there is one, breaks ties between repeated structures ([`SegmentProposal`]s as
+//! priors) and tells where edges ought to be seen (a [`SignedDistance`]).
+//!
+//! The steps: neighbouring views; candidate partners of every segment by the
+//! epipolar geometry; scores of the 3D positions that they make; one position per
+//! segment by mutual agreement; tracks of segments on one line; merging; a graph
+//! of junctions where 2D vertices join tracks; bundle adjustment of that graph.
+//! Matching and scoring follow Hofer, Maurer and Bischof, *Efficient 3D scene
+//! abstraction using line segments* (Line3D++, 2017).
+//!
+//! All steps work in a world whose scene ball is the unit ball around the
+//! origin; thresholds are pixels of the images.
+
+mod clustering;
+mod consensus;
+mod edge_confirmation;
+mod epipolar_matching;
+mod graph_adjustment;
+mod hypothesis_scoring;
+mod isolated_edges;
+mod junction_graph;
+mod line_refinement;
+mod neighbours;
+mod projected_line;
+mod segment_index;
+mod straight_junctions;
+mod t_junctions;
+mod track_merging;
+mod view_segments;
+
+#[cfg(test)]
+mod test_tracks;
+
+pub use clustering::ClusteringConfig;
+pub use consensus::ConsensusConfig;
+pub use edge_confirmation::EdgeConfirmationConfig;
+pub use epipolar_matching::EpipolarMatchingConfig;
+pub use graph_adjustment::GraphAdjustmentConfig;
+pub use hypothesis_scoring::HypothesisScoringConfig;
+pub use isolated_edges::IsolatedEdgesConfig;
+pub use junction_graph::JunctionGraphConfig;
+pub use line_refinement::LineRefinementConfig;
+pub use neighbours::NeighboursConfig;
+pub use straight_junctions::StraightJunctionsConfig;
+pub use t_junctions::TJunctionsConfig;
+pub use track_merging::TrackMergingConfig;
+
+use crate::fast_back_end::UnitBallSurface;
+use crate::occlusion::{OcclusionConfig, visible_views};
+use crate::{SegmentProposal, SignedDistance, ViewObservation, Wireframe3d};
+use clustering::{grow_tracks, view_count};
+use consensus::find_consensus;
+use edge_confirmation::confirm_edges;
+use graph_adjustment::adjust_graph;
+use hypothesis_scoring::{DepthPrior, score_hypotheses};
+use isolated_edges::drop_isolated;
+use junction_graph::{GraphEdge, JunctionGraph, junction_graph};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::time::{Duration, Instant};
+use straight_junctions::dissolve_straight;
+use t_junctions::snap_free_ends;
+use track_merging::{gather_unclaimed, merge_duplicates};
+use view_segments::{SegmentId, TrackView, segment_of};
+
+/// Switches and constants of [`run`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LineTracksConfig {
+    /// Views that must show an edge, at least 2.
+    pub min_views: usize,
+    /// Shorter 2D segments are passed over.
+    pub min_segment_length_in_pixels: f64,
+    /// Structure lies within the scene ball times this.
+    pub ball_margin: f64,
+    /// Which views are compared.
+    pub neighbours: NeighboursConfig,
+    /// Which segments are compared.
+    pub matching: EpipolarMatchingConfig,
+    /// What speaks for a 3D position.
+    pub scoring: HypothesisScoringConfig,
+    /// How segments choose among their positions.
+    pub consensus: ConsensusConfig,
+    /// When a segment belongs to a track.
+    pub clustering: ClusteringConfig,
+    /// How a track's line is found.
+    pub refinement: LineRefinementConfig,
+    /// Which tracks are one.
+    pub merging: TrackMergingConfig,
+    /// Which ends of tracks are one junction.
+    pub junctions: JunctionGraphConfig,
+    /// Which junctions are none.
+    pub straight: StraightJunctionsConfig,
+    /// Bundle adjustment of the graph.
+    pub adjustment: GraphAdjustmentConfig,
+    /// The final test of every edge.
+    pub confirmation: EdgeConfirmationConfig,
+    /// Which edges float alone.
+    pub isolation: IsolatedEdgesConfig,
+    /// Which ends stop on other edges.
+    pub t_junctions: TJunctionsConfig,
+    /// Drop edges supported in too few of the views in which the surface leaves
+    /// them visible; without a surface it says nothing.
+    pub occlusion_test: bool,
+    /// Constants of the occlusion test.
+    pub occlusion: OcclusionConfig,
+}
+
+impl Default for LineTracksConfig {
+    fn default() -> Self {
+        Self {
+            min_views: 3,
+            min_segment_length_in_pixels: 8.0,
+            ball_margin: 1.5,
+            neighbours: NeighboursConfig::default(),
+            matching: EpipolarMatchingConfig::default(),
+            scoring: HypothesisScoringConfig::default(),
+            consensus: ConsensusConfig::default(),
+            clustering: ClusteringConfig::default(),
+            refinement: LineRefinementConfig::default(),
+            merging: TrackMergingConfig::default(),
+            junctions: JunctionGraphConfig::default(),
+            straight: StraightJunctionsConfig::default(),
+            adjustment: GraphAdjustmentConfig::default(),
+            confirmation: EdgeConfirmationConfig::default(),
+            isolation: IsolatedEdgesConfig::default(),
+            t_junctions: TJunctionsConfig::default(),
+            occlusion_test: false,
+            occlusion: OcclusionConfig::default(),
+        }
+    }
+}
+
+/// A wireframe with the evidence for each of its edges.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LineTracksResult {
+    /// Junctions in lexicographic order of their coordinates; edges `[a, b]`,
+    /// a < b, sorted.
+    pub wireframe: Wireframe3d,
+    /// One entry per edge of the wireframe.
+    pub edges: Vec<LineEvidence>,
+    /// What each step kept.
+    pub report: LineTracksReport,
+    /// How long each step took; the only part that differs from run to run.
+    pub timings: Vec<StepTiming>,
+}
+
+/// What speaks for an edge.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LineEvidence {
+    /// The 2D segments that lie on the edge, by ascending view and index.
+    pub supports: Vec<SegmentSupport>,
+    /// Number of different views among them.
+    pub views: usize,
+    /// Number of views in which the surface leaves the edge visible; `None`
+    /// without the occlusion test.
+    pub visible_views: Option<usize>,
+}
+
+/// Names a 2D segment of the observations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct SegmentSupport {
+    /// Index of the view.
+    pub view: usize,
+    /// Index into that view's [`ViewObservation::segments`].
+    pub segment_in_view: usize,
+}
+
+/// How many things each step of [`run`] kept, in the order of the steps.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LineTracksReport {
+    /// Views with a usable camera and at least one usable segment.
+    pub usable_views: usize,
+    /// Finite segments that are long enough, in these views.
+    pub usable_segments: usize,
+    /// Pairs of a view and a neighbour.
+    pub neighbour_pairs: usize,
+    /// Priors that name a usable segment.
+    pub usable_priors: usize,
+    /// Segments with a position that enough views support.
+    pub segments_with_hypotheses: usize,
+    /// Segments whose partners agree mutually in enough views.
+    pub segments_in_consensus: usize,
+    /// Tracks as they grew.
+    pub grown_tracks: usize,
+    /// Tracks after merging and gathering.
+    pub merged_tracks: usize,
+    /// Edges of the junction graph.
+    pub graph_edges: usize,
+    /// Edges that the adjusted graph confirms.
+    pub confirmed_edges: usize,
+    /// Edges that do not float alone.
+    pub accompanied_edges: usize,
+    /// Free ends moved to the edges that they touch.
+    pub snapped_ends: usize,
+    /// Edges left by the occlusion test.
+    pub unoccluded_edges: usize,
+    /// Junctions of the result.
+    pub junctions: usize,
+    /// Edges of the result.
+    pub edges: usize,
+}
+
+/// Duration of one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepTiming {
+    /// Name of the step.
+    pub step: &'static str,
+    /// Wall-clock time.
+    pub duration: Duration,
+}
+
+/// Builds the wireframe.
+///
+/// - `observations`: cameras and detected segments. Segments whose ends have the
+///   same coordinates share a vertex. Views without a valid camera do not count.
+/// - `priors`: 3D segments with indices into `observations` that something else
+///   proposes, or none. They break ties; those that are not finite or name
+///   nothing do not count.
+/// - `surface`: for the occlusion test, asked in the world of the cameras.
+/// - `scene_radius`: radius of the ball around the world's origin in which the
+///   structure lies.
+///
+/// The result is empty where nothing can be built: too few usable views, a
+/// radius that is not a positive number. But for the timings it does not depend
+/// on the number of threads.
+pub fn run(
+    observations: &[ViewObservation],
+    priors: &[SegmentProposal],
+    surface: Option<&dyn SignedDistance>,
+    scene_radius: f64,
+    config: &LineTracksConfig,
+) -> LineTracksResult {
+    if !(scene_radius.is_normal() && scene_radius > 0.0) {
+        return LineTracksResult::default();
+    }
+    let mut clock = StepClock::new();
+    let mut report = LineTracksReport::default();
+    let min_views = config.min_views.max(2);
+    let views: Vec<TrackView> = observations
+        .par_iter()
+        .map(|observation| {
+            TrackView::new(
+                observation,
+                scene_radius.recip(),
+                config.min_segment_length_in_pixels,
+            )
+        })
+        .collect();
+    report.usable_views = views.iter().filter(|v| !v.segments.is_empty()).count();
+    report.usable_segments = views.iter().map(|v| v.segments.len()).sum();
+    let neighbours = neighbours::neighbours(&views, config.ball_margin, &config.neighbours);
+    report.neighbour_pairs = neighbours.iter().map(Vec::len).sum();
+    let priors = depth_priors(&views, priors, scene_radius.recip());
+    report.usable_priors = priors.len();
+    clock.end_of("preparation");
+
+    let alternatives = score_hypotheses(
+        &views,
+        &neighbours,
+        &priors,
+        config.ball_margin,
+        min_views,
+        &config.matching,
+        &config.scoring,
+    );
+    report.segments_with_hypotheses = alternatives
+        .iter()
+        .flatten()
+        .filter(|list| !list.is_empty())
+        .count();
+    clock.end_of("matching");
+
+    let consensus = find_consensus(&views, &alternatives, min_views, &config.consensus);
+    drop(alternatives);
+    report.segments_in_consensus = consensus.iter().flatten().flatten().count();
+    clock.end_of("consensus");
+
+    let tracks = grow_tracks(
+        &views,
+        &consensus,
+        min_views,
+        &config.clustering,
+        &config.refinement,
+    );
+    report.grown_tracks = tracks.len();
+    clock.end_of("tracks");
+
+    let merge = |tracks| {
+        merge_duplicates(
+            &views,
+            tracks,
+            min_views,
+            &config.merging,
+            &config.refinement,
+        )
+    };
+    let tracks = merge(tracks);
+    let tracks = gather_unclaimed(
+        &views,
+        tracks,
+        min_views,
+        &config.clustering,
+        &config.refinement,
+    );
+    let tracks = merge(tracks);
+    report.merged_tracks = tracks.len();
+    clock.end_of("merging");
+
+    let mut graph = junction_graph(&views, &tracks, min_views, &config.junctions);
+    dissolve_straight(&views, &mut graph, &config.straight);
+    report.graph_edges = graph.edges.len();
+    clock.end_of("junctions");
+
+    adjust_graph(&views, &mut graph, &config.adjustment);
+    confirm_edges(
+        &views,
+        &mut graph,
+        min_views,
+        &config.clustering,
+        &config.confirmation,
+    );
+    report.confirmed_edges = graph.edges.len();
+    drop_isolated(&views, &mut graph, &config.isolation);
+    report.accompanied_edges = graph.edges.len();
+    report.snapped_ends = snap_free_ends(&views, &mut graph, &config.t_junctions);
+    clock.end_of("adjustment");
+
+    let mut visible = None;
+    if let (true, Some(surface)) = (config.occlusion_test, surface) {
+        let surface = UnitBallSurface {
+            surface,
+            scene_radius,
+        };
+        visible = Some(drop_occluded(
+            observations,
+            &mut graph,
+            &surface,
+            scene_radius,
+            config,
+        ));
+        clock.end_of("occlusion");
+    }
+    report.unoccluded_edges = graph.edges.len();
+    result(&views, graph, visible, scene_radius, report, clock.timings)
+}
+
+/// Measures the steps.
+struct StepClock {
+    last: Instant,
+    timings: Vec<StepTiming>,
+}
+
+impl StepClock {
+    fn new() -> Self {
+        Self {
+            last: Instant::now(),
+            timings: Vec::new(),
+        }
+    }
+
+    fn end_of(&mut self, step: &'static str) {
+        let now = Instant::now();
+        self.timings.push(StepTiming {
+            step,
+            duration: now - self.last,
+        });
+        self.last = now;
+    }
+}
+
+/// The proposals as depths on the rays of their segments, by ascending id; of
+/// several for one segment the first.
+fn depth_priors(views: &[TrackView], proposals: &[SegmentProposal], scale: f64) -> Vec<DepthPrior> {
+    let mut priors: Vec<DepthPrior> = proposals
+        .iter()
+        .filter_map(|proposal| {
+            let view = views.get(proposal.view)?;
+            // Segments keep their order.
+            let segment = view
+                .segments
+                .binary_search_by_key(&proposal.segment_in_view, |s| s.segment_in_view)
+                .ok()?;
+            let ends = proposal.segment.ends();
+            let rays = view.segments[segment].rays;
+            let depths = [0, 1]
+                .map(|side| (ends[side] * scale - view.camera.center_in_world).dot(&rays[side]));
+            let spreads = proposal.end_spread.map(|spread| spread * scale);
+            let usable = depths.iter().all(|d| d.is_finite() && *d > 0.0)
+                && spreads.iter().all(|s| s.is_finite() && *s >= 0.0);
+            usable.then_some(DepthPrior {
+                id: SegmentId {
+                    view: proposal.view,
+                    segment,
+                },
+                depths,
+                spreads,
+            })
+        })
+        .collect();
+    priors.sort_by_key(|prior| prior.id);
+    priors.dedup_by_key(|prior| prior.id);
+    priors
+}
+
+/// Drops the edges that the images ought to show more often; returns the number
+/// of views in which each of the others is visible.
+fn drop_occluded(
+    observations: &[ViewObservation],
+    graph: &mut JunctionGraph,
+    surface: &UnitBallSurface,
+    scene_radius: f64,
+    config: &LineTracksConfig,
+) -> Vec<usize> {
+    let views: Vec<ViewObservation> = observations
+        .iter()
+        .filter(|observation| observation.camera.validate().is_ok())
+        .map(|observation| {
+            let mut camera = observation.camera;
+            camera.center_in_world /= scene_radius;
+            ViewObservation {
+                camera,
+                segments: Vec::new(),
+                junctions: Vec::new(),
+            }
+        })
+        .collect();
+    let pairs: Vec<[usize; 2]> = graph.edges.iter().map(|edge| edge.junctions).collect();
+    let visible = visible_views(&views, &graph.junctions, &pairs, surface, &config.occlusion);
+    let edges = std::mem::take(&mut graph.edges);
+    let mut kept_visible = Vec::new();
+    for (edge, visible) in edges.into_iter().zip(visible) {
+        let support = view_count(&edge.supports);
+        let ratio = config
+            .occlusion
+            .support_ratio(support, visible, views.len());
+        if ratio >= config.occlusion.min_support_ratio {
+            graph.edges.push(edge);
+            kept_visible.push(visible);
+        }
+    }
+    kept_visible
+}
+
+/// The graph without isolated junctions, in canonical order and in the world of
+/// the observations.
+fn result(
+    views: &[TrackView],
+    graph: JunctionGraph,
+    visible: Option<Vec<usize>>,
+    scene_radius: f64,
+    mut report: LineTracksReport,
+    timings: Vec<StepTiming>,
+) -> LineTracksResult {
+    let mut order: Vec<usize> = graph.edges.iter().flat_map(|edge| edge.junctions).collect();
+    order.sort_unstable();
+    order.dedup();
+    order.sort_by(|a, b| {
+        let [a, b] = [a, b].map(|junction| &graph.junctions[*junction]);
+        a.x.total_cmp(&b.x)
+            .then(a.y.total_cmp(&b.y))
+            .then(a.z.total_cmp(&b.z))
+    });
+    let mut new_index = vec![0; graph.junctions.len()];
+    for (new, old) in order.iter().enumerate() {
+        new_index[*old] = new;
+    }
+    let mut edges: Vec<([usize; 2], LineEvidence)> = graph
+        .edges
+        .iter()
+        .enumerate()
+        .map(|(i, edge)| {
+            let [a, b] = edge.junctions.map(|junction| new_index[junction]);
+            let visible_views = visible.as_ref().map(|visible| visible[i]);
+            ([a.min(b), a.max(b)], evidence(views, edge, visible_views))
+        })
+        .collect();
+    edges.sort_by_key(|(pair, _)| *pair);
+    report.junctions = order.len();
+    report.edges = edges.len();
+    let (pairs, evidence) = edges.into_iter().unzip();
+    LineTracksResult {
+        wireframe: Wireframe3d {
+            junctions: order
+                .iter()
+                .map(|old| graph.junctions[*old] * scene_radius)
+                .collect(),
+            edges: pairs,
+        },
+        edges: evidence,
+        report,
+        timings,
+    }
+}
+
+fn evidence(views: &[TrackView], edge: &GraphEdge, visible_views: Option<usize>) -> LineEvidence {
+    LineEvidence {
+        supports: edge
+            .supports
+            .iter()
+            .map(|id| SegmentSupport {
+                view: id.view,
+                segment_in_view: segment_of(views, *id).segment_in_view,
+            })
+            .collect(),
+        views: view_count(&edge.supports),
+        visible_views,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_configuration_names_only_what_it_changes_and_nothing_unknown() {
+        let text = r#"{"min_views": 4, "clustering": {"tolerance_in_pixels": 1.5}}"#;
+        let config: LineTracksConfig = serde_json::from_str(text).unwrap();
+        let mut expected = LineTracksConfig {
+            min_views: 4,
+            ..Default::default()
+        };
+        expected.clustering.tolerance_in_pixels = 1.5;
+        assert_eq!(config, expected);
+        let text = serde_json::to_string(&config).unwrap();
+        assert_eq!(
+            serde_json::from_str::<LineTracksConfig>(&text).unwrap(),
+            config
+        );
+        assert!(serde_json::from_str::<LineTracksConfig>(r#"{"min_view": 4}"#).is_err());
+    }
+}

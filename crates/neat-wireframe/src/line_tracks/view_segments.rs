@@ -1,0 +1,184 @@
+//! The 2D evidence of one view, ready for geometry: back-projected rays and
+//! planes, shared vertices, and an index of where each segment lies.
+
+use super::segment_index::SegmentIndex;
+use crate::ViewObservation;
+use nalgebra::{Vector2, Vector3};
+use neat_core::{Camera, LineSegment2, LineSegment3};
+use std::collections::HashMap;
+
+/// Names one 2D segment of the prepared views.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct SegmentId {
+    /// Index of the view.
+    pub view: usize,
+    /// Index into [`TrackView::segments`].
+    pub segment: usize,
+}
+
+/// A 2D segment with the plane that it and the camera's centre span.
+#[derive(Clone, Debug)]
+pub(super) struct ViewSegment {
+    /// Index into the observation's segments.
+    pub segment_in_view: usize,
+    /// In image coordinates.
+    pub segment: LineSegment2,
+    /// Unit rays through both ends, in the world.
+    pub rays: [Vector3<f64>; 2],
+    /// Unit normal of the plane of both rays, in the world.
+    pub plane_normal: Vector3<f64>,
+    /// The detector's confidence, in [0, 1].
+    pub score: f64,
+    /// Which vertices of the view the ends are.
+    pub vertices: [usize; 2],
+}
+
+/// One end of a segment at a vertex.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct VertexEnd {
+    /// Index into [`TrackView::segments`].
+    pub segment: usize,
+    /// 0 for the start, 1 for the end.
+    pub side: usize,
+}
+
+/// A camera with its prepared segments.
+#[derive(Clone, Debug)]
+pub(super) struct TrackView {
+    /// In the world whose scene ball has radius 1.
+    pub camera: Camera,
+    /// Mean focal length in pixels.
+    pub focal_in_pixels: f64,
+    /// The usable segments, in the order of the observation.
+    pub segments: Vec<ViewSegment>,
+    /// The segments' ends at each vertex. Ends with the same coordinates are
+    /// the same vertex: that is how 2D wireframes reach this crate.
+    pub vertices: Vec<Vec<VertexEnd>>,
+    /// Where the segments lie.
+    pub index: SegmentIndex,
+}
+
+impl TrackView {
+    /// Prepares a view; lengths of the world are multiplied by `scale`. A camera
+    /// that cannot be used leaves a view without segments, and segments that are
+    /// not finite or shorter than `min_length_in_pixels` are left out.
+    pub(super) fn new(
+        observation: &ViewObservation,
+        scale: f64,
+        min_length_in_pixels: f64,
+    ) -> Self {
+        let camera = Camera {
+            center_in_world: observation.camera.center_in_world * scale,
+            ..observation.camera
+        };
+        let mut segments = Vec::new();
+        let mut vertices: Vec<Vec<VertexEnd>> = Vec::new();
+        if camera.validate().is_ok() {
+            let mut vertex_at: HashMap<[u64; 2], usize> = HashMap::new();
+            for (segment_in_view, detection) in observation.segments.iter().enumerate() {
+                let segment = detection.segment;
+                let length = segment.length();
+                let long_enough = length.is_finite() && length >= min_length_in_pixels;
+                if !long_enough || !detection.score.is_finite() {
+                    continue;
+                }
+                let rays = segment.ends().map(|end| camera.ray_through(&end).direction);
+                let Some(plane_normal) = rays[0].cross(&rays[1]).try_normalize(1e-12) else {
+                    continue;
+                };
+                let vertices = [0, 1].map(|side| {
+                    let end = segment.ends()[side];
+                    let vertex = *vertex_at
+                        .entry([end.x.to_bits(), end.y.to_bits()])
+                        .or_insert_with(|| {
+                            vertices.push(Vec::new());
+                            vertices.len() - 1
+                        });
+                    let segment = segments.len();
+                    vertices[vertex].push(VertexEnd { segment, side });
+                    vertex
+                });
+                segments.push(ViewSegment {
+                    segment_in_view,
+                    segment,
+                    rays,
+                    plane_normal,
+                    score: detection.score.clamp(0.0, 1.0),
+                    vertices,
+                });
+            }
+        }
+        let shapes: Vec<LineSegment2> = segments.iter().map(|s| s.segment).collect();
+        Self {
+            focal_in_pixels: 0.5 * (camera.intrinsics.fx + camera.intrinsics.fy),
+            index: SegmentIndex::new(&shapes, camera.width, camera.height),
+            camera,
+            segments,
+            vertices,
+        }
+    }
+
+    /// The 3D segment whose ends lie at these distances on the rays of a 2D
+    /// segment's ends.
+    pub(super) fn back_project(&self, segment: usize, depths: [f64; 2]) -> LineSegment3 {
+        let rays = self.segments[segment].rays;
+        let at = |side: usize| self.camera.center_in_world + depths[side] * rays[side];
+        LineSegment3::new(at(0), at(1))
+    }
+
+    /// Length in the world of one pixel at a point.
+    pub(super) fn pixel_size_at(&self, point_in_world: &Vector3<f64>) -> f64 {
+        (point_in_world - self.camera.center_in_world).norm() / self.focal_in_pixels
+    }
+
+    /// Image coordinates of a vertex.
+    pub(super) fn vertex_position(&self, vertex: usize) -> Vector2<f64> {
+        let VertexEnd { segment, side } = self.vertices[vertex][0];
+        self.segments[segment].segment.ends()[side]
+    }
+}
+
+/// The 2D segment that an id names.
+pub(super) fn segment_of(views: &[TrackView], id: SegmentId) -> &ViewSegment {
+    &views[id.view].segments[id.segment]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
+
+    #[test]
+    fn ends_at_one_place_are_one_vertex_and_planes_hold_the_edges() {
+        let (junctions, edges) = cube();
+        let observations = views_of_edges(&cameras_on_sphere(3), &junctions, &edges);
+        for observation in &observations {
+            let view = TrackView::new(observation, 1.0, 1.0);
+            assert_eq!(view.vertices.len(), 8);
+            assert!(view.vertices.iter().all(|ends| ends.len() == 3));
+            for (segment, [a, b]) in view.segments.iter().zip(&edges) {
+                for junction in [junctions[*a], junctions[*b]] {
+                    let offset = junction - view.camera.center_in_world;
+                    assert!(offset.dot(&segment.plane_normal).abs() < 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_left_out() {
+        let (junctions, edges) = cube();
+        let mut observations = views_of_edges(&cameras_on_sphere(2), &junctions, &edges);
+        observations[0].segments[3].segment.start.x = f64::NAN;
+        observations[0].segments[4].segment.end = observations[0].segments[4].segment.start;
+        let view = TrackView::new(&observations[0], 1.0, 1.0);
+        assert_eq!(view.segments.len(), edges.len() - 2);
+        assert_eq!(view.segments[3].segment_in_view, 5);
+        observations[1].camera.center_in_world.x = f64::NAN;
+        assert!(
+            TrackView::new(&observations[1], 1.0, 1.0)
+                .segments
+                .is_empty()
+        );
+    }
+}
