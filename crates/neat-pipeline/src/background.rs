@@ -1,6 +1,6 @@
 //! What lies behind the object in the photographs, and what follows from it.
 
-use crate::config::Config;
+use crate::config::{BackEnd, Config};
 use image::RgbImage;
 use neat_core::Scene;
 use serde::{Deserialize, Serialize};
@@ -29,7 +29,8 @@ const SPHERE_SLOPE: f64 = 20.0;
 
 /// Makes `config` fit the background of `scene`: decides [`Background::Auto`], and
 /// for a photograph puts the border of the sphere behind the scene and drops the
-/// silhouette term. A configuration without `data.background` stays as it is.
+/// silhouette term; and [`BackEnd::Auto`]. A configuration without
+/// `data.background` stays as it is.
 pub fn fit_background(config: &mut Config, scene: &Scene) {
     let background = match config.data.background {
         None => return,
@@ -38,6 +39,12 @@ pub fn fit_background(config: &mut Config, scene: &Scene) {
         Some(known) => known,
     };
     config.data.background = Some(background);
+    if config.distill.back_end == BackEnd::Auto {
+        config.distill.back_end = match background {
+            Background::Photo => BackEnd::Tracks,
+            Background::Auto | Background::Black => BackEnd::Fast,
+        };
+    }
     if background == Background::Photo {
         config.train.loss.mask = 0.0;
         if config.model.implicit.bounding_sphere_slope == 0.0 {
@@ -90,6 +97,7 @@ mod tests {
         let mut config = preset.clone();
         fit_background(&mut config, &scene);
         assert_eq!(config.data.background, Some(Background::Black));
+        assert_eq!(config.distill.back_end, BackEnd::Fast);
         assert_eq!(config.train, preset.train);
         assert_eq!(config.model, preset.model);
 
@@ -101,6 +109,7 @@ mod tests {
         let mut config = preset.clone();
         fit_background(&mut config, &scene);
         assert_eq!(config.data.background, Some(Background::Photo));
+        assert_eq!(config.distill.back_end, BackEnd::Tracks);
         assert_eq!(config.train.loss.mask, 0.0);
         assert_eq!(config.model.implicit.bounding_sphere_slope, SPHERE_SLOPE);
         // A decided configuration stays, and so does a published one.

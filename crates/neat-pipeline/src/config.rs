@@ -12,6 +12,7 @@ use neat_gjp::{CandidateConfig, MatchingConfig, PerceiverConfig};
 use neat_sdf::{DensityConfig, ImplicitNetworkConfig, RaySamplerConfig, RenderingNetworkConfig};
 use neat_tensor::adam::AdamConfig;
 use neat_wireframe::fast_back_end::FastBackEndConfig;
+use neat_wireframe::line_tracks::LineTracksConfig;
 use neat_wireframe::paper_back_end::PaperBackEndConfig;
 use serde::{Deserialize, Serialize};
 
@@ -191,8 +192,14 @@ pub struct LossConfig {
 pub enum BackEnd {
     /// Section 4.3 of the paper.
     Paper,
-    /// Junctions from modes of the segment ends, re-triangulated and adjusted.
+    /// Junctions from modes of the segment ends, re-triangulated and adjusted: for
+    /// single objects.
     Fast,
+    /// Tracks of 2D segments over the views, with the field's segments as priors:
+    /// for photographs with thousands of segments.
+    Tracks,
+    /// `Tracks` where `data.background` is a photograph, else `Fast`.
+    Auto,
 }
 
 /// From the trained field to the wireframe.
@@ -207,4 +214,7 @@ pub struct DistillConfig {
     pub paper: PaperBackEndConfig,
     /// The fast back end.
     pub fast: FastBackEndConfig,
+    /// The back end of line tracks.
+    #[serde(default)]
+    pub tracks: LineTracksConfig,
 }

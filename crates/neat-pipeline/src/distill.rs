@@ -9,6 +9,8 @@ use neat_core::{Camera, LineSegment3, Scene, Wireframe3d};
 use neat_field::attraction_region::AttractionRegions;
 use neat_sdf::RayBundle;
 use neat_wireframe::fast_back_end;
+use neat_wireframe::line_tracks;
+use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 use neat_wireframe::neat_lines;
 use neat_wireframe::paper_back_end::PaperBackEndError;
 use neat_wireframe::robust_segments::{self, RobustSegmentConfig, robust_segment};
@@ -53,8 +55,25 @@ pub fn distill(
 ) -> Result<Distilled, DistillError> {
     match config.distill.back_end {
         BackEnd::Paper => paper(scene, field, config, progress),
-        BackEnd::Fast => Ok(fast(scene, field, config, progress)),
+        BackEnd::Fast | BackEnd::Auto => Ok(fast(scene, field, config, progress)),
+        BackEnd::Tracks => Ok(tracks(scene, field, config, progress)),
     }
+}
+
+/// How well a wireframe in the scene's world agrees with the 2D segments and the
+/// sparse points, with lengths in the unit of the user's files; `None` for a
+/// wireframe that is not valid.
+pub fn agreement(scene: &Scene, config: &Config, wireframe: &Wireframe3d) -> Option<ImageEvidence> {
+    let views = ViewObservation::from_scene(scene, config.data.min_segment_score);
+    let points: Vec<_> = (scene.sparse_points.iter())
+        .map(|point| point.position_in_world)
+        .collect();
+    let config = ImageEvidenceConfig::default();
+    let mut evidence = image_evidence(wireframe, &views, &points, &config).ok()?;
+    if let Some(distance) = &mut evidence.median_junction_to_point_distance {
+        *distance *= scene.original_from_world.scale;
+    }
+    Some(evidence)
 }
 
 /// Rays of one view, with the 2D segment that each asks for.
@@ -192,6 +211,34 @@ fn fast(
         report: json!({
             "back_end": "fast",
             "proposals": proposals.len(),
+            "steps": result.report,
+        }),
+        wireframe: result.wireframe,
+    }
+}
+
+fn tracks(
+    scene: &Scene,
+    field: &TrainedField,
+    config: &Config,
+    progress: &mut dyn FnMut(f64),
+) -> Distilled {
+    let views = ViewObservation::from_scene(scene, config.data.min_segment_score);
+    let priors = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f));
+    let surface = field.surface_grid();
+    let result = line_tracks::run(
+        &views,
+        &priors,
+        Some(&surface),
+        field.scene_radius,
+        &config.distill.tracks,
+    );
+    progress(1.0);
+    Distilled {
+        edge_support: result.edges.iter().map(|edge| edge.views).collect(),
+        report: json!({
+            "back_end": "tracks",
+            "priors": priors.len(),
             "steps": result.report,
         }),
         wireframe: result.wireframe,

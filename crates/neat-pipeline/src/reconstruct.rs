@@ -13,6 +13,7 @@ use crate::run_dir::{Existing, RunDir};
 use neat_core::Wireframe3d;
 use neat_core::file_cache::FileCache;
 use neat_tensor::Backend;
+use neat_wireframe::metrics::ImageEvidence;
 use session::Session;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -54,6 +55,8 @@ pub struct Reconstruction {
     pub run: RunDir,
     /// The wireframe, in the frame of the user's files.
     pub wireframe: Wireframe3d,
+    /// How well it agrees with the images.
+    pub agreement: Option<ImageEvidence>,
     /// Numbers of every step of the distillation.
     pub report: serde_json::Value,
 }

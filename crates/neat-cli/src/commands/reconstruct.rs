@@ -45,10 +45,18 @@ impl ReconstructArgs {
 /// One line about the result.
 pub fn summary(reconstruction: &Reconstruction) -> String {
     let wireframe = &reconstruction.wireframe;
-    format!(
-        "wireframe: {} junctions, {} edges: {}",
+    let mut text = format!(
+        "wireframe: {} junctions, {} edges",
         wireframe.junctions.len(),
         wireframe.edges.len(),
-        reconstruction.run.wireframe("json").display()
-    )
+    );
+    let agreement = reconstruction.agreement.and_then(|agreement| {
+        let share = agreement.explained_length_share?;
+        Some((share, agreement.mean_reprojection_error_in_pixels?))
+    });
+    if let Some((share, error)) = agreement {
+        let percent = 100.0 * share;
+        text += &format!(", on {percent:.0} % of the length of all 2D segments, {error:.2} px off");
+    }
+    text + &format!(": {}", reconstruction.run.wireframe("json").display())
 }

@@ -2,7 +2,7 @@
 
 use super::Reconstruction;
 use super::session::Session;
-use crate::distill::{Distilled, distill};
+use crate::distill::{Distilled, agreement, distill};
 use crate::error::PipelineError;
 use crate::event::{Event, Stage};
 use crate::field::TrainedField;
@@ -10,6 +10,7 @@ use crate::image_io::write_png;
 use crate::overlay::{draw_overlay, draw_wireframe, spread_views};
 use neat_core::{Wireframe3d, file};
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
+use neat_wireframe::metrics::ImageEvidence;
 use rayon::prelude::*;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -36,21 +37,29 @@ impl Session<'_> {
                 "the wireframe has no edges: train longer, or look at the 2D wireframes of the scene",
             );
         }
-        let wireframe = self.stage(Stage::Export, |session| session.export(&distilled))?;
+        let agreement = agreement(&self.scene, &self.config, &distilled.wireframe);
+        let wireframe = self.stage(Stage::Export, |session| {
+            session.export(&distilled, agreement)
+        })?;
         Ok(Reconstruction {
             run: self.dir.clone(),
             wireframe,
+            agreement,
             report: distilled.report,
         })
     }
 
     /// Writes files and pictures; returns the wireframe in the frame of the
     /// user's files.
-    fn export(&mut self, distilled: &Distilled) -> Result<Wireframe3d, PipelineError> {
+    fn export(
+        &mut self,
+        distilled: &Distilled,
+        agreement: Option<ImageEvidence>,
+    ) -> Result<Wireframe3d, PipelineError> {
         let in_world = &distilled.wireframe;
         let original = in_world.map(|point| self.scene.original_from_world.apply(point));
         let document = WireframeDocument {
-            metadata: self.metadata(distilled),
+            metadata: self.metadata(distilled, agreement),
             edge_fields: BTreeMap::from([(
                 "supporting_views".to_owned(),
                 distilled.edge_support.iter().map(|n| *n as f64).collect(),
@@ -84,7 +93,11 @@ impl Session<'_> {
         Ok(original)
     }
 
-    fn metadata(&self, distilled: &Distilled) -> BTreeMap<String, serde_json::Value> {
+    fn metadata(
+        &self,
+        distilled: &Distilled,
+        agreement: Option<ImageEvidence>,
+    ) -> BTreeMap<String, serde_json::Value> {
         [
             ("neat", json!(self.manifest.neat)),
             ("scene", json!(self.scene.name)),
@@ -95,6 +108,7 @@ impl Session<'_> {
             // `neat distill` may have chosen others than those of config.toml.
             ("distill", json!(self.config.distill)),
             ("report", distilled.report.clone()),
+            ("agreement", json!(agreement)),
         ]
         .map(|(key, value)| (key.to_owned(), value))
         .into()
