@@ -12,7 +12,7 @@ use neat_core::LineSegment3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Settings of [`drop_isolated`].
+/// Which edges float alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IsolatedEdgesConfig {

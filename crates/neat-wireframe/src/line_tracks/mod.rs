@@ -18,8 +18,10 @@
 //! origin; thresholds are pixels of the images.
 
 mod clustering;
+mod config;
 mod consensus;
 mod edge_confirmation;
+mod end_joining;
 mod epipolar_matching;
 mod graph_adjustment;
 mod hypothesis_scoring;
@@ -28,6 +30,7 @@ mod junction_graph;
 mod line_refinement;
 mod neighbours;
 mod projected_line;
+mod report;
 mod segment_index;
 mod straight_junctions;
 mod t_junctions;
@@ -38,6 +41,7 @@ mod view_segments;
 mod test_tracks;
 
 pub use clustering::ClusteringConfig;
+pub use config::LineTracksConfig;
 pub use consensus::ConsensusConfig;
 pub use edge_confirmation::EdgeConfirmationConfig;
 pub use epipolar_matching::EpipolarMatchingConfig;
@@ -47,12 +51,13 @@ pub use isolated_edges::IsolatedEdgesConfig;
 pub use junction_graph::JunctionGraphConfig;
 pub use line_refinement::LineRefinementConfig;
 pub use neighbours::NeighboursConfig;
+pub use report::{LineEvidence, LineTracksReport, LineTracksResult, SegmentSupport, StepTiming};
 pub use straight_junctions::StraightJunctionsConfig;
 pub use t_junctions::TJunctionsConfig;
 pub use track_merging::TrackMergingConfig;
 
 use crate::fast_back_end::UnitBallSurface;
-use crate::occlusion::{OcclusionConfig, visible_views};
+use crate::occlusion::visible_views;
 use crate::{SegmentProposal, SignedDistance, ViewObservation, Wireframe3d};
 use clustering::{grow_tracks, view_count};
 use consensus::find_consensus;
@@ -62,159 +67,11 @@ use hypothesis_scoring::{DepthPrior, score_hypotheses};
 use isolated_edges::drop_isolated;
 use junction_graph::{GraphEdge, JunctionGraph, junction_graph};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use straight_junctions::dissolve_straight;
 use t_junctions::snap_free_ends;
 use track_merging::{gather_unclaimed, merge_duplicates};
 use view_segments::{SegmentId, TrackView, segment_of};
-
-/// Switches and constants of [`run`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LineTracksConfig {
-    /// Views that must show an edge, at least 2.
-    pub min_views: usize,
-    /// Shorter 2D segments are passed over.
-    pub min_segment_length_in_pixels: f64,
-    /// Structure lies within the scene ball times this.
-    pub ball_margin: f64,
-    /// Which views are compared.
-    pub neighbours: NeighboursConfig,
-    /// Which segments are compared.
-    pub matching: EpipolarMatchingConfig,
-    /// What speaks for a 3D position.
-    pub scoring: HypothesisScoringConfig,
-    /// How segments choose among their positions.
-    pub consensus: ConsensusConfig,
-    /// When a segment belongs to a track.
-    pub clustering: ClusteringConfig,
-    /// How a track's line is found.
-    pub refinement: LineRefinementConfig,
-    /// Which tracks are one.
-    pub merging: TrackMergingConfig,
-    /// Which ends of tracks are one junction.
-    pub junctions: JunctionGraphConfig,
-    /// Which junctions are none.
-    pub straight: StraightJunctionsConfig,
-    /// Bundle adjustment of the graph.
-    pub adjustment: GraphAdjustmentConfig,
-    /// The final test of every edge.
-    pub confirmation: EdgeConfirmationConfig,
-    /// Which edges float alone.
-    pub isolation: IsolatedEdgesConfig,
-    /// Which ends stop on other edges.
-    pub t_junctions: TJunctionsConfig,
-    /// Drop edges supported in too few of the views in which the surface leaves
-    /// them visible; without a surface it says nothing.
-    pub occlusion_test: bool,
-    /// Constants of the occlusion test.
-    pub occlusion: OcclusionConfig,
-}
-
-impl Default for LineTracksConfig {
-    fn default() -> Self {
-        Self {
-            min_views: 3,
-            min_segment_length_in_pixels: 8.0,
-            ball_margin: 1.5,
-            neighbours: NeighboursConfig::default(),
-            matching: EpipolarMatchingConfig::default(),
-            scoring: HypothesisScoringConfig::default(),
-            consensus: ConsensusConfig::default(),
-            clustering: ClusteringConfig::default(),
-            refinement: LineRefinementConfig::default(),
-            merging: TrackMergingConfig::default(),
-            junctions: JunctionGraphConfig::default(),
-            straight: StraightJunctionsConfig::default(),
-            adjustment: GraphAdjustmentConfig::default(),
-            confirmation: EdgeConfirmationConfig::default(),
-            isolation: IsolatedEdgesConfig::default(),
-            t_junctions: TJunctionsConfig::default(),
-            occlusion_test: false,
-            occlusion: OcclusionConfig::default(),
-        }
-    }
-}
-
-/// A wireframe with the evidence for each of its edges.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct LineTracksResult {
-    /// Junctions in lexicographic order of their coordinates; edges `[a, b]`,
-    /// a < b, sorted.
-    pub wireframe: Wireframe3d,
-    /// One entry per edge of the wireframe.
-    pub edges: Vec<LineEvidence>,
-    /// What each step kept.
-    pub report: LineTracksReport,
-    /// How long each step took; the only part that differs from run to run.
-    pub timings: Vec<StepTiming>,
-}
-
-/// What speaks for an edge.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LineEvidence {
-    /// The 2D segments that lie on the edge, by ascending view and index.
-    pub supports: Vec<SegmentSupport>,
-    /// Number of different views among them.
-    pub views: usize,
-    /// Number of views in which the surface leaves the edge visible; `None`
-    /// without the occlusion test.
-    pub visible_views: Option<usize>,
-}
-
-/// Names a 2D segment of the observations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct SegmentSupport {
-    /// Index of the view.
-    pub view: usize,
-    /// Index into that view's [`ViewObservation::segments`].
-    pub segment_in_view: usize,
-}
-
-/// How many things each step of [`run`] kept, in the order of the steps.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct LineTracksReport {
-    /// Views with a usable camera and at least one usable segment.
-    pub usable_views: usize,
-    /// Finite segments that are long enough, in these views.
-    pub usable_segments: usize,
-    /// Pairs of a view and a neighbour.
-    pub neighbour_pairs: usize,
-    /// Priors that name a usable segment.
-    pub usable_priors: usize,
-    /// Segments with a position that enough views support.
-    pub segments_with_hypotheses: usize,
-    /// Segments whose partners agree mutually in enough views.
-    pub segments_in_consensus: usize,
-    /// Tracks as they grew.
-    pub grown_tracks: usize,
-    /// Tracks after merging and gathering.
-    pub merged_tracks: usize,
-    /// Edges of the junction graph.
-    pub graph_edges: usize,
-    /// Edges that the adjusted graph confirms.
-    pub confirmed_edges: usize,
-    /// Edges that do not float alone.
-    pub accompanied_edges: usize,
-    /// Free ends moved to the edges that they touch.
-    pub snapped_ends: usize,
-    /// Edges left by the occlusion test.
-    pub unoccluded_edges: usize,
-    /// Junctions of the result.
-    pub junctions: usize,
-    /// Edges of the result.
-    pub edges: usize,
-}
-
-/// Duration of one step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepTiming {
-    /// Name of the step.
-    pub step: &'static str,
-    /// Wall-clock time.
-    pub duration: Duration,
-}
 
 /// Builds the wireframe.
 ///
@@ -511,28 +368,5 @@ fn evidence(views: &[TrackView], edge: &GraphEdge, visible_views: Option<usize>)
             .collect(),
         views: view_count(&edge.supports),
         visible_views,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_configuration_names_only_what_it_changes_and_nothing_unknown() {
-        let text = r#"{"min_views": 4, "clustering": {"tolerance_in_pixels": 1.5}}"#;
-        let config: LineTracksConfig = serde_json::from_str(text).unwrap();
-        let mut expected = LineTracksConfig {
-            min_views: 4,
-            ..Default::default()
-        };
-        expected.clustering.tolerance_in_pixels = 1.5;
-        assert_eq!(config, expected);
-        let text = serde_json::to_string(&config).unwrap();
-        assert_eq!(
-            serde_json::from_str::<LineTracksConfig>(&text).unwrap(),
-            config
-        );
-        assert!(serde_json::from_str::<LineTracksConfig>(r#"{"min_view": 4}"#).is_err());
     }
 }

@@ -8,7 +8,7 @@ use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Settings of [`dissolve_straight`].
+/// Which junctions only cut a line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StraightJunctionsConfig {

@@ -14,7 +14,7 @@ use neat_core::{LineSegment2, LineSegment3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Settings of [`snap_free_ends`].
+/// Which free ends stop on another edge.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TJunctionsConfig {
