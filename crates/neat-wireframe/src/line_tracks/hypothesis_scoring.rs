@@ -188,7 +188,10 @@ impl<'a> Scorer<'a> {
         let mut chosen: Vec<Hypothesis> = Vec::new();
         // Near copies of the best hypotheses come first in the ranking: look
         // at a bounded number only.
-        for (depths, _) in ranked.iter().take(32 * self.config.alternatives) {
+        for (depths, _) in ranked
+            .iter()
+            .take(self.config.alternatives.saturating_mul(32))
+        {
             if chosen.len() >= self.config.alternatives {
                 break;
             }

@@ -213,7 +213,11 @@ pub(super) fn covered_parts(
             parts.push([low, place]);
         }
     }
-    close_gaps(parts, pixel_in_parameters(views, members, line), config)
+    let pixel = pixel_in_parameters(views, members, line);
+    let mut parts = close_gaps(parts, pixel, config);
+    // A point is no part: it has no direction.
+    parts.retain(|[low, high]| high - low > pixel);
+    parts
 }
 
 /// Length of a pixel on the line in units of its parameter, at the median of the

@@ -1,11 +1,13 @@
 //! Nothing that a file can hold makes the back end panic or answer nonsense.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
+use neat_core::synthetic::{Solid, SyntheticScene, generate};
 use neat_core::{Camera, Intrinsics, LineSegment2, LineSegment3, ScoredSegment2};
 use neat_wireframe::line_tracks::{LineTracksConfig, LineTracksResult, run};
 use neat_wireframe::validity::check_wireframe;
 use neat_wireframe::{SegmentProposal, ViewObservation};
 use proptest::prelude::*;
+use std::sync::LazyLock;
 
 /// Mostly plain numbers, sometimes none.
 fn number(range: std::ops::Range<f64>) -> impl Strategy<Value = f64> {
@@ -122,6 +124,91 @@ proptest! {
         for support in result.edges.iter().flat_map(|edge| &edge.supports) {
             prop_assert!(support.segment_in_view < views[support.view].segments.len());
         }
+    }
+}
+
+/// What happens to the segments of a good scene.
+#[derive(Clone, Copy, Debug)]
+enum Damage {
+    RepeatSegment,
+    ReplaceCoordinate(f64),
+    CollapseSegment,
+    CopyCamera,
+    MirrorCamera,
+    TurnAround,
+    EmptyView,
+}
+
+fn damage() -> impl Strategy<Value = (usize, usize, Damage)> {
+    let kind = prop_oneof![
+        4 => Just(Damage::RepeatSegment),
+        4 => number(-100.0..600.0).prop_map(Damage::ReplaceCoordinate),
+        2 => Just(Damage::CollapseSegment),
+        2 => Just(Damage::CopyCamera),
+        1 => Just(Damage::MirrorCamera),
+        1 => Just(Damage::TurnAround),
+        1 => Just(Damage::EmptyView),
+    ];
+    (0..1000_usize, 0..1000_usize, kind)
+}
+
+fn apply(views: &mut [ViewObservation], (view, segment, damage): (usize, usize, Damage)) {
+    let view = view % views.len();
+    let other_camera = views[segment % views.len()].camera;
+    let ViewObservation {
+        camera, segments, ..
+    } = &mut views[view];
+    let Some(index) = segment.checked_rem(segments.len()) else {
+        return;
+    };
+    match damage {
+        Damage::RepeatSegment => segments.push(segments[index]),
+        Damage::ReplaceCoordinate(x) => segments[index].segment.end.x = x,
+        Damage::CollapseSegment => segments[index].segment.end = segments[index].segment.start,
+        Damage::CopyCamera => *camera = other_camera,
+        Damage::MirrorCamera => camera.world_from_camera *= -1.0,
+        Damage::TurnAround => camera.center_in_world *= -1.0,
+        Damage::EmptyView => segments.clear(),
+    }
+}
+
+/// Few, coarse views of a box, so that many cases run.
+fn good_views() -> (Vec<ViewObservation>, f64) {
+    let config = SyntheticScene {
+        solid: Solid::Box,
+        views: 12,
+        image_size: 64,
+        noise_in_pixels: 0.1,
+        false_segments: 1,
+        shading: false,
+        ..Default::default()
+    };
+    let scene = generate(&config).unwrap().scene;
+    let radius = scene.sphere_radius;
+    (ViewObservation::from_scene(&scene, 0.0), radius)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn a_damaged_scene_gives_a_valid_graph(
+        damages in prop::collection::vec(damage(), 0..30),
+        min_views in 0..4_usize,
+    ) {
+        static VIEWS: LazyLock<(Vec<ViewObservation>, f64)> = LazyLock::new(good_views);
+        let (mut views, radius) = VIEWS.clone();
+        for damage in damages {
+            apply(&mut views, damage);
+        }
+        let config = LineTracksConfig {
+            min_views,
+            ..Default::default()
+        };
+        let result = run(&views, &[], None, radius, &config);
+        let wireframe = &result.wireframe;
+        prop_assert!(check_wireframe(&wireframe.junctions, &wireframe.edges).is_ok());
+        prop_assert!(wireframe.segments().iter().all(|segment| segment.length() > 0.0));
     }
 }
 
