@@ -23,7 +23,7 @@ const JUNCTION_COLOR: [f64; 3] = [32.0, 200.0, 255.0];
 pub fn draw_overlay(view: &View, pixel_center: f64, wireframe: &Wireframe3d) -> RgbImage {
     let mut image = view.image.clone();
     let size = f64::from(image.width().max(image.height()));
-    let radius = (size * WIDTH_PER_SIZE / 2.0).max(0.75);
+    let radius = (size * WIDTH_PER_SIZE / 2.0 * thinness(wireframe)).max(0.75);
     let line = Pen {
         color: SEGMENT_COLOR,
         radius,
@@ -75,6 +75,15 @@ pub fn draw_detection(image: &RgbImage, wireframe: &Wireframe2d) -> RgbImage {
         draw_disc(&mut drawn, vertex, &dot);
     }
     drawn
+}
+
+/// Factor on the widths with which a wireframe is drawn: with many edges thick lines
+/// would hide each other.
+fn thinness(wireframe: &Wireframe3d) -> f64 {
+    const EDGES: f64 = 100.0;
+    (EDGES / wireframe.edges.len().max(1) as f64)
+        .sqrt()
+        .clamp(0.4, 1.0)
 }
 
 /// The part of a segment that is in front of the camera, in pixels with the

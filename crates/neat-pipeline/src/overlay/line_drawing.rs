@@ -14,6 +14,14 @@ pub struct Pen {
 }
 
 impl Pen {
+    /// A pen of another width.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self {
+            radius: self.radius * factor,
+            ..*self
+        }
+    }
+
     /// The pen at `t` on the way from this one (0) to `other` (1).
     pub fn mix(&self, other: &Self, t: f64) -> Self {
         let mix = |a: f64, b: f64| a + (b - a) * t;

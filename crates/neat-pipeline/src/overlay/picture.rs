@@ -1,7 +1,7 @@
 //! The wireframe alone, on white, from a viewpoint that shows its shape.
 
 use super::line_drawing::{Pen, draw_disc, draw_segment};
-use super::visible_part;
+use super::{thinness, visible_part};
 use image::{Rgb, RgbImage};
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{Camera, Intrinsics, Scene, Wireframe3d};
@@ -43,9 +43,10 @@ pub fn draw_wireframe(wireframe: &Wireframe3d, scene: &Scene) -> RgbImage {
     let camera = camera_at(&orientation, &center, radius);
 
     let depth = |point: &Vector3<f64>| camera.to_camera(point).z;
+    let thinness = thinness(wireframe);
     let pen = |point: &Vector3<f64>| {
         let nearness = (DISTANCE + 1.0 - depth(point) / radius) / 2.0;
-        FAR.mix(&NEAR, nearness.clamp(0.0, 1.0))
+        FAR.mix(&NEAR, nearness.clamp(0.0, 1.0)).scaled(thinness)
     };
     let mut segments = wireframe.segments();
     // Near lines go over far ones.
@@ -56,7 +57,8 @@ pub fn draw_wireframe(wireframe: &Wireframe3d, scene: &Scene) -> RgbImage {
         }
     }
     for junction in &wireframe.junctions {
-        draw_disc(&mut picture, &camera.project(junction).pixel, &JUNCTION);
+        let pixel = camera.project(junction).pixel;
+        draw_disc(&mut picture, &pixel, &JUNCTION.scaled(thinness));
     }
     picture
 }
