@@ -161,7 +161,7 @@ fn info_describes_a_scene() {
 
     fs::remove_dir_all(scene.file("scene/hawp")).unwrap();
     let assert = neat(&["info", &scene.path("scene")]).assert().success();
-    assert!(stderr(&assert).contains("no view has a segment"));
+    assert!(stderr(&assert).contains("no 2D wireframes"));
 }
 
 #[test]
