@@ -68,11 +68,7 @@ fn missing_files() {
     );
     check(
         |scene| fs::remove_file(scene.file("scene/hawp/image_0001.json")).unwrap(),
-        &["image_0001.json does not exist", "run a wireframe detector"],
-    );
-    check(
-        |scene| fs::remove_dir_all(scene.file("scene/hawp")).unwrap(),
-        &["hawp does not exist", "run a wireframe detector"],
+        &["image_0001.json does not exist", "`neat detect`"],
     );
 }
 

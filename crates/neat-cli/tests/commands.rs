@@ -154,14 +154,14 @@ fn info_describes_a_scene() {
     let scene = TestScene::new();
     let assert = neat(&["info", &scene.path("scene")]).assert().success();
     let text = stdout(&assert);
-    for fragment in ["ABC", "views", "48×48", "scene ball", "0.5"] {
+    for fragment in ["ABC", "views", "48×48", "scene sphere", "0.5"] {
         assert!(text.contains(fragment), "no `{fragment}` in:\n{text}");
     }
     assert_eq!(stderr(&assert), "");
 
     fs::remove_dir_all(scene.file("scene/hawp")).unwrap();
     let assert = neat(&["info", &scene.path("scene")]).assert().success();
-    assert!(stderr(&assert).contains("no view has a segment"));
+    assert!(stderr(&assert).contains("no 2D wireframes"));
 }
 
 #[test]

@@ -44,8 +44,8 @@ struct HawpJson {
 }
 
 /// What to do about a missing wireframe.
-pub(crate) const REMEDY: &str = "run a wireframe detector (HAWP) on the images \
-     and keep one JSON file per image in the folder `hawp`";
+pub(crate) const REMEDY: &str = "detect it with `neat detect` or HAWP, or remove the folder \
+     `hawp` so that all are detected";
 
 /// Reads a HAWP file and shifts its vertices by `pixel_center` to image
 /// coordinates.

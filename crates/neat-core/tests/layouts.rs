@@ -350,9 +350,9 @@ fn views_without_segments_are_dropped_until_none_is_left() {
 fn wireframes_are_required_unless_told_otherwise() {
     let dir = scene_dir();
     fs::remove_file(dir.path().join("hawp/view_1.json")).unwrap();
-    assert!(message(&dir).contains("view_1.json") && message(&dir).contains("detector"));
+    assert!(message(&dir).contains("view_1.json") && message(&dir).contains("detect"));
     fs::remove_dir_all(dir.path().join("hawp")).unwrap();
-    assert!(message(&dir).contains("hawp") && message(&dir).contains("detector"));
+    assert!(message(&dir).contains("hawp") && message(&dir).contains("detect"));
     let options = LoadOptions {
         require_wireframes: false,
         ..LoadOptions::default()

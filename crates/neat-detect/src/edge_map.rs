@@ -80,6 +80,7 @@ pub fn segments(map: &GrayImage) -> Vec<LineSegment2> {
     let threshold = (f64::from(brightest) * THRESHOLD).max(1.0);
     let mut lines = Mask::new(map, |value| f64::from(value) >= threshold);
     lines.thin();
+    lines.cut_corners();
     let mut segments = Vec::new();
     for chain in lines.chains() {
         split(&chain, &mut segments);
@@ -131,6 +132,22 @@ impl Mask {
             }
             if candidates.len() == before {
                 return;
+            }
+        }
+    }
+
+    /// Takes the corners out of staircases, which thinning leaves: they have three
+    /// neighbours like a branch, but what they join touches without them.
+    fn cut_corners(&mut self) {
+        for index in self.indices() {
+            let around = self.neighbors(index).map(|neighbor| self.set[neighbor]);
+            // Two sides that touch each other, and nothing on the other side.
+            let is_corner = (0..8).step_by(2).any(|side| {
+                let at = |turn: usize| around[(side + turn) % 8];
+                at(0) && at(2) && !at(4) && !at(5) && !at(6)
+            });
+            if is_corner {
+                self.set[index] = false;
             }
         }
     }
@@ -278,6 +295,24 @@ mod tests {
                 "{length} of {}",
                 side.length()
             );
+        }
+    }
+
+    #[test]
+    fn staircases_are_lines() {
+        // As lines are drawn that step along one axis at a time.
+        for (from, to) in [([10.0, 10.0], [80.0, 45.0]), ([15.0, 70.0], [60.0, 12.0])] {
+            let mut map = GrayImage::new(96, 96);
+            let line = LineSegment2::new(from.into(), to.into());
+            for step in 0..=1000 {
+                let point = line.point_at(f64::from(step) / 1000.0);
+                map.put_pixel(point.x.round() as u32, point.y.round() as u32, Luma([255]));
+                let aside = point + Vector2::new(0.4, 0.0);
+                map.put_pixel(aside.x.round() as u32, aside.y.round() as u32, Luma([255]));
+            }
+            let found = segments(&map);
+            let length: f64 = found.iter().map(LineSegment2::length).sum();
+            assert!(length > 0.9 * line.length(), "{found:?}");
         }
     }
 

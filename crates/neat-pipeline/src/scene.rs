@@ -56,13 +56,7 @@ pub fn prepare_scene(
     if detected {
         let (more, time) = timed(on_event, Stage::Detect, |on_event| {
             let min_score = config.data.min_segment_score;
-            Ok(detect_wireframes(
-                &mut scene,
-                &config.detect,
-                min_score,
-                cache,
-                on_event,
-            )?)
+            detect_wireframes(&mut scene, &config.detect, min_score, cache, on_event)
         })?;
         seconds.insert(Stage::Detect, time);
         warnings.extend(more);

@@ -34,13 +34,24 @@ pub struct TestScene {
 impl TestScene {
     /// Four views of a box, 48 × 48 pixels, everything detected.
     pub fn new() -> Self {
+        Self::with(&[
+            "--solid",
+            "box",
+            "--views",
+            "4",
+            "--image-size",
+            "48",
+            "--detection-rate",
+            "1",
+        ])
+    }
+
+    /// What `neat synth` makes with these arguments.
+    pub fn with(arguments: &[&str]) -> Self {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let scene = Self { dir };
-        neat(&["synth", "--solid", "box", "--views", "4"])
-            .args(["--image-size", "48", "--detection-rate", "1"])
-            .args(["--out", &scene.path("scene")])
-            .assert()
-            .success();
+        let mut synth = neat(&["synth", "--out", &scene.path("scene")]);
+        synth.args(arguments).assert().success();
         scene
     }
 

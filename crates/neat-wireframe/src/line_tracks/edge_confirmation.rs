@@ -29,6 +29,9 @@ pub struct EdgeConfirmationConfig {
     /// Views within this angle of a view that shows the edge, with the whole edge
     /// in the image, ought to show it too: what hides it would hide it there.
     pub expected_angle_in_degrees: f64,
+    /// A view shows an edge if its segments cover this share of what of it lies in
+    /// the image: short pieces at a place here and there make no long edge.
+    pub min_covered_share: f64,
     /// An edge explains a 2D segment if it covers this share of it.
     pub min_explained_share: f64,
 }
@@ -40,6 +43,7 @@ impl Default for EdgeConfirmationConfig {
             min_support_share: 0.4,
             min_score_share: 0.15,
             expected_angle_in_degrees: 15.0,
+            min_covered_share: 0.3,
             min_explained_share: 0.5,
         }
     }
@@ -103,7 +107,7 @@ fn candidate(
     config: &EdgeConfirmationConfig,
 ) -> Option<Candidate> {
     let line = segment_of_edge(graph, edge);
-    let supports = supports_of(views, &line, clustering);
+    let supports = supports_of(views, &line, clustering, config);
     if view_count(&supports) < min_views {
         return None;
     }
@@ -136,27 +140,55 @@ fn candidate(
     })
 }
 
-/// All 2D segments that lie on a 3D segment, ascending.
+/// All 2D segments that lie on a 3D segment, of the views that show enough of it,
+/// ascending.
 fn supports_of(
     views: &[TrackView],
     line: &LineSegment3,
     clustering: &ClusteringConfig,
+    config: &EdgeConfirmationConfig,
 ) -> Vec<SegmentId> {
     let mut supports = Vec::new();
     for (view, prepared) in views.iter().enumerate() {
         let Some(projected) = project_segment(prepared, line) else {
             continue;
         };
-        supports.extend(
-            prepared
-                .index
-                .near(&projected)
-                .into_iter()
-                .map(|segment| SegmentId { view, segment })
-                .filter(|id| lies_on(views, *id, line, clustering)),
-        );
+        let near = prepared.index.near(&projected).into_iter();
+        let on_line: Vec<SegmentId> = near
+            .map(|segment| SegmentId { view, segment })
+            .filter(|id| lies_on(views, *id, line, clustering))
+            .collect();
+        if covered_share(views, view, &on_line, line) >= config.min_covered_share {
+            supports.extend(on_line);
+        }
     }
     supports
+}
+
+/// The share of the part of a 3D segment within a view's image that 2D segments
+/// of the view show.
+fn covered_share(
+    views: &[TrackView],
+    view: usize,
+    supports: &[SegmentId],
+    line: &LineSegment3,
+) -> f64 {
+    /// Evenly spaced places on the line that are tested.
+    const SAMPLES: usize = 16;
+    let shown: Vec<[f64; 2]> = supports
+        .iter()
+        .filter_map(|id| shown_interval(views, *id, line))
+        .collect();
+    let (mut covered, mut within) = (0, 0_usize);
+    for sample in 0..SAMPLES {
+        let place = (sample as f64 + 0.5) / SAMPLES as f64;
+        if views[view].camera.sees(&line.point_at(place)) {
+            within += 1;
+            let is_shown = |[low, high]: &[f64; 2]| (*low..=*high).contains(&place);
+            covered += usize::from(shown.iter().any(is_shown));
+        }
+    }
+    covered as f64 / within.max(1) as f64
 }
 
 /// Mean distance of the supports' ends from the projected line.
@@ -273,6 +305,24 @@ mod tests {
                 view.segments[4].score = 0.0;
             }
         }
+        assert_eq!(confirmed(&views, graph).edges.len(), 11);
+    }
+
+    #[test]
+    fn short_pieces_do_not_confirm_a_long_edge() {
+        use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
+        let graph = cube_graph(&cube_views(12));
+        let (junctions, edges) = cube();
+        let mut observations = views_of_edges(&cameras_on_sphere(12), &junctions, &edges);
+        for observation in &mut observations {
+            let whole = observation.segments[3].segment;
+            observation.segments[3].segment.start = whole.point_at(0.4);
+            observation.segments[3].segment.end = whole.point_at(0.6);
+        }
+        let views: Vec<TrackView> = observations
+            .iter()
+            .map(|observation| TrackView::new(observation, 1.0, 1.0))
+            .collect();
         assert_eq!(confirmed(&views, graph).edges.len(), 11);
     }
 }
