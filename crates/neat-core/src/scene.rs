@@ -153,6 +153,12 @@ impl Scene {
         check_names(self.views.iter().map(|view| view.name.as_str()), &path)
     }
 
+    /// Whether something was detected in any view.
+    pub fn has_wireframes(&self) -> bool {
+        let mut views = self.views.iter();
+        views.any(|view| !view.wireframe.vertices.is_empty())
+    }
+
     /// Keeps the views for which `keep` is true; sparse points lose what the others
     /// observed.
     pub fn retain_views(&mut self, mut keep: impl FnMut(&View) -> bool) {

@@ -365,7 +365,7 @@ fn idr_reads_projections_of_the_original_frame() {
 }
 
 #[test]
-fn shared_cameras_are_written_once_and_empty_wireframes_never() {
+fn shared_cameras_are_written_once_and_wireframes_of_all_views_or_of_none() {
     let mut scene = scene(0.5);
     scene.views[1].camera.intrinsics = scene.views[0].camera.intrinsics;
     scene.views[1].wireframe = Wireframe2d::empty(SIZE.0, SIZE.1);
@@ -375,16 +375,23 @@ fn shared_cameras_are_written_once_and_empty_wireframes_never() {
     convert(&scene, SceneFormat::Colmap, &dir).unwrap();
     assert_eq!(lines(&dir.join("sparse/0/cameras.txt")).len(), 2);
     assert_eq!(lines(&dir.join("sparse/0/points3D.txt")).len(), 0);
-    assert_eq!(fs::read_dir(dir.join("hawp")).unwrap().count(), 2);
+    // One for the view without segments too, which is not to be detected again.
+    assert_eq!(fs::read_dir(dir.join("hawp")).unwrap().count(), 3);
     let options = LoadOptions {
         require_wireframes: false,
         ..LoadOptions::default()
     };
     assert_same(&load_scene(&dir, &options).unwrap().scene, &scene, "shared");
 
-    let dir = parent.path().join("npz");
-    convert(&scene, SceneFormat::CamerasNpz, &dir).unwrap();
-    assert!(!dir.join(POINTS_FILE).exists());
+    for view in &mut scene.views {
+        view.wireframe = Wireframe2d::empty(SIZE.0, SIZE.1);
+    }
+    for format in FORMATS {
+        let dir = parent.path().join(format!("{format:?}"));
+        convert(&scene, format, &dir).unwrap();
+        assert!(!dir.join(POINTS_FILE).exists());
+        assert!(!dir.join("hawp").exists());
+    }
 }
 
 #[test]

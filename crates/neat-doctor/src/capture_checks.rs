@@ -96,12 +96,11 @@ fn scene_sphere(scene: &Scene, sphere: &SceneSphere) -> Finding {
         .iter()
         .map(|view| seen_share(&view.camera, sphere));
     let seen = median(seen.collect());
-    let [x, y, z] = [sphere.center.x, sphere.center.y, sphere.center.z];
-    let ball = format!(
-        "the ball around ({x:.2}, {y:.2}, {z:.2}) of radius {:.3}",
-        sphere.radius
-    );
-    let remedy = "give the sphere of the object, or let it be found from points or cameras";
+    // In the frame of the user's files, as --scene-sphere takes it.
+    let [x, y, z] = scene.original_from_world.apply(&sphere.center).into();
+    let radius = scene.original_from_world.scale * sphere.radius;
+    let ball = format!("the ball around ({x:.2}, {y:.2}, {z:.2}) of radius {radius:.3}");
+    let remedy = "give the sphere of the object by --scene-sphere";
     if !away.is_empty() {
         let message = format!(
             "{} of {} do not look at {ball}: {}",

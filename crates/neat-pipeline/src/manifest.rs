@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -90,50 +90,23 @@ fn rfc3339(seconds: u64) -> String {
     format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
 }
 
-/// The files of a scene folder that belong to the scene.
-const INPUT_FILES: [&str; 10] = [
-    "cameras.npz",
-    "cameras.json",
-    "transforms.json",
-    "transforms_train.json",
-    "cameras.bin",
-    "cameras.txt",
-    "images.bin",
-    "images.txt",
-    "points3D.bin",
-    "points3D.txt",
-];
-/// The folders whose files do.
-const INPUT_FOLDERS: [&str; 6] = ["image", "images", "train", "hawp", "sparse", "sparse/0"];
-
-/// SHA-256 of the cameras, images and 2D wireframes in a scene folder, by their
-/// paths in it.
+/// SHA-256 of the files that a scene was read from, by their paths in its folder.
 ///
 /// # Errors
 /// If one of them cannot be read.
-pub fn hash_inputs(scene: &Path) -> Result<BTreeMap<String, String>, SceneError> {
-    let mut names: Vec<String> = INPUT_FILES.map(String::from).to_vec();
-    for folder in INPUT_FOLDERS {
-        let path = scene.join(folder);
-        if !path.is_dir() {
-            continue;
-        }
-        let read_error = |source| SceneError::Read {
-            path: path.clone(),
-            source,
-        };
-        for entry in fs::read_dir(&path).map_err(read_error)? {
-            let name = entry.map_err(read_error)?.file_name();
-            names.push(format!("{folder}/{}", name.to_string_lossy()));
-        }
-    }
-    names
-        .into_par_iter()
-        .filter(|name| scene.join(name).is_file())
-        .map(|name| {
-            let path = scene.join(&name);
-            let hash = sha256(&path).map_err(|source| SceneError::Read { path, source })?;
-            Ok((name, hash))
+pub fn hash_inputs(
+    scene: &Path,
+    files: &[PathBuf],
+) -> Result<BTreeMap<String, String>, SceneError> {
+    files
+        .par_iter()
+        .map(|path| {
+            let hash = sha256(path).map_err(|source| SceneError::Read {
+                path: path.clone(),
+                source,
+            })?;
+            let name = path.strip_prefix(scene).unwrap_or(path);
+            Ok((name.to_string_lossy().replace('\\', "/"), hash))
         })
         .collect()
 }
@@ -156,6 +129,7 @@ fn sha256(path: &Path) -> io::Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn dates_follow_the_calendar() {
@@ -171,8 +145,8 @@ mod tests {
         fs::create_dir(dir.path().join("images")).unwrap();
         fs::write(dir.path().join("cameras.npz"), "abc").unwrap();
         fs::write(dir.path().join("images/b.png"), "").unwrap();
-        fs::write(dir.path().join("notes.txt"), "no input").unwrap();
-        let inputs = hash_inputs(dir.path()).unwrap();
+        let files = ["cameras.npz", "images/b.png"].map(|name| dir.path().join(name));
+        let inputs = hash_inputs(dir.path(), &files).unwrap();
         let expected = [
             // The test vectors of FIPS 180-4.
             (

@@ -9,7 +9,7 @@ use neat_core::layout::HAWP_DIR;
 use neat_core::{LoadOptions, Scene, SceneSphere, load_scene};
 use neat_doctor::{Depth, ExamineOptions, Finding, Level, Repair, Verdict};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A scene as a run needs it.
 #[derive(Clone, Debug)]
@@ -18,6 +18,8 @@ pub struct PreparedScene {
     pub scene: Scene,
     /// Its sphere, in the frame and unit of the files.
     pub sphere: SceneSphere,
+    /// The files that it was read from.
+    pub files: Vec<PathBuf>,
     /// Whether its 2D wireframes were detected, for want of files.
     pub detected: bool,
     /// What a person should know; told as events already.
@@ -67,6 +69,7 @@ pub fn prepare_scene(
     Ok(PreparedScene {
         scene: scaled_for(&config.data, scene),
         sphere: loaded.sphere,
+        files: loaded.files,
         detected,
         warnings,
         seconds,

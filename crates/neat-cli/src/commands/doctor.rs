@@ -99,7 +99,7 @@ impl DoctorArgs {
             text.push('\n');
         }
         if !costs.is_empty() {
-            text.push_str("\nexpected on this machine, within a factor of two:\n");
+            text.push_str("\nexpected on this machine if it is idle, within a factor of two:\n");
         }
         for Cost { preset, estimate } in costs {
             let time = duration::display(estimate.seconds);

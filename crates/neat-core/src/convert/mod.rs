@@ -41,7 +41,7 @@ pub enum SceneFormat {
 pub const POINTS_FILE: &str = "sparse_points.ply";
 
 /// Writes `scene` into the folder `dir`, which must not exist or be empty. The
-/// 2D wireframes go along in `hawp/`, one file per view that has one; sparse points
+/// 2D wireframes, if there are any, go along in `hawp/`, one file per view; sparse points
 /// in the format's own file, or in [`POINTS_FILE`] in the user's frame.
 ///
 /// The folder appears once it is complete.
@@ -84,15 +84,16 @@ fn write_images(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
 }
 
 fn write_wireframes(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
+    // An empty folder would say that nothing was to be found.
+    if !scene.has_wireframes() {
+        return Ok(());
+    }
     let hawp_dir = dir.join(abc::HAWP_DIR);
     file::create_dir(&hawp_dir)?;
-    for view in &scene.views {
-        if !view.wireframe.vertices.is_empty() {
-            let path = hawp_dir.join(format!("{}.json", view.name));
-            hawp_json::write(&path, &view.wireframe, scene.pixel_center)?;
-        }
-    }
-    Ok(())
+    scene.views.iter().try_for_each(|view| {
+        let path = hawp_dir.join(format!("{}.json", view.name));
+        hawp_json::write(&path, &view.wireframe, scene.pixel_center)
+    })
 }
 
 /// The file of a view's image.

@@ -116,9 +116,16 @@ pub fn write_scene(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
     let images_dir = dir.join(IMAGES_DIR);
     let hawp_dir = dir.join(HAWP_DIR);
     file::create_dir(&images_dir)?;
-    file::create_dir(&hawp_dir)?;
+    // An empty folder would say that nothing was to be found.
+    let has_wireframes = scene.has_wireframes();
+    if has_wireframes {
+        file::create_dir(&hawp_dir)?;
+    }
     scene.views.par_iter().try_for_each(|view| {
         file::write_png(&images_dir.join(format!("{}.png", view.name)), &view.image)?;
+        if !has_wireframes {
+            return Ok(());
+        }
         let hawp = hawp_dir.join(format!("{}.json", view.name));
         hawp_json::write(&hawp, &view.wireframe, scene.pixel_center)
     })?;

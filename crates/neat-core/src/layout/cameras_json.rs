@@ -5,13 +5,13 @@
 //! OpenCV axes; the optional `scale_mat` leads from the world, whose unit ball holds
 //! the object, to the original frame. Other keys are ignored.
 
-use super::images::with_existing_ending;
+use super::images;
 use super::poses::{PosedImage, Poses, similarity_of, view_error};
 use crate::hawp_json::file_stem;
 use crate::{Distortion, Intrinsics, SceneError, Similarity, file};
 use nalgebra::{Matrix3, Matrix4};
 use serde::Deserialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 pub(super) const FILE_NAME: &str = "cameras.json";
 
@@ -23,7 +23,7 @@ struct CamerasJson {
 
 #[derive(Deserialize)]
 struct Frame {
-    file: PathBuf,
+    file: String,
     width: u32,
     height: u32,
     #[serde(rename = "K")]
@@ -50,13 +50,13 @@ fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
     })?;
     let mut views = Vec::with_capacity(json.frames.len());
     for frame in json.frames {
-        let name = file_stem(&frame.file);
+        let name = file_stem(Path::new(&frame.file));
         // `From` takes the inner arrays for columns.
         let k = Matrix3::from(frame.k).transpose();
         let intrinsics =
             Intrinsics::try_from_matrix(&k).map_err(|problem| view_error(&path, &name, problem))?;
         views.push(PosedImage {
-            image: with_existing_ending(dir.join(&frame.file)),
+            image: images::locate(&path, &[dir.into()], &frame.file)?,
             name,
             intrinsics,
             distortion: Distortion::None,

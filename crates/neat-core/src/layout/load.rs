@@ -16,7 +16,7 @@ use crate::{
     hawp_json,
 };
 use rayon::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A scene with what a person should know about how it was read.
 #[derive(Clone, Debug)]
@@ -27,6 +27,8 @@ pub struct LoadedScene {
     pub layout: Layout,
     /// The scene sphere, in the frame and unit of the files.
     pub sphere: SceneSphere,
+    /// The files that it was read from, sorted.
+    pub files: Vec<PathBuf>,
     /// In the order of the views.
     pub warnings: Vec<SceneWarning>,
 }
@@ -176,6 +178,7 @@ pub(super) fn load_posed(
     if sphere.source == SphereSource::Unknown {
         warnings.push(SceneWarning::SphereUnknown);
     }
+    let files = input_files(&poses.path, &images, &hawp_dir);
     let scene = Scene {
         name: scene_name(dir),
         views,
@@ -191,10 +194,45 @@ pub(super) fn load_posed(
             radius: poses.original_from_world.scale * sphere.radius,
             ..sphere
         },
+        files,
         scene,
         layout,
         warnings,
     })
+}
+
+/// What is read beside the file of poses: in its folder or, where each image has a
+/// file of its own, that folder itself.
+const BESIDE_POSES: [&str; 8] = [
+    "cameras.txt",
+    "cameras.bin",
+    "points3D.txt",
+    "points3D.bin",
+    "list.txt",
+    "sparse_points.ply",
+    "sparse_pc.ply",
+    "points3D.ply",
+];
+
+/// The files that a scene was read from, sorted; masks are not among them.
+fn input_files(poses: &Path, images: &[PosedImage], hawp_dir: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = images.iter().map(|view| view.image.clone()).collect();
+    files.extend(
+        images
+            .iter()
+            .map(|view| hawp_dir.join(format!("{}.json", view.name))),
+    );
+    if poses.is_dir() {
+        let entries = poses.read_dir().into_iter().flatten().flatten();
+        files.extend(entries.map(|entry| entry.path()));
+    } else {
+        files.push(poses.into());
+        files.extend(BESIDE_POSES.map(|name| poses.with_file_name(name)));
+    }
+    files.retain(|file| file.is_file());
+    files.sort();
+    files.dedup();
+    files
 }
 
 /// Leaves out the views whose images are not there: scenes are often passed on

@@ -58,7 +58,7 @@ impl<'a> Session<'a> {
             warnings.extend(found);
             seconds.insert(Stage::Examine, time);
         }
-        let inputs = hash_inputs(&scene_dir)?;
+        let inputs = hash_inputs(&scene_dir, &prepared.files)?;
         if earlier.as_ref().is_some_and(|e| e.inputs != inputs) {
             let warning = "the files of the scene have changed since the run began".to_owned();
             on_event(Event::Warning(warning.clone()));
@@ -216,7 +216,7 @@ where
 
 fn read_run(
     dir: RunDir,
-    config: Config,
+    mut config: Config,
     scene: Option<&Path>,
     backend: Backend,
     cache: Option<&FileCache>,
@@ -229,6 +229,7 @@ fn read_run(
     let manifest = dir.manifest()?;
     let scene_dir = scene.unwrap_or(&manifest.scene);
     let prepared = prepare_scene(scene_dir, &config, cache, on_event)?;
+    fit_background(&mut config, &prepared.scene);
     let checkpoint = dir.read_latest_checkpoint()?;
     let field = TrainedField::load(&config, &checkpoint, &device)?;
     Ok(OpenedRun {
