@@ -26,7 +26,7 @@ fn lens(name: &str) -> Distortion {
             thin_prism: [0.0; 4],
         },
         "fov" => Distortion::Fov { omega: 0.9 },
-        _ => Distortion::Division { k: -0.05 },
+        _ => Distortion::ReverseRadial { k: -0.05 },
     }
 }
 

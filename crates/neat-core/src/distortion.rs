@@ -4,7 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
 
-/// A lens model. Every model but [`Self::Division`] leads from the calibrated
+/// A lens model. Every model but [`Self::ReverseRadial`] and [`Self::Division`] leads from the calibrated
 /// coordinates (x, y) of an ideal pinhole, with r² = x² + y², to those in the
 /// photograph; K then leads to pixels as for a pinhole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -52,12 +52,26 @@ pub enum Distortion {
         /// ω, in radians.
         omega: f64,
     },
-    /// One-parameter division as VisualSfM stores it, which leads the other way,
+    /// One radial parameter as VisualSfM stores it, which leads the other way,
     /// from the photograph's calibrated coordinates to those of a pinhole:
     /// `(u, v) · (1 + k (u² + v²))`.
+    ReverseRadial {
+        /// k.
+        k: f64,
+    },
+    /// Division (Fitzgibbon 2001), which leads the other way too: with ρ² = u² + v²
+    /// `(u, v) / (1 + k ρ²)`.
     Division {
         /// k.
         k: f64,
+    },
+    /// Extended unified camera model (Khomutenko et al. 2016):
+    /// `(x, y) / (α √(β r² + 1) + 1 − α)`.
+    ExtendedUnified {
+        /// α: 0 is a pinhole.
+        alpha: f64,
+        /// β, positive.
+        beta: f64,
     },
 }
 
@@ -72,7 +86,8 @@ impl Distortion {
             }
             Self::Fisheye { .. } | Self::ThinPrismFisheye { .. } => false,
             Self::Fov { omega } => *omega == 0.0,
-            Self::Division { k } => *k == 0.0,
+            Self::ReverseRadial { k } | Self::Division { k } => *k == 0.0,
+            Self::ExtendedUnified { alpha, .. } => *alpha == 0.0,
         }
     }
 
@@ -84,15 +99,18 @@ impl Distortion {
             Self::Fisheye { .. } => "fisheye",
             Self::ThinPrismFisheye { .. } => "thin prism fisheye",
             Self::Fov { .. } => "field of view",
+            Self::ReverseRadial { .. } => "reverse radial",
             Self::Division { .. } => "division",
+            Self::ExtendedUnified { .. } => "extended unified",
         }
     }
 
     /// Where the photograph shows what an ideal pinhole shows at `calibrated`.
     ///
     /// This is the formula alone: beyond the fold of a lens ([`Self::is_one_to_one_to`])
-    /// it leads back inward. Of [`Self::Division`], whose formula leads the other
-    /// way, it is the solution before the fold, and NaN where there is none.
+    /// it leads back inward. Of [`Self::ReverseRadial`] and [`Self::Division`], whose
+    /// formulas lead the other way, it is the solution before the fold, and NaN where
+    /// there is none.
     pub fn distort(&self, calibrated: &Vector2<f64>) -> Vector2<f64> {
         let point = calibrated;
         match self {
@@ -121,7 +139,14 @@ impl Distortion {
                 bent * outer + decentering(tangential, &bent) + prism(&[*s1, 0.0, *s2, 0.0], &bent)
             }
             Self::Fov { omega } => point * fov_scale(*omega, point.norm()),
-            Self::Division { k } => point * division_scale(*k, point.norm()),
+            Self::ReverseRadial { k } => point * reverse_radial_scale(*k, point.norm()),
+            // The smaller root of k r ρ² − ρ + r = 0.
+            Self::Division { k } => {
+                point * (2.0 / (1.0 + (1.0 - 4.0 * k * point.norm_squared()).sqrt()))
+            }
+            Self::ExtendedUnified { alpha, beta } => {
+                point / (alpha * (beta * point.norm_squared() + 1.0).sqrt() + 1.0 - alpha)
+            }
         }
     }
 
@@ -147,10 +172,23 @@ impl Distortion {
                 let undistorted = distorted * (angle.tan() / (2.0 * half_tangent * radius));
                 (angle.abs() < FRAC_PI_2).then_some(undistorted)
             }
-            Self::Division { k } => {
+            Self::ReverseRadial { k } => {
                 let stretch = k * distorted.norm_squared();
                 // The derivative of the radius: zero at the fold.
                 (1.0 + 3.0 * stretch > 0.0).then_some(distorted * (1.0 + stretch))
+            }
+            Self::Division { k } => {
+                let shrink = k * distorted.norm_squared();
+                // Before the fold, and in front of the camera.
+                (shrink.abs() < 1.0).then_some(distorted / (1.0 + shrink))
+            }
+            Self::ExtendedUnified { alpha, beta } => {
+                let square = distorted.norm_squared();
+                let root = (1.0 - (2.0 * alpha - 1.0) * beta * square).sqrt();
+                let depth = (1.0 - beta * alpha * alpha * square) / (alpha * root + 1.0 - alpha);
+                // NaN where no ray is shown.
+                let undistorted = distorted / depth;
+                (depth > 0.0 && self.is_one_to_one_to(&undistorted)).then_some(undistorted)
             }
         }
     }
@@ -167,7 +205,14 @@ impl Distortion {
                         .is_some_and(|(_, jacobian)| jacobian.determinant() > 0.0)
                 })
             }
-            Self::Division { .. } => self.distort(calibrated).iter().all(|x| x.is_finite()),
+            Self::ReverseRadial { .. } | Self::Division { .. } => {
+                self.distort(calibrated).iter().all(|x| x.is_finite())
+            }
+            Self::ExtendedUnified { alpha, beta } => {
+                let distance = (beta * calibrated.norm_squared() + 1.0).sqrt();
+                // The denominator, and the sign of the radius's derivative.
+                alpha * distance + 1.0 - alpha > 0.0 && alpha / distance + 1.0 - alpha > 0.0
+            }
         }
     }
 
@@ -250,7 +295,11 @@ impl Distortion {
                     outer_scale,
                 )
             }
-            Self::None | Self::Fov { .. } | Self::Division { .. } => return None,
+            Self::None
+            | Self::Fov { .. }
+            | Self::ReverseRadial { .. }
+            | Self::Division { .. }
+            | Self::ExtendedUnified { .. } => return None,
         };
         let finite = value.iter().chain(&jacobian).all(|x| x.is_finite());
         (finite && scale > 0.0).then_some((value, jacobian))
@@ -317,7 +366,7 @@ fn fov_scale(omega: f64, radius: f64) -> f64 {
 
 /// r′ / r with r = r′ (1 + k r′²): the cubic's root by the formulas for thrice
 /// the argument of sinh and sin.
-fn division_scale(k: f64, radius: f64) -> f64 {
+fn reverse_radial_scale(k: f64, radius: f64) -> f64 {
     if k == 0.0 || radius == 0.0 {
         return 1.0;
     }

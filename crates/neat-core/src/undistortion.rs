@@ -324,7 +324,7 @@ mod tests {
                 thin_prism: [0.0; 4],
             },
             Distortion::Fov { omega: 0.8 },
-            Distortion::Division { k: 0.1 },
+            Distortion::ReverseRadial { k: 0.1 },
         ]
     }
 

@@ -286,10 +286,13 @@ fn bad_models_are_named_with_file_and_view() {
     let in_cameras = |from, to| [edit(cameras, from, to), images.into(), points.into()];
     let in_images = |from, to| [cameras.into(), edit(images, from, to), points.into()];
     let in_points = |from, to| [cameras.into(), images.into(), edit(points, from, to)];
-    let division = "camera 2 has the model SIMPLE_DIVISION, which is not read: \
+    let panorama = "camera 2 has the model EQUIRECTANGULAR, which is not read: \
                     run `colmap image_undistorter`";
     let bad: [([String; 3], &[&str]); 24] = [
-        (in_cameras("RADIAL", "DIVISION"), &["cameras.txt", division]),
+        (
+            in_cameras("SIMPLE_RADIAL 12 8 20 6 4 0", "EQUIRECTANGULAR 12 8 12 6"),
+            &["cameras.txt", panorama],
+        ),
         (
             in_cameras("PINHOLE", "SPHERE"),
             &["cameras.txt", "camera 7 has the model SPHERE"],

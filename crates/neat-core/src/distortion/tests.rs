@@ -2,7 +2,7 @@ use super::*;
 use proptest::prelude::*;
 
 /// Lenses as calibrations give them, one or two of each model.
-fn lenses() -> [Distortion; 7] {
+fn lenses() -> [Distortion; 9] {
     [
         Distortion::None,
         Distortion::Brown {
@@ -24,7 +24,12 @@ fn lenses() -> [Distortion; 7] {
             thin_prism: [4e-4, -3e-4],
         },
         Distortion::Fov { omega: 0.9 },
+        Distortion::ReverseRadial { k: -0.08 },
         Distortion::Division { k: -0.08 },
+        Distortion::ExtendedUnified {
+            alpha: 0.6,
+            beta: 1.2,
+        },
     ]
 }
 
@@ -33,7 +38,12 @@ fn lenses() -> [Distortion; 7] {
 fn by_the_book(lens: &Distortion, x: f64, y: f64) -> (f64, f64) {
     let (r, phi) = (x.hypot(y), y.atan2(x));
     match *lens {
-        Distortion::None | Distortion::Division { .. } => (x, y),
+        Distortion::None | Distortion::ReverseRadial { .. } | Distortion::Division { .. } => (x, y),
+        Distortion::ExtendedUnified { alpha, beta } => {
+            let distance = (beta * (x * x + y * y) + 1.0).sqrt();
+            let depth = alpha * distance + (1.0 - alpha);
+            (x / depth, y / depth)
+        }
         Distortion::Brown {
             radial: [k1, k2, k3, k4, k5, k6],
             tangential: [p1, p2],
@@ -94,12 +104,18 @@ proptest! {
     fn points_go_where_the_formulas_say(x in -1.2..1.2, y in -1.2..1.2) {
         let point = Vector2::new(x, y);
         for lens in lenses() {
-            if let Distortion::Division { k } = lens {
+            if let Distortion::ReverseRadial { k } = lens {
                 // Its formula leads the other way.
                 let stretched = point * (1.0 + k * point.norm_squared());
                 // The fold is at r = 2.04, beyond the corners of the range.
                 let found = lens.undistort(&point).unwrap();
                 prop_assert!((found - stretched).norm() < 1e-15);
+                continue;
+            }
+            if let Distortion::Division { k } = lens {
+                let divided = point / (1.0 + k * point.norm_squared());
+                let found = lens.undistort(&point).unwrap();
+                prop_assert!((found - divided).norm() < 1e-15);
                 continue;
             }
             let (u, v) = by_the_book(&lens, x, y);
@@ -147,7 +163,9 @@ proptest! {
             Distortion::Brown { radial, tangential },
             Distortion::Fisheye { radial, tangential, thin_prism },
             Distortion::Fov { omega },
+            Distortion::ReverseRadial { k },
             Distortion::Division { k },
+            Distortion::ExtendedUnified { alpha: k, beta: omega.abs() },
         ] {
             if let Some(found) = lens.undistort(&point) {
                 prop_assert!((lens.distort(&found) - point).norm() < 1e-9, "{lens:?}");
@@ -184,7 +202,7 @@ fn points_beyond_the_fold_are_nothing() {
     assert_eq!(returning.undistort(&Vector2::new(0.5, 0.0)), None);
 
     // r (1 − r²/3) again, but from the photograph to the pinhole.
-    let division = Distortion::Division { k: -1.0 / 3.0 };
+    let division = Distortion::ReverseRadial { k: -1.0 / 3.0 };
     assert_eq!(division.undistort(&Vector2::new(1.01, 0.0)), None);
     assert!(division.undistort(&Vector2::new(0.99, 0.0)).is_some());
     assert!(division.is_one_to_one_to(&Vector2::new(0.666, 0.0)));
@@ -219,7 +237,7 @@ fn lenses_without_distortion_change_nothing() {
             tangential: [0.0; 2],
         },
         Distortion::Fov { omega: 0.0 },
-        Distortion::Division { k: 0.0 },
+        Distortion::ReverseRadial { k: 0.0 },
     ] {
         assert!(lens.is_none());
         assert_eq!(lens.distort(&point), point);
@@ -227,7 +245,7 @@ fn lenses_without_distortion_change_nothing() {
     }
     // Small coefficients are no division by zero.
     for (omega, k) in [(1e-9, 1e-18), (-1e-9, -1e-18)] {
-        for lens in [Distortion::Fov { omega }, Distortion::Division { k }] {
+        for lens in [Distortion::Fov { omega }, Distortion::ReverseRadial { k }] {
             assert!((lens.distort(&point) - point).norm() < 1e-15, "{lens:?}");
             assert!((lens.undistort(&point).unwrap() - point).norm() < 1e-15);
             assert_eq!(lens.distort(&Vector2::zeros()), Vector2::zeros());

@@ -10,7 +10,7 @@
 //! focal length, rotation camera-from-world and centre of projection, in OpenCV
 //! axes. In files that start with `NVM_V3_R9T` the rotation is a matrix, row by
 //! row, and the translation camera-from-world follows instead of the centre.
-//! `r` is the lens, as [`Distortion::Division`]. Images of focal length 0 have no
+//! `r` is the lens, as [`Distortion::ReverseRadial`]. Images of focal length 0 have no
 //! pose and are skipped.
 //!
 //! Measurements are relative to the principal point, which without `FixedK` is
@@ -286,7 +286,7 @@ fn posed_image(
         name,
         image,
         intrinsics,
-        distortion: Distortion::Division { k: camera.radial },
+        distortion: Distortion::ReverseRadial { k: camera.radial },
         world_from_camera: pose_of(&rotation, &center),
         size,
     })
@@ -322,7 +322,7 @@ mod tests {
         assert_eq!(a.intrinsics, Intrinsics::centered(10.0, (12, 8)));
         assert_eq!((b.intrinsics.cx, b.intrinsics.cy), (6.0, 4.0));
         assert_eq!(a.distortion, Distortion::None);
-        assert_eq!(b.distortion, Distortion::Division { k: 0.25 });
+        assert_eq!(b.distortion, Distortion::ReverseRadial { k: 0.25 });
         assert_eq!(a.world_from_camera, Matrix4::identity());
         // Camera x is world −y: the rotation camera-from-world takes x to y.
         let turned = Matrix4::new(

@@ -96,7 +96,8 @@ pub(super) fn check_finite(distortion: &Distortion) -> Result<(), CameraError> {
             thin_prism,
         } => all(radial) && all(tangential) && all(thin_prism),
         Distortion::Fov { omega } => omega.is_finite(),
-        Distortion::Division { k } => k.is_finite(),
+        Distortion::ReverseRadial { k } | Distortion::Division { k } => k.is_finite(),
+        Distortion::ExtendedUnified { alpha, beta } => all(&[*alpha, *beta]),
     };
     finite.then_some(()).ok_or(CameraError::NotFinite)
 }
@@ -118,7 +119,7 @@ mod tests {
                 cy: 0.0,
                 skew: 0.0,
             },
-            distortion: Distortion::Division { k: 0.0 },
+            distortion: Distortion::ReverseRadial { k: 0.0 },
             world_from_camera: Matrix4::identity(),
             size: None,
         }

@@ -19,7 +19,7 @@ enum Lens {
     OneFocalLength(Bend),
     /// fx, fy, cx, cy, then [`Bend`].
     TwoFocalLengths(Bend),
-    /// No [`Distortion`] says what it does.
+    /// A panorama, which is no pinhole image with any distortion.
     NotRead,
 }
 
@@ -36,9 +36,15 @@ enum Bend {
     RadTanThinPrismFisheye,
     /// ω.
     Fov,
+    /// k.
+    Division,
+    /// α, β.
+    ExtendedUnified,
 }
 
-use Bend::{Brown, Fisheye, Fov, RadTanThinPrismFisheye, ThinPrismFisheye};
+use Bend::{
+    Brown, Division, ExtendedUnified, Fisheye, Fov, RadTanThinPrismFisheye, ThinPrismFisheye,
+};
 use Lens::{NotRead, OneFocalLength, TwoFocalLengths};
 
 /// The models by their numbers in binary files.
@@ -59,11 +65,11 @@ const MODELS: [CameraModel; 18] = [
         16,
         TwoFocalLengths(RadTanThinPrismFisheye),
     ),
-    model("SIMPLE_DIVISION", 4, NotRead),
-    model("DIVISION", 5, NotRead),
+    model("SIMPLE_DIVISION", 4, OneFocalLength(Division)),
+    model("DIVISION", 5, TwoFocalLengths(Division)),
     model("SIMPLE_FISHEYE", 3, OneFocalLength(Fisheye)),
     model("FISHEYE", 4, TwoFocalLengths(Fisheye)),
-    model("EUCM", 6, NotRead),
+    model("EUCM", 6, TwoFocalLengths(ExtendedUnified)),
     model("EQUIRECTANGULAR", 2, NotRead),
 ];
 
@@ -148,6 +154,14 @@ impl Bend {
             Fov => {
                 let [omega] = filled(parameters);
                 Distortion::Fov { omega }
+            }
+            Division => {
+                let [k] = filled(parameters);
+                Distortion::Division { k }
+            }
+            ExtendedUnified => {
+                let [alpha, beta] = filled(parameters);
+                Distortion::ExtendedUnified { alpha, beta }
             }
         }
     }
@@ -234,6 +248,14 @@ mod tests {
             thin_prism: [0.9, 1.0, 1.1, 1.2],
         };
         assert_eq!(distortion("RAD_TAN_THIN_PRISM_FISHEYE"), rad_tan);
+        for name in ["SIMPLE_DIVISION", "DIVISION"] {
+            assert_eq!(distortion(name), Distortion::Division { k: 0.1 });
+        }
+        let unified = Distortion::ExtendedUnified {
+            alpha: 0.1,
+            beta: 0.2,
+        };
+        assert_eq!(distortion("EUCM"), unified);
     }
 
     #[test]
