@@ -202,12 +202,26 @@ pub enum BackEnd {
     Auto,
 }
 
+/// What a wireframe is drawn on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OverlayGround {
+    /// The photograph.
+    #[default]
+    Photo,
+    /// The 2D segments, for who may not pass photographs on.
+    Segments,
+}
+
 /// From the trained field to the wireframe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DistillConfig {
     /// Which of the two back ends runs.
     pub back_end: BackEnd,
+    /// What the wireframe is drawn on in `overlays/`.
+    #[serde(default)]
+    pub overlay: OverlayGround,
     /// Rays of the fast back end along each 2D segment.
     pub rays_per_segment: usize,
     /// The paper's back end.

@@ -5,7 +5,7 @@ mod picture;
 
 pub use picture::draw_wireframe;
 
-use image::RgbImage;
+use image::{Rgb, RgbImage};
 use line_drawing::{Pen, draw_disc, draw_segment};
 use nalgebra::Vector2;
 use neat_core::{Camera, LineSegment2, LineSegment3, View, Wireframe2d, Wireframe3d};
@@ -21,7 +21,31 @@ const JUNCTION_COLOR: [f64; 3] = [32.0, 200.0, 255.0];
 ///
 /// `pixel_center` is [`neat_core::Scene::pixel_center`].
 pub fn draw_overlay(view: &View, pixel_center: f64, wireframe: &Wireframe3d) -> RgbImage {
-    let mut image = view.image.clone();
+    draw_projected(view.image.clone(), &view.camera, pixel_center, wireframe)
+}
+
+/// The same on the 2D segments of the view instead of the photograph, for who may
+/// not pass photographs on.
+pub fn draw_sketch(view: &View, pixel_center: f64, wireframe: &Wireframe3d) -> RgbImage {
+    const DETECTED: Pen = Pen {
+        color: [168.0; 3],
+        radius: 1.5,
+    };
+    let (width, height) = view.image.dimensions();
+    let mut image = RgbImage::from_pixel(width, height, Rgb([255; 3]));
+    for scored in view.wireframe.segments(f64::NEG_INFINITY) {
+        let segment = (scored.segment).map(|end| end.add_scalar(-pixel_center));
+        draw_segment(&mut image, &segment, &[DETECTED; 2]);
+    }
+    draw_projected(image, &view.camera, pixel_center, wireframe)
+}
+
+fn draw_projected(
+    mut image: RgbImage,
+    camera: &Camera,
+    pixel_center: f64,
+    wireframe: &Wireframe3d,
+) -> RgbImage {
     let size = f64::from(image.width().max(image.height()));
     let radius = (size * WIDTH_PER_SIZE / 2.0 * thinness(wireframe)).max(0.75);
     let line = Pen {
@@ -33,12 +57,12 @@ pub fn draw_overlay(view: &View, pixel_center: f64, wireframe: &Wireframe3d) -> 
         radius: 2.0 * radius,
     };
     for segment in wireframe.segments() {
-        if let Some(segment) = visible_part(&segment, &view.camera, pixel_center) {
+        if let Some(segment) = visible_part(&segment, camera, pixel_center) {
             draw_segment(&mut image, &segment, &[line; 2]);
         }
     }
     for junction in &wireframe.junctions {
-        let projection = view.camera.project(junction);
+        let projection = camera.project(junction);
         if projection.depth > 0.0 {
             let pixel = projection.pixel - Vector2::repeat(pixel_center);
             draw_disc(&mut image, &pixel, &dot);
@@ -169,6 +193,18 @@ mod tests {
                 "{pixel:?}"
             );
         }
+    }
+
+    #[test]
+    fn sketches_show_nothing_of_the_photograph() {
+        let mut data = scene();
+        let sketch = |data: &neat_core::synthetic::SyntheticData| {
+            draw_sketch(&data.scene.views[3], data.scene.pixel_center, &data.truth)
+        };
+        let before = sketch(&data);
+        data.scene.views[3].image.fill(77);
+        assert_eq!(sketch(&data), before);
+        assert_ne!(before, RgbImage::from_pixel(64, 64, Rgb([255; 3])));
     }
 
     #[test]

@@ -2,12 +2,13 @@
 
 use super::Reconstruction;
 use super::session::Session;
+use crate::config::OverlayGround;
 use crate::distill::{Distilled, agreement, distill};
 use crate::error::PipelineError;
 use crate::event::{Event, Stage};
 use crate::field::TrainedField;
 use crate::image_io::write_png;
-use crate::overlay::{draw_overlay, draw_wireframe, spread_views};
+use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe, spread_views};
 use neat_core::{Wireframe3d, file};
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::metrics::ImageEvidence;
@@ -83,7 +84,11 @@ impl Session<'_> {
             file::create_dir(folder)?;
         }
         overlays.par_iter().try_for_each(|(view, path)| {
-            write_png(path, &draw_overlay(view, self.scene.pixel_center, in_world))
+            let draw = match self.config.distill.overlay {
+                OverlayGround::Photo => draw_overlay,
+                OverlayGround::Segments => draw_sketch,
+            };
+            write_png(path, &draw(view, self.scene.pixel_center, in_world))
         })?;
         written.extend(overlays.into_iter().map(|(_, path)| path));
 
