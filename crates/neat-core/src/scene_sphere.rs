@@ -123,7 +123,7 @@ pub enum SphereSource {
 impl fmt::Display for SphereSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::File => "the origin of the poses",
+            Self::File => "the frame of the file",
             Self::Points => "the sparse points",
             Self::Cameras => "what the cameras look at",
             Self::Masks => "the masks",

@@ -108,7 +108,12 @@ fn scene_sphere(scene: &Scene, sphere: &SceneSphere) -> Finding {
             counted(scene.views.len(), "camera"),
             listed(&away)
         );
-        return Finding::new(Check::SceneSphere, Level::Warning, message)
+        // What no camera looks at cannot be reconstructed.
+        let level = match away.len() == scene.views.len() {
+            true => Level::Problem,
+            false => Level::Warning,
+        };
+        return Finding::new(Check::SceneSphere, level, message)
             .because(Cause::Other)
             .remedied_by(remedy)
             .of_views(away);

@@ -21,12 +21,13 @@ const DETECTOR_VERSION: u32 = 1;
 /// coordinates. Views without a segment whose score is above `min_segment_score`
 /// are left out, with a warning.
 ///
-/// What `cache` holds for an image and this configuration is not detected again.
+/// `dir` is the folder of the scene, for messages. What `cache` holds for an image and this configuration is not detected again.
 ///
 /// # Errors
 /// If the configuration is out of range, or no view has a segment.
 pub fn detect_wireframes(
     scene: &mut Scene,
+    dir: &Path,
     config: &DetectorConfig,
     min_segment_score: f64,
     cache: Option<&FileCache>,
@@ -66,7 +67,7 @@ pub fn detect_wireframes(
     scene.retain_views(has_segments);
     if scene.views.is_empty() {
         return Err(PipelineError::Scene(SceneError::NoUsableView {
-            path: scene.name.clone().into(),
+            path: dir.into(),
             views,
             min_segment_score,
         }));
@@ -137,7 +138,14 @@ mod tests {
         scene: &mut Scene,
         cache: Option<&FileCache>,
     ) -> Result<Vec<String>, PipelineError> {
-        detect_wireframes(scene, &DetectorConfig::default(), 0.05, cache, &mut |_| {})
+        detect_wireframes(
+            scene,
+            Path::new("scene"),
+            &DetectorConfig::default(),
+            0.05,
+            cache,
+            &mut |_| {},
+        )
     }
 
     #[test]
@@ -170,7 +178,15 @@ mod tests {
             min_length: 20.0,
             ..DetectorConfig::default()
         };
-        detect_wireframes(&mut other, &config, 0.05, Some(&cache), &mut |_| {}).unwrap();
+        detect_wireframes(
+            &mut other,
+            Path::new("scene"),
+            &config,
+            0.05,
+            Some(&cache),
+            &mut |_| {},
+        )
+        .unwrap();
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 6);
     }
 

@@ -14,7 +14,7 @@ use std::time::Instant;
 pub enum Stage {
     /// A synthetic scene is made and written.
     Synthesise,
-    /// Images, poses and 2D wireframes are read, and hashed for the manifest.
+    /// Images, poses and 2D wireframes are read.
     Load,
     /// 2D wireframes are detected, where the scene has none.
     Detect,

@@ -26,16 +26,22 @@ pub fn draw_overlay(view: &View, pixel_center: f64, wireframe: &Wireframe3d) -> 
 
 /// The same on the 2D segments of the view instead of the photograph, for who may
 /// not pass photographs on.
-pub fn draw_sketch(view: &View, pixel_center: f64, wireframe: &Wireframe3d) -> RgbImage {
-    const DETECTED: Pen = Pen {
-        color: [168.0; 3],
-        radius: 1.5,
-    };
+pub fn draw_sketch(
+    view: &View,
+    pixel_center: f64,
+    min_segment_score: f64,
+    wireframe: &Wireframe3d,
+) -> RgbImage {
     let (width, height) = view.image.dimensions();
+    let size = f64::from(width.max(height));
+    let detected = Pen {
+        color: [168.0; 3],
+        radius: (size * WIDTH_PER_SIZE / 4.0).max(0.75),
+    };
     let mut image = RgbImage::from_pixel(width, height, Rgb([255; 3]));
-    for scored in view.wireframe.segments(f64::NEG_INFINITY) {
+    for scored in view.wireframe.segments(min_segment_score) {
         let segment = (scored.segment).map(|end| end.add_scalar(-pixel_center));
-        draw_segment(&mut image, &segment, &[DETECTED; 2]);
+        draw_segment(&mut image, &segment, &[detected; 2]);
     }
     draw_projected(image, &view.camera, pixel_center, wireframe)
 }
@@ -199,7 +205,12 @@ mod tests {
     fn sketches_show_nothing_of_the_photograph() {
         let mut data = scene();
         let sketch = |data: &neat_core::synthetic::SyntheticData| {
-            draw_sketch(&data.scene.views[3], data.scene.pixel_center, &data.truth)
+            draw_sketch(
+                &data.scene.views[3],
+                data.scene.pixel_center,
+                0.05,
+                &data.truth,
+            )
         };
         let before = sketch(&data);
         data.scene.views[3].image.fill(77);

@@ -9,6 +9,7 @@
 //! wireframe.obj, .ply the same for other programs
 //! wireframe.png       a picture of it
 //! overlays/           the wireframe drawn on some of the photographs
+//! detections/         2D wireframes, where the scene came without
 //! ```
 //!
 //! Every file is complete or not there; `metrics.jsonl` only grows.

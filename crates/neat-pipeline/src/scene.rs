@@ -6,7 +6,7 @@ use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage, timed};
 use neat_core::file_cache::FileCache;
 use neat_core::layout::HAWP_DIR;
-use neat_core::{LoadOptions, Scene, SceneSphere, load_scene};
+use neat_core::{LoadOptions, Scene, SceneSphere, SphereChoice, load_scene};
 use neat_doctor::{Depth, ExamineOptions, Finding, Level, Repair, Verdict};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,8 @@ pub struct PreparedScene {
 }
 
 /// Reads the scene in the folder `dir`, and detects its 2D wireframes if it has
-/// none. `cache` keeps what takes long for the next time.
+/// none. `placed` is the sphere of an earlier part of the run, which stays; `cache`
+/// keeps what takes long for the next time.
 ///
 /// Without a configured radius the world is scaled so that the scene sphere has
 /// radius 1: every length of a configuration (β, grid, encoding) then means the
@@ -40,6 +41,7 @@ pub struct PreparedScene {
 pub fn prepare_scene(
     dir: &Path,
     config: &Config,
+    placed: Option<&SceneSphere>,
     cache: Option<&FileCache>,
     on_event: OnEvent<'_>,
 ) -> Result<PreparedScene, PipelineError> {
@@ -52,28 +54,65 @@ pub fn prepare_scene(
     let mut seconds = BTreeMap::new();
     let (loaded, time) = timed(on_event, Stage::Load, |_| Ok(load_scene(dir, &options)?))?;
     seconds.insert(Stage::Load, time);
-    on_event(Event::Note(format!("scene sphere: {}", loaded.sphere)));
     let mut warnings: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
     let mut scene = loaded.scene;
     if detected {
         let (more, time) = timed(on_event, Stage::Detect, |on_event| {
             let min_score = config.data.min_segment_score;
-            detect_wireframes(&mut scene, &config.detect, min_score, cache, on_event)
+            detect_wireframes(&mut scene, dir, &config.detect, min_score, cache, on_event)
         })?;
         seconds.insert(Stage::Detect, time);
         warnings.extend(more);
+    }
+    if let Some(sphere) = placed {
+        scene = placed_at(scene, sphere, &config.data);
+    }
+    let scene = scaled_for(&config.data, scene);
+    // What is modelled: the configuration may have a radius of its own.
+    let sphere = SceneSphere {
+        center: scene.original_from_world.translation,
+        radius: scene.original_from_world.scale * scene.sphere_radius,
+        source: placed.map_or(loaded.sphere.source, |sphere| sphere.source),
+    };
+    on_event(Event::Note(format!("scene sphere: {sphere}")));
+    if let (SphereChoice::Given { .. }, Some(radius)) =
+        (config.data.scene_sphere, config.data.scene_radius)
+    {
+        warnings.push(format!(
+            "data.scene_radius = {radius} takes the place of the radius of the given scene sphere: --set data.scene_radius=none uses that one"
+        ));
     }
     for warning in &warnings {
         on_event(Event::Warning(warning.clone()));
     }
     Ok(PreparedScene {
-        scene: scaled_for(&config.data, scene),
-        sphere: loaded.sphere,
+        scene,
+        sphere,
         files: loaded.files,
         detected,
         warnings,
         seconds,
     })
+}
+
+/// The scene around the sphere of the run that it belongs to, which it may not have by
+/// itself any more: other views may be left out, or files be gone.
+fn placed_at(scene: Scene, sphere: &SceneSphere, config: &DataConfig) -> Scene {
+    /// Rounding, of the sphere's radius. Below it nothing moves, so that a resumed
+    /// run stays the same to the bit.
+    const SAME: f64 = 1e-9;
+    let world_from_original = scene.original_from_world.inverse();
+    let center = world_from_original.apply(&sphere.center);
+    let radius = world_from_original.scale * sphere.radius;
+    let same_center = center.norm() <= SAME * radius;
+    let same_radius = (scene.sphere_radius - radius).abs() <= SAME * radius;
+    match (same_center, same_radius || config.scene_radius.is_some()) {
+        (true, true) => scene,
+        _ => Scene {
+            sphere_radius: radius,
+            ..scene.centered_at(&center)
+        },
+    }
 }
 
 /// Examines a scene for a second or two: warnings are told and returned.
@@ -164,7 +203,7 @@ mod tests {
 
         let mut config = Preset::Fast.config();
         let read = |config: &Config| {
-            let prepared = prepare_scene(dir.path(), config, None, &mut |_| {});
+            let prepared = prepare_scene(dir.path(), config, None, None, &mut |_| {});
             prepared.unwrap().scene
         };
         let scaled = read(&config);
@@ -177,5 +216,46 @@ mod tests {
         let kept = read(&config);
         assert!((camera(&kept) - camera(&in_millimetres)).norm() < 1e-9);
         assert_eq!(kept.sphere_radius, 1500.0);
+    }
+
+    #[test]
+    fn the_sphere_of_a_run_stays() {
+        let small = SyntheticScene {
+            views: 6,
+            image_size: 64,
+            min_visible_length: 2.0,
+            ..SyntheticScene::default()
+        };
+        let scene = generate(&small).unwrap().scene;
+        let dir = tempfile::tempdir().unwrap();
+        write_scene(&scene, dir.path()).unwrap();
+        let config = Preset::Fast.config();
+        let read = |config: &Config, placed: Option<&SceneSphere>| {
+            prepare_scene(dir.path(), config, placed, None, &mut |_| {}).unwrap()
+        };
+        let first = read(&config, None);
+        // The same sphere changes nothing, to the bit.
+        let again = read(&config, Some(&first.sphere));
+        assert_eq!(again.sphere, first.sphere);
+        let cameras =
+            |scene: &Scene| -> Vec<_> { scene.views.iter().map(|view| view.camera).collect() };
+        assert_eq!(cameras(&again.scene), cameras(&first.scene));
+
+        // Another choice does not move a run that has begun.
+        let mut other = config.clone();
+        other.data.scene_sphere = "0.3,0.1,-0.2,2.5".parse().unwrap();
+        let kept = read(&other, Some(&first.sphere));
+        for (a, b) in cameras(&kept.scene).iter().zip(cameras(&first.scene)) {
+            assert!((a.center_in_world - b.center_in_world).norm() < 1e-9);
+        }
+        let moved = read(&other, None);
+        assert!((moved.sphere.center - nalgebra::Vector3::new(0.3, 0.1, -0.2)).norm() < 1e-12);
+        assert!((moved.sphere.radius - 2.5).abs() < 1e-12);
+
+        // What is told is what is modelled.
+        other.data.scene_radius = Some(3.0);
+        let radius = read(&other, None);
+        assert!((radius.sphere.radius - 3.0).abs() < 1e-12);
+        assert!(radius.warnings[0].contains("scene_radius"));
     }
 }

@@ -7,6 +7,7 @@ use crate::output;
 use crate::progress::Progress;
 use clap::Args;
 use neat_core::file;
+use neat_pipeline::background::fit_background;
 use neat_pipeline::compare_backends::compare_backends;
 use neat_pipeline::event::Event;
 use neat_pipeline::reconstruct::software_warning;
@@ -54,7 +55,7 @@ impl CompareBackendsArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         let existing = super::train::existing(self.overwrite);
         RunDir::check(&self.out, existing)?;
-        let config = self.method.config()?;
+        let mut config = self.method.config()?;
         let backends = if self.backends.is_empty() {
             Backend::available()
         } else {
@@ -67,9 +68,10 @@ impl CompareBackendsArgs {
             }
         }
         let cache = self.cache.open();
-        let prepared = prepare_scene(&self.scene, &config, cache.as_ref(), &mut |event| {
+        let prepared = prepare_scene(&self.scene, &config, None, cache.as_ref(), &mut |event| {
             progress.show(event);
         })?;
+        fit_background(&mut config, &prepared.scene);
         file::create_dir(&self.out)?;
         let comparison = compare_backends(
             &prepared.scene,

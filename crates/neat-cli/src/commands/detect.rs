@@ -53,7 +53,10 @@ pub struct DetectArgs {
 
 impl DetectArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
-        let settings: Vec<String> = self.set.iter().map(|set| format!("detect.{set}")).collect();
+        let settings: Vec<String> = (self.set.iter())
+            // As in a run's configuration, or without its section.
+            .map(|set| format!("detect.{}", set.strip_prefix("detect.").unwrap_or(set)))
+            .collect();
         let config = apply_overrides(&Preset::default().config(), &settings)?.detect;
         #[cfg(feature = "onnx")]
         let learned = self.model.map(SegmentSource::Onnx);

@@ -76,10 +76,16 @@ impl DoctorArgs {
             depth,
             ..ExamineOptions::default()
         };
+        // Before the work: a backend that cannot be used is an error at once. What
+        // training reaches of a GPU's speed is not known.
+        let speed = match self.backend.backend.resolve() {
+            Backend::Wgpu => None,
+            cpu => Some(speed(&cpu.device()?)),
+        };
         let examination = examine_folder(&self.scene, &options, &how);
         // What cannot be read has been explained.
         let costs = match load_scene(&self.scene, &options) {
-            Ok(loaded) => costs(&loaded.scene, self.backend.backend)?,
+            Ok(loaded) => speed.map_or_else(Vec::new, |speed| costs(&loaded.scene, speed)),
             Err(_) => Vec::new(),
         };
         let text = match self.json {
@@ -99,7 +105,7 @@ impl DoctorArgs {
             text.push('\n');
         }
         if !costs.is_empty() {
-            text.push_str("\nexpected on this machine if it is idle, within a factor of two:\n");
+            text.push_str("\ntraining on this machine if it is idle, within a factor of two:\n");
         }
         for Cost { preset, estimate } in costs {
             let time = duration::display(estimate.seconds);
@@ -107,26 +113,24 @@ impl DoctorArgs {
             text.push_str(&format!("  --preset {preset:<18} {time}, {gib:.1} GiB\n"));
         }
         if examination.verdict != Verdict::NotReady {
-            let scene = self.scene.display();
+            let scene = self.scene.display().to_string();
             let flags = self.scene_args.to_string();
-            text.push_str(&format!("\nneat reconstruct {scene} --out RUN{flags}\n"));
+            let quote = if scene.contains(' ') { "'" } else { "" };
+            text.push_str(&format!(
+                "\nneat reconstruct {quote}{scene}{quote} --out RUN{flags}\n"
+            ));
         }
         text
     }
 }
 
-/// What every preset takes, where that is known: on a CPU.
-fn costs(scene: &Scene, backend: Backend) -> Result<Vec<Cost>, CliError> {
-    let backend = backend.resolve();
-    if backend == Backend::Wgpu {
-        return Ok(Vec::new());
-    }
-    let speed = speed(&backend.device()?);
+/// What every preset takes where a matrix product runs at `speed` GFLOP/s.
+fn costs(scene: &Scene, speed: f64) -> Vec<Cost> {
     let cost = |preset: Preset| Cost {
         preset,
         estimate: estimate(&preset.config(), scene, speed),
     };
-    Ok(Preset::ALL.map(cost).into())
+    Preset::ALL.map(cost).into()
 }
 
 fn json(examination: &Examination, costs: &[Cost]) -> Result<String, CliError> {

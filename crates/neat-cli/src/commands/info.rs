@@ -120,7 +120,7 @@ fn warnings(loaded: &LoadedScene, min_score: f64) -> Vec<String> {
         .collect();
     if empty.len() == scene.views.len() {
         warnings.push(format!(
-            "there are no 2D wireframes with a segment above {min_score} in hawp/: `neat reconstruct` detects them if there is no such folder"
+            "there are no 2D wireframes with a segment above {min_score}: without a folder hawp/ `neat reconstruct` detects them"
         ));
     } else if !empty.is_empty() {
         warnings.push(format!(

@@ -55,7 +55,7 @@ pub struct RunArgs {
     #[command(flatten)]
     cache: CacheArgs,
     #[command(flatten)]
-    pub scene_args: SceneArgs,
+    scene_args: SceneArgs,
 }
 
 impl RunArgs {

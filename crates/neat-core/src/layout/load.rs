@@ -6,7 +6,8 @@ use super::poses::{self, PosedImage, Poses};
 use super::rectify::Rectification;
 use super::sphere::Evidence;
 use super::{
-    HAWP_DIR, Layout, LoadOptions, PixelCenter, SceneWarning, images, pixel_center, point_files,
+    HAWP_DIR, Layout, LoadOptions, PixelCenter, SceneWarning, images, masks, pixel_center,
+    point_files,
 };
 use crate::file_cache::FileCache;
 use crate::scene::{check_image_size, check_names};
@@ -161,7 +162,11 @@ pub(super) fn load_posed(
     }
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
     let points = match poses.points.is_empty() {
-        true => point_files::read(dir, &cameras, &poses.original_from_world)?,
+        true => {
+            let convention = options.pose_convention.unwrap_or_default();
+            let is_mirrored = convention.mirrored_world;
+            point_files::read(dir, &cameras, &poses.original_from_world, is_mirrored)?
+        }
         false => observed_by(poses.points, &rectifications, &kept),
     };
     let images: Vec<PosedImage> = (poses.views.into_iter().zip(&kept))
@@ -178,7 +183,7 @@ pub(super) fn load_posed(
     if sphere.source == SphereSource::Unknown {
         warnings.push(SceneWarning::SphereUnknown);
     }
-    let files = input_files(&poses.path, &images, &hawp_dir);
+    let files = input_files(dir, &poses.path, &images);
     let scene = Scene {
         name: scene_name(dir),
         views,
@@ -201,8 +206,7 @@ pub(super) fn load_posed(
     })
 }
 
-/// What is read beside the file of poses: in its folder or, where each image has a
-/// file of its own, that folder itself.
+/// What is read beside the file of poses, or in the folder of the scene.
 const BESIDE_POSES: [&str; 8] = [
     "cameras.txt",
     "cameras.bin",
@@ -214,8 +218,9 @@ const BESIDE_POSES: [&str; 8] = [
     "points3D.ply",
 ];
 
-/// The files that a scene was read from, sorted; masks are not among them.
-fn input_files(poses: &Path, images: &[PosedImage], hawp_dir: &Path) -> Vec<PathBuf> {
+/// The files that a scene was read from, sorted.
+fn input_files(dir: &Path, poses: &Path, images: &[PosedImage]) -> Vec<PathBuf> {
+    let hawp_dir = dir.join(HAWP_DIR);
     let mut files: Vec<PathBuf> = images.iter().map(|view| view.image.clone()).collect();
     files.extend(
         images
@@ -229,6 +234,12 @@ fn input_files(poses: &Path, images: &[PosedImage], hawp_dir: &Path) -> Vec<Path
         files.push(poses.into());
         files.extend(BESIDE_POSES.map(|name| poses.with_file_name(name)));
     }
+    files.extend(BESIDE_POSES.map(|name| dir.join(name)));
+    files.extend(
+        masks::find(dir, images)
+            .into_iter()
+            .flat_map(|masks| masks.files),
+    );
     files.retain(|file| file.is_file());
     files.sort();
     files.dedup();

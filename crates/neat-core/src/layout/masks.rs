@@ -18,8 +18,28 @@ const CELLS: u32 = 256;
 /// Brighter pixels show the object.
 const BRIGHT: u8 = 127;
 
+/// The masks of all views.
+pub(super) struct MaskFiles {
+    /// One file per view.
+    pub files: Vec<PathBuf>,
+    /// What of them shows the object.
+    by: Shown,
+}
+
+#[derive(Clone, Copy)]
+enum Shown {
+    /// Bright pixels.
+    Brightness,
+    /// Opaque pixels.
+    Opacity,
+}
+
 /// The file with the mask of each view. `None` unless every view has one.
-pub(super) fn find(dir: &Path, views: &[PosedImage]) -> Option<Vec<PathBuf>> {
+pub(super) fn find(dir: &Path, views: &[PosedImage]) -> Option<MaskFiles> {
+    let bright = |files| MaskFiles {
+        files,
+        by: Shown::Brightness,
+    };
     for folder in DIRS.map(|name| dir.join(name)) {
         let Ok(files) = images::list(&folder) else {
             continue;
@@ -29,26 +49,35 @@ pub(super) fn find(dir: &Path, views: &[PosedImage]) -> Option<Vec<PathBuf>> {
             Some(file.clone())
         };
         if let Some(masks) = views.iter().map(named).collect() {
-            return Some(masks);
+            return Some(bright(masks));
         }
         if files.len() == views.len() {
-            return Some(files);
+            return Some(bright(files));
         }
     }
     let transparent = |view: &PosedImage| {
         let has_alpha = images::has_alpha(&view.image).unwrap_or(false);
         has_alpha.then(|| view.image.clone())
     };
-    views.iter().map(transparent).collect()
+    let files = views.iter().map(transparent).collect::<Option<_>>()?;
+    Some(MaskFiles {
+        files,
+        by: Shown::Opacity,
+    })
 }
 
-/// Reads the masks in `files`.
-pub(super) fn read(files: &[PathBuf]) -> Result<Vec<Mask>, SceneError> {
-    let masks: Vec<_> = files.par_iter().map(|path| read_one(path)).collect();
-    masks.into_iter().collect()
+/// Reads the masks. `None` if they hide nothing: many programs write images with an
+/// alpha channel that is opaque everywhere.
+pub(super) fn read(masks: &MaskFiles) -> Result<Option<Vec<Mask>>, SceneError> {
+    let read: Vec<_> = (masks.files.par_iter())
+        .map(|path| read_one(path, masks.by))
+        .collect();
+    let read: Vec<Mask> = read.into_iter().collect::<Result<_, _>>()?;
+    let hides_something = read.iter().any(|mask| mask.inside.contains(&false));
+    Ok(hides_something.then_some(read))
 }
 
-fn read_one(path: &Path) -> Result<Mask, SceneError> {
+fn read_one(path: &Path, by: Shown) -> Result<Mask, SceneError> {
     let image = ImageReader::open(path)
         .and_then(ImageReader::with_guessed_format)
         .map_err(|source| crate::file::read_error(path, "put the mask there", source))?
@@ -57,14 +86,14 @@ fn read_one(path: &Path) -> Result<Mask, SceneError> {
             path: path.into(),
             source,
         })?;
-    let gray = match image.color().has_alpha() {
-        true => {
+    let gray = match by {
+        Shown::Brightness => image.into_luma8(),
+        Shown::Opacity => {
             let rgba = image.into_rgba8();
             GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| {
                 image::Luma([rgba.get_pixel(x, y)[3]])
             })
         }
-        false => image.into_luma8(),
     };
     let (width, height) = gray.dimensions();
     let scale = f64::from(CELLS) / f64::from(width.max(height));
@@ -74,4 +103,48 @@ fn read_one(path: &Path) -> Result<Mask, SceneError> {
         size: (small.width() as usize, small.height() as usize),
         inside: small.pixels().map(|pixel| pixel[0] > BRIGHT).collect(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Distortion, Intrinsics};
+    use image::{GrayAlphaImage, LumaA, Rgba, RgbaImage};
+    use nalgebra::Matrix4;
+    use std::fs;
+
+    fn view(image: PathBuf) -> PosedImage {
+        PosedImage {
+            name: file_stem(&image),
+            image,
+            intrinsics: Intrinsics::centered(100.0, (8, 4)),
+            distortion: Distortion::None,
+            world_from_camera: Matrix4::identity(),
+            size: None,
+        }
+    }
+
+    #[test]
+    fn opaque_images_are_no_masks_and_transparent_ones_are() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let mut image = RgbaImage::from_pixel(8, 4, Rgba([9, 9, 9, 255]));
+        image.save(&path).unwrap();
+        let views = [view(path.clone())];
+        let found = find(dir.path(), &views).unwrap();
+        assert_eq!(read(&found).unwrap(), None);
+
+        image.put_pixel(7, 0, Rgba([9, 9, 9, 0]));
+        image.save(&path).unwrap();
+        let mask = read(&find(dir.path(), &views).unwrap()).unwrap().unwrap();
+        assert_eq!(mask[0].inside.iter().filter(|inside| !**inside).count(), 1);
+
+        // A file of masks counts by its brightness, also with an alpha channel.
+        fs::create_dir(dir.path().join("mask")).unwrap();
+        let mut mask = GrayAlphaImage::from_pixel(8, 4, LumaA([0, 255]));
+        mask.put_pixel(2, 1, LumaA([255, 255]));
+        mask.save(dir.path().join("mask/a.png")).unwrap();
+        let mask = read(&find(dir.path(), &views).unwrap()).unwrap().unwrap();
+        assert_eq!(mask[0].inside.iter().filter(|inside| **inside).count(), 1);
+    }
 }

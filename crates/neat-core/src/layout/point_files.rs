@@ -11,10 +11,12 @@ const FILES: [&str; 3] = ["sparse_points.ply", "sparse_pc.ply", "points3D.ply"];
 /// The points of the first of [`FILES`] in the folder `dir`, in the world of
 /// `cameras`; none without a file. The file may be in that world or in the frame
 /// to which `original_from_world` leads: in the one where more cameras see points.
+/// `is_mirrored` if the poses were mirrored when they were read.
 pub(super) fn read(
     dir: &Path,
     cameras: &[Camera],
     original_from_world: &Similarity,
+    is_mirrored: bool,
 ) -> Result<Vec<SparsePoint>, SceneError> {
     let Some(path) = (FILES.iter())
         .map(|name| dir.join(name))
@@ -22,7 +24,12 @@ pub(super) fn read(
     else {
         return Ok(Vec::new());
     };
-    let as_written = read_ply(&path)?;
+    let mut as_written = read_ply(&path)?;
+    if is_mirrored {
+        for point in &mut as_written {
+            point.z = -point.z;
+        }
+    }
     let world_from_original = original_from_world.inverse();
     let from_original = |point: &Vector3<f64>| world_from_original.apply(point);
     let moved: Vec<_> = as_written.iter().map(from_original).collect();

@@ -97,6 +97,7 @@ impl Evidence<'_> {
         let Some(files) = masks::find(self.dir, self.images) else {
             return Ok(None);
         };
-        Ok(from_masks(self.cameras, &masks::read(&files)?))
+        let masks = masks::read(&files)?;
+        Ok(masks.and_then(|masks| from_masks(self.cameras, &masks)))
     }
 }

@@ -9,6 +9,7 @@ use neat_core::layout::{list_images, read_image};
 use neat_core::{SceneError, Wireframe2d, file, hawp_json};
 use neat_detect::{DetectorConfig, detect, edge_map, segment_file, wireframe_from_segments};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// What finds the line segments. Those of others go through the same fitting and
@@ -72,6 +73,13 @@ pub fn detect_folder(
         }
         .into());
     }
+    let mut names = BTreeSet::new();
+    if let Some(path) = images.iter().find(|path| !names.insert(path.file_stem())) {
+        return Err(PipelineError::Scene(SceneError::Malformed {
+            path: path.clone(),
+            reason: "another image has this name with another ending: rename one".into(),
+        }));
+    }
     let detector = Detector::open(options)?;
     let overlays = options.out.join("overlays");
     file::create_dir(if options.overlays {
@@ -127,7 +135,7 @@ enum Detector<'a> {
     SegmentFiles(&'a Path),
     EdgeMaps(&'a Path),
     #[cfg(feature = "onnx")]
-    Onnx(neat_detect::onnx::OnnxDetector),
+    Onnx(Box<neat_detect::onnx::OnnxDetector>),
 }
 
 impl<'a> Detector<'a> {
@@ -137,7 +145,10 @@ impl<'a> Detector<'a> {
             SegmentSource::SegmentFiles(dir) => Self::SegmentFiles(dir),
             SegmentSource::EdgeMaps(dir) => Self::EdgeMaps(dir),
             #[cfg(feature = "onnx")]
-            SegmentSource::Onnx(path) => Self::Onnx(neat_detect::onnx::OnnxDetector::load(path)?),
+            SegmentSource::Onnx(path) => {
+                let detector = neat_detect::onnx::OnnxDetector::load(path)?;
+                Self::Onnx(Box::new(detector))
+            }
         })
     }
 
@@ -252,9 +263,11 @@ mod tests {
         assert!(message(&built_in).contains("images"));
         fs::create_dir(dir.path().join("images")).unwrap();
         assert!(message(&built_in).contains("PNG"));
-        RgbImage::new(8, 8)
-            .save(dir.path().join("images/a.png"))
-            .unwrap();
+        let image = RgbImage::new(8, 8);
+        image.save(dir.path().join("images/a.png")).unwrap();
+        image.save(dir.path().join("images/a.jpg")).unwrap();
+        assert!(message(&built_in).contains("another image"));
+        fs::remove_file(dir.path().join("images/a.jpg")).unwrap();
         let files = options(dir.path(), SegmentSource::SegmentFiles(dir.path().into()));
         assert!(message(&files).contains("a.npz"));
         let mut wrong = built_in;

@@ -84,11 +84,15 @@ impl Session<'_> {
             file::create_dir(folder)?;
         }
         overlays.par_iter().try_for_each(|(view, path)| {
-            let draw = match self.config.distill.overlay {
-                OverlayGround::Photo => draw_overlay,
-                OverlayGround::Segments => draw_sketch,
+            let pixel_center = self.scene.pixel_center;
+            let picture = match self.config.distill.overlay {
+                OverlayGround::Photo => draw_overlay(view, pixel_center, in_world),
+                OverlayGround::Segments => {
+                    let min_score = self.config.data.min_segment_score;
+                    draw_sketch(view, pixel_center, min_score, in_world)
+                }
             };
-            write_png(path, &draw(view, self.scene.pixel_center, in_world))
+            write_png(path, &picture)
         })?;
         written.extend(overlays.into_iter().map(|(_, path)| path));
 

@@ -47,7 +47,10 @@ impl<'a> Session<'a> {
             on_event(Event::Warning(warning.clone()));
         }
         let cache = options.cache.as_ref();
-        let prepared = prepare_scene(&scene_dir, &options.config, cache, on_event)?;
+        let prepared = {
+            let placed = earlier.as_ref().and_then(|e| e.sphere.as_ref());
+            prepare_scene(&scene_dir, &options.config, placed, cache, on_event)?
+        };
         warnings.extend(prepared.warnings);
         let mut seconds = prepared.seconds;
         if options.examine && options.existing != Existing::Resume {
@@ -103,10 +106,10 @@ impl<'a> Session<'a> {
         for (stage, seconds) in seconds {
             session.add_seconds(stage, seconds);
         }
+        session.write_manifest()?;
         if prepared.detected {
             session.write_detections()?;
         }
-        session.write_manifest()?;
         Ok(session)
     }
 
@@ -228,7 +231,10 @@ fn read_run(
     }
     let manifest = dir.manifest()?;
     let scene_dir = scene.unwrap_or(&manifest.scene);
-    let prepared = prepare_scene(scene_dir, &config, cache, on_event)?;
+    let prepared = {
+        let placed = manifest.sphere.as_ref();
+        prepare_scene(scene_dir, &config, placed, cache, on_event)?
+    };
     fit_background(&mut config, &prepared.scene);
     let checkpoint = dir.read_latest_checkpoint()?;
     let field = TrainedField::load(&config, &checkpoint, &device)?;
