@@ -2,6 +2,7 @@
 
 use crate::arguments::positive;
 use clap::Args;
+use neat_core::file_cache::FileCache;
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
 use neat_core::{LoadOptions, SphereChoice};
 use neat_pipeline::config::DataConfig;
@@ -42,9 +43,13 @@ pub struct SceneArgs {
 }
 
 impl SceneArgs {
-    /// How a scene is read with what was given.
-    pub fn load_options(&self) -> LoadOptions {
-        load_options(&self.apply(Preset::default().config().data))
+    /// How a scene is read with what was given, by commands that need no 2D
+    /// wireframes.
+    pub fn load_options(&self, cache: Option<&FileCache>) -> LoadOptions {
+        LoadOptions {
+            require_wireframes: false,
+            ..load_options(&self.apply(Preset::default().config().data), cache)
+        }
     }
 
     /// `data` with everything that was given.

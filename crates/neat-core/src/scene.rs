@@ -163,20 +163,7 @@ impl Scene {
     /// observed.
     pub fn retain_views(&mut self, mut keep: impl FnMut(&View) -> bool) {
         let kept: Vec<bool> = self.views.iter().map(&mut keep).collect();
-        // Where each view is among those that are kept.
-        let new_index: Vec<usize> = (kept.iter())
-            .scan(0, |next, &kept| {
-                let index = *next;
-                *next += usize::from(kept);
-                Some(index)
-            })
-            .collect();
-        for point in &mut self.sparse_points {
-            point.observations.retain(|seen| kept[seen.view]);
-            for seen in &mut point.observations {
-                seen.view = new_index[seen.view];
-            }
-        }
+        keep_observations(&mut self.sparse_points, &kept);
         let mut kept = kept.into_iter();
         self.views.retain(|_| kept.next() == Some(true));
     }
@@ -212,6 +199,23 @@ impl Scene {
     /// views.
     pub fn visible_radius(&self) -> f64 {
         scene_sphere::visible_radius(self.views.iter().map(|view| &view.camera))
+    }
+}
+
+/// Takes the observations of views that are not `kept` out of `points`, and gives the
+/// others the indices that are left.
+pub(crate) fn keep_observations(points: &mut [SparsePoint], kept: &[bool]) {
+    let mut next = 0..;
+    let new_index: Vec<Option<usize>> = (kept.iter())
+        .map(|&kept| kept.then(|| next.next()).flatten())
+        .collect();
+    for point in points {
+        point.observations = (point.observations.iter())
+            .filter_map(|&Observation { view, pixel }| {
+                let view = (*new_index.get(view)?)?;
+                Some(Observation { view, pixel })
+            })
+            .collect();
     }
 }
 

@@ -1,13 +1,12 @@
 //! Where the cameras stand, what they look at, and what is known beside images.
 
-use crate::SceneSphere;
 use crate::examination::{Cause, Check, Finding, Level, counted, listed, percent};
 use nalgebra::Vector3;
 use neat_core::{Camera, Scene};
 
 /// What is found about cameras, sparse points and segments.
-pub(crate) fn capture_findings(scene: &Scene, sphere: &SceneSphere) -> Vec<Finding> {
-    let mut findings = vec![coverage(scene, sphere), scene_sphere(scene, sphere)];
+pub(crate) fn capture_findings(scene: &Scene) -> Vec<Finding> {
+    let mut findings = vec![coverage(scene), scene_sphere(scene)];
     findings.extend(sparse_points(scene));
     findings.extend(segments(scene));
     findings
@@ -23,15 +22,15 @@ const WIDE: f64 = 35.0;
 /// Views closer together than this, in degrees, hardly tell a depth.
 const NARROW: f64 = 5.0;
 
-fn coverage(scene: &Scene, sphere: &SceneSphere) -> Finding {
+fn coverage(scene: &Scene) -> Finding {
     let count = scene.views.len();
     let directions: Vec<Vector3<f64>> = (scene.views.iter())
-        .map(|view| (view.camera.center_in_world - sphere.center).normalize())
+        .map(|view| view.camera.center_in_world.normalize())
         .collect();
     let extent = (scene.views.iter())
         .map(|view| (view.camera.center_in_world - scene.views[0].camera.center_in_world).norm())
         .fold(0.0, f64::max);
-    let from_sphere = (scene.views[0].camera.center_in_world - sphere.center).norm();
+    let from_sphere = scene.views[0].camera.center_in_world.norm();
     if count < 2 || extent <= 1e-9 * from_sphere.max(1e-9) {
         let message = format!(
             "{} from one place: nothing tells how far things are",
@@ -84,21 +83,22 @@ fn coverage(scene: &Scene, sphere: &SceneSphere) -> Finding {
     Finding::new(Check::Coverage, Level::Good, message)
 }
 
-fn scene_sphere(scene: &Scene, sphere: &SceneSphere) -> Finding {
-    let names = |holds: &dyn Fn(&Camera) -> bool| -> Vec<String> {
-        let views = scene.views.iter().filter(|view| holds(&view.camera));
-        views.map(|view| view.name.clone()).collect()
+fn scene_sphere(scene: &Scene) -> Finding {
+    let names = |holds: Vec<bool>| -> Vec<String> {
+        let views = scene.views.iter().zip(holds).filter(|(_, holds)| *holds);
+        views.map(|(view, _)| view.name.clone()).collect()
     };
-    let inside = names(&|camera| (camera.center_in_world - sphere.center).norm() < sphere.radius);
-    let away = names(&|camera| seen_share(camera, sphere) == 0.0);
-    let seen = scene
-        .views
-        .iter()
-        .map(|view| seen_share(&view.camera, sphere));
-    let seen = median(seen.collect());
+    let cameras = || scene.views.iter().map(|view| &view.camera);
+    let shares: Vec<f64> = cameras()
+        .map(|camera| seen_share(camera, scene.sphere_radius))
+        .collect();
+    let is_inside = |camera: &Camera| camera.center_in_world.norm() < scene.sphere_radius;
+    let inside = names(cameras().map(is_inside).collect());
+    let away = names(shares.iter().map(|&share| share == 0.0).collect());
+    let seen = median(shares);
     // In the frame of the user's files, as --scene-sphere takes it.
-    let [x, y, z] = scene.original_from_world.apply(&sphere.center).into();
-    let radius = scene.original_from_world.scale * sphere.radius;
+    let [x, y, z] = scene.original_from_world.translation.into();
+    let radius = scene.original_from_world.scale * scene.sphere_radius;
     let ball = format!("the ball around ({x:.2}, {y:.2}, {z:.2}) of radius {radius:.3}");
     let remedy = "give the sphere of the object by --scene-sphere";
     if !away.is_empty() {
@@ -134,8 +134,8 @@ fn scene_sphere(scene: &Scene, sphere: &SceneSphere) -> Finding {
     Finding::new(Check::SceneSphere, Level::Good, message)
 }
 
-/// The share of the ball that a camera sees.
-fn seen_share(camera: &Camera, sphere: &SceneSphere) -> f64 {
+/// The share of the scene sphere that a camera sees.
+fn seen_share(camera: &Camera, radius: f64) -> f64 {
     const STEPS: i32 = 4;
     let (mut seen, mut all) = (0, 0);
     let steps = || (-STEPS..=STEPS).map(|step| f64::from(step) / f64::from(STEPS));
@@ -147,12 +147,7 @@ fn seen_share(camera: &Camera, sphere: &SceneSphere) -> f64 {
                     continue;
                 }
                 all += 1;
-                let projection = camera.project(&(sphere.center + offset * sphere.radius));
-                let pixel = projection.pixel;
-                let inside = projection.depth > 0.0
-                    && (0.0..f64::from(camera.width)).contains(&pixel.x)
-                    && (0.0..f64::from(camera.height)).contains(&pixel.y);
-                seen += u32::from(inside);
+                seen += u32::from(camera.sees(&(offset * radius)));
             }
         }
     }

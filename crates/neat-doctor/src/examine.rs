@@ -7,7 +7,6 @@ use crate::gray_image::GrayImage;
 use crate::image_checks::image_findings;
 use crate::load_failure::{explain, size_factor};
 use crate::pose_diagnosis::Diagnosis;
-use nalgebra::Vector3;
 use neat_core::{CameraError, LoadOptions, LoadedScene, Scene, SceneError, ViewError, load_scene};
 use rayon::prelude::*;
 use std::path::Path;
@@ -23,23 +22,11 @@ pub enum Depth {
     Full,
 }
 
-/// The ball that holds what is to be reconstructed, in the world of the cameras.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SceneSphere {
-    /// Its middle.
-    pub center: Vector3<f64>,
-    /// Its radius; positive.
-    pub radius: f64,
-}
-
 /// How [`examine`] looks at a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExamineOptions {
     /// How thoroughly.
     pub depth: Depth,
-    /// The scene sphere; without one, that of [`Scene::sphere_radius`]
-    /// around the origin.
-    pub sphere: Option<SceneSphere>,
     /// What the scene was read with: remedies name what to use instead.
     pub read_with: Repair,
 }
@@ -78,13 +65,9 @@ fn examine_as(scene: &Scene, options: &ExamineOptions, mirrored: bool) -> Examin
     let working: Vec<_> = (scene.views.par_iter())
         .map(|view| GrayImage::working_copy(&view.image))
         .collect();
-    let sphere = options.sphere.unwrap_or_else(|| SceneSphere {
-        center: Vector3::zeros(),
-        radius: scene.sphere_radius,
-    });
     let mut findings = pose_findings(scene, &working, options, mirrored);
     findings.extend(image_findings(scene, &working));
-    findings.extend(capture_findings(scene, &sphere));
+    findings.extend(capture_findings(scene));
     Examination::new(&scene.name, scene.views.len(), findings)
 }
 
@@ -134,10 +117,8 @@ pub fn examine_folder(
     options: &ExamineOptions,
 ) -> Examination {
     let dir = dir.as_ref();
-    let mut options = *options;
-    options.read_with = Repair::of(load);
     let error = match load_scene(dir, load) {
-        Ok(loaded) => return with_warnings(&loaded, examine(&loaded.scene, &options)),
+        Ok(loaded) => return examine_loaded(&loaded, load, options),
         Err(error) => error,
     };
     let unreadable = |finding| {
@@ -160,8 +141,7 @@ pub fn examine_folder(
         };
         // If only some poses are mirrored, others fail now: the first error holds.
         if let Ok(loaded) = load_scene(dir, &again) {
-            options.read_with = Repair::of(&again);
-            return with_warnings(&loaded, examine_as(&loaded.scene, &options, true));
+            return examine_loaded_as(&loaded, &again, options, true);
         }
     }
     if let Some(scale) = size_factor(&error) {
@@ -173,11 +153,10 @@ pub fn examine_folder(
         let again = repair.apply(load);
         if let Ok(loaded) = load_scene(dir, &again) {
             let repair = Repair::of(&again);
-            options.read_with = repair;
             let mut finding = explain(&error);
             finding.repair = Some(repair);
             finding.remedy = Some(format!("run it with `{repair}`"));
-            let rest = with_warnings(&loaded, examine(&loaded.scene, &options));
+            let rest = examine_loaded(&loaded, &again, options);
             let findings = [vec![finding], rest.findings].concat();
             return Examination::new(rest.scene, rest.views, findings);
         }
@@ -185,8 +164,27 @@ pub fn examine_folder(
     unreadable(explain(&error))
 }
 
-/// Puts what was noticed while reading before the other findings.
-fn with_warnings(loaded: &LoadedScene, examination: Examination) -> Examination {
+/// [`examine_folder`] of a scene that has been read, with `load`.
+pub fn examine_loaded(
+    loaded: &LoadedScene,
+    load: &LoadOptions,
+    options: &ExamineOptions,
+) -> Examination {
+    examine_loaded_as(loaded, load, options, false)
+}
+
+/// What was noticed while reading comes before the other findings.
+fn examine_loaded_as(
+    loaded: &LoadedScene,
+    load: &LoadOptions,
+    options: &ExamineOptions,
+    mirrored: bool,
+) -> Examination {
+    let options = ExamineOptions {
+        read_with: Repair::of(load),
+        ..*options
+    };
+    let examination = examine_as(&loaded.scene, &options, mirrored);
     let notes = (loaded.warnings.iter())
         .map(|warning| Finding::new(Check::Files, Level::Note, warning.to_string()));
     let findings = notes.chain(examination.findings).collect();

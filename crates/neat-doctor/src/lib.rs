@@ -32,5 +32,5 @@ mod pose_findings;
 mod tracks;
 
 pub use examination::{Cause, Check, Examination, Finding, Level, Repair, Verdict};
-pub use examine::{Depth, ExamineOptions, SceneSphere, examine, examine_folder};
+pub use examine::{Depth, ExamineOptions, examine, examine_folder, examine_loaded};
 pub use load_failure::explain;

@@ -31,7 +31,7 @@ const SPHERE_SLOPE: f64 = 20.0;
 /// for a photograph puts the border of the sphere behind the scene and drops the
 /// silhouette term; and [`BackEnd::Auto`]. A configuration without
 /// `data.background` stays as it is.
-pub fn fit_background(config: &mut Config, scene: &Scene) {
+pub(crate) fn fit_background(config: &mut Config, scene: &Scene) {
     let background = match config.data.background {
         None => return,
         Some(Background::Auto) if is_black(scene) => Background::Black,

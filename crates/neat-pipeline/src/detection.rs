@@ -21,7 +21,8 @@ const DETECTOR_VERSION: u32 = 1;
 /// coordinates. Views without a segment whose score is above `min_segment_score`
 /// are left out, with a warning.
 ///
-/// `dir` is the folder of the scene, for messages. What `cache` holds for an image and this configuration is not detected again.
+/// `dir` is the folder of the scene, for messages. What `cache` holds for an image
+/// and this configuration is not detected again.
 ///
 /// # Errors
 /// If the configuration is out of range, or no view has a segment.

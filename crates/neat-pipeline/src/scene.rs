@@ -1,5 +1,6 @@
 //! Reading a scene as a configuration wants it.
 
+use crate::background::fit_background;
 use crate::config::{Config, DataConfig};
 use crate::detection::detect_wireframes;
 use crate::error::PipelineError;
@@ -29,7 +30,8 @@ pub struct PreparedScene {
 }
 
 /// Reads the scene in the folder `dir`, and detects its 2D wireframes if it has
-/// none. `placed` is the sphere of an earlier part of the run, which stays; `cache`
+/// none. What `config` leaves to the background of the images is decided. `placed`
+/// is the sphere of an earlier part of the run, which stays; `cache`
 /// keeps what takes long for the next time.
 ///
 /// Without a configured radius the world is scaled so that the scene sphere has
@@ -40,7 +42,7 @@ pub struct PreparedScene {
 /// If the scene cannot be read, or no view has a segment.
 pub fn prepare_scene(
     dir: &Path,
-    config: &Config,
+    config: &mut Config,
     placed: Option<&SceneSphere>,
     cache: Option<&FileCache>,
     on_event: OnEvent<'_>,
@@ -48,8 +50,7 @@ pub fn prepare_scene(
     let detected = !dir.join(HAWP_DIR).is_dir();
     let options = LoadOptions {
         require_wireframes: !detected,
-        cache_dir: cache.map(|cache| cache.dir().into()),
-        ..load_options(&config.data)
+        ..load_options(&config.data, cache)
     };
     let mut seconds = BTreeMap::new();
     let (loaded, time) = timed(on_event, Stage::Load, |_| Ok(load_scene(dir, &options)?))?;
@@ -74,6 +75,7 @@ pub fn prepare_scene(
         radius: scene.original_from_world.scale * scene.sphere_radius,
         source: placed.map_or(loaded.sphere.source, |sphere| sphere.source),
     };
+    fit_background(config, &scene);
     on_event(Event::Note(format!("scene sphere: {sphere}")));
     if let (SphereChoice::Given { .. }, Some(radius)) =
         (config.data.scene_sphere, config.data.scene_radius)
@@ -128,7 +130,7 @@ pub fn examine_quickly(
         scene,
         &ExamineOptions {
             depth: Depth::Quick,
-            read_with: Repair::of(&load_options(config)),
+            read_with: Repair::of(&load_options(config, None)),
             ..ExamineOptions::default()
         },
     );
@@ -150,7 +152,7 @@ pub fn examine_quickly(
 }
 
 /// How a configuration wants a scene to be read.
-pub fn load_options(config: &DataConfig) -> LoadOptions {
+pub fn load_options(config: &DataConfig, cache: Option<&FileCache>) -> LoadOptions {
     LoadOptions {
         pixel_center: config.pixel_center,
         min_segment_score: config.min_segment_score,
@@ -159,6 +161,7 @@ pub fn load_options(config: &DataConfig) -> LoadOptions {
         focal_scale: config.focal_scale,
         intrinsics_scale: config.intrinsics_scale,
         max_image_size: config.max_image_size,
+        cache_dir: cache.map(|cache| cache.dir().into()),
         ..LoadOptions::default()
     }
 }
@@ -203,7 +206,7 @@ mod tests {
 
         let mut config = Preset::Fast.config();
         let read = |config: &Config| {
-            let prepared = prepare_scene(dir.path(), config, None, None, &mut |_| {});
+            let prepared = prepare_scene(dir.path(), &mut config.clone(), None, None, &mut |_| {});
             prepared.unwrap().scene
         };
         let scaled = read(&config);
@@ -231,7 +234,7 @@ mod tests {
         write_scene(&scene, dir.path()).unwrap();
         let config = Preset::Fast.config();
         let read = |config: &Config, placed: Option<&SceneSphere>| {
-            prepare_scene(dir.path(), config, placed, None, &mut |_| {}).unwrap()
+            prepare_scene(dir.path(), &mut config.clone(), placed, None, &mut |_| {}).unwrap()
         };
         let first = read(&config, None);
         // The same sphere changes nothing, to the bit.

@@ -7,7 +7,6 @@ use crate::output;
 use crate::progress::Progress;
 use clap::Args;
 use neat_core::file;
-use neat_pipeline::background::fit_background;
 use neat_pipeline::compare_backends::compare_backends;
 use neat_pipeline::event::Event;
 use neat_pipeline::reconstruct::software_warning;
@@ -68,10 +67,15 @@ impl CompareBackendsArgs {
             }
         }
         let cache = self.cache.open();
-        let prepared = prepare_scene(&self.scene, &config, None, cache.as_ref(), &mut |event| {
-            progress.show(event);
-        })?;
-        fit_background(&mut config, &prepared.scene);
+        let prepared = prepare_scene(
+            &self.scene,
+            &mut config,
+            None,
+            cache.as_ref(),
+            &mut |event| {
+                progress.show(event);
+            },
+        )?;
         file::create_dir(&self.out)?;
         let comparison = compare_backends(
             &prepared.scene,

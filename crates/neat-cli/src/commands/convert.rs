@@ -6,7 +6,7 @@ use crate::output;
 use crate::scene_arguments::SceneArgs;
 use clap::{Args, ValueEnum};
 use neat_core::convert::{SceneFormat, convert};
-use neat_core::{LoadOptions, load_scene};
+use neat_core::load_scene;
 use std::path::PathBuf;
 
 /// Write a scene in another format
@@ -60,11 +60,7 @@ impl From<Format> for SceneFormat {
 
 impl ConvertArgs {
     pub fn run(self) -> Result<(), CliError> {
-        let options = LoadOptions {
-            require_wireframes: false,
-            cache_dir: self.cache.open().map(|cache| cache.dir().into()),
-            ..self.scene_args.load_options()
-        };
+        let options = self.scene_args.load_options(self.cache.open().as_ref());
         let loaded = load_scene(&self.scene, &options)?;
         for warning in &loaded.warnings {
             output::note(&format!("warning: {warning}"));

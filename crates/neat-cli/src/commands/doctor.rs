@@ -6,8 +6,8 @@ use crate::error::CliError;
 use crate::scene_arguments::SceneArgs;
 use crate::{duration, output};
 use clap::Args;
-use neat_core::{LoadOptions, Scene, load_scene};
-use neat_doctor::{Depth, Examination, ExamineOptions, Verdict, examine_folder};
+use neat_core::{Scene, load_scene};
+use neat_doctor::{Depth, Examination, ExamineOptions, Verdict, examine_folder, examine_loaded};
 use neat_pipeline::estimate::{Estimate, estimate, speed};
 use neat_pipeline::preset::Preset;
 use neat_tensor::Backend;
@@ -63,11 +63,7 @@ struct Report<'a> {
 
 impl DoctorArgs {
     pub fn run(self) -> Result<(), CliError> {
-        let options = LoadOptions {
-            require_wireframes: false,
-            cache_dir: self.cache.open().map(|cache| cache.dir().into()),
-            ..self.scene_args.load_options()
-        };
+        let options = self.scene_args.load_options(self.cache.open().as_ref());
         let depth = match self.quick {
             true => Depth::Quick,
             false => Depth::Full,
@@ -82,11 +78,13 @@ impl DoctorArgs {
             Backend::Wgpu => None,
             cpu => Some(speed(&cpu.device()?)),
         };
-        let examination = examine_folder(&self.scene, &options, &how);
-        // What cannot be read has been explained.
-        let costs = match load_scene(&self.scene, &options) {
-            Ok(loaded) => speed.map_or_else(Vec::new, |speed| costs(&loaded.scene, speed)),
-            Err(_) => Vec::new(),
+        let (examination, costs) = match load_scene(&self.scene, &options) {
+            Ok(loaded) => (
+                examine_loaded(&loaded, &options, &how),
+                speed.map_or_else(Vec::new, |speed| costs(&loaded.scene, speed)),
+            ),
+            // It explains what cannot be read.
+            Err(_) => (examine_folder(&self.scene, &options, &how), Vec::new()),
         };
         let text = match self.json {
             true => json(&examination, &costs)?,

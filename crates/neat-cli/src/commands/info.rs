@@ -42,8 +42,7 @@ impl InfoArgs {
     pub fn run(self) -> Result<(), CliError> {
         let options = LoadOptions {
             min_segment_score: self.min_score,
-            require_wireframes: false,
-            ..self.scene_args.load_options()
+            ..self.scene_args.load_options(None)
         };
         let loaded = load_scene(&self.scene, &options)?;
         output::print(&describe(&loaded, self.min_score))?;

@@ -1,16 +1,16 @@
 //! From a folder to a scene: poses, images and 2D wireframes, read alike for all
 //! layouts.
 
+use super::masks::{self, MaskFiles};
 use super::photograph::{self, Photograph};
 use super::poses::{self, PosedImage, Poses};
 use super::rectify::Rectification;
 use super::sphere::Evidence;
 use super::{
-    HAWP_DIR, Layout, LoadOptions, PixelCenter, SceneWarning, images, masks, pixel_center,
-    point_files,
+    HAWP_DIR, Layout, LoadOptions, PixelCenter, SceneWarning, images, pixel_center, point_files,
 };
 use crate::file_cache::FileCache;
-use crate::scene::{check_image_size, check_names};
+use crate::scene::{check_image_size, check_names, keep_observations};
 use crate::scene_sphere::SphereSource;
 use crate::{
     Camera, Observation, Scene, SceneError, SceneSphere, SparsePoint, View, ViewError, Wireframe2d,
@@ -128,7 +128,7 @@ pub(super) fn load_posed(
     warnings.extend(cache_warning(&photographs, options));
 
     let mut views = Vec::new();
-    // Where each view of the files is in `views`, if it is kept.
+    // Which views of the files are in `views`.
     let mut kept = Vec::new();
     for (((posed, rectification), photograph), wireframe) in
         rectified.into_iter().zip(photographs).zip(wireframes)
@@ -147,9 +147,9 @@ pub(super) fn load_posed(
                 view: view.name,
                 min_segment_score: options.min_segment_score,
             });
-            kept.push(None);
+            kept.push(false);
         } else {
-            kept.push(Some(views.len()));
+            kept.push(true);
             views.push(view);
         }
     }
@@ -167,14 +167,18 @@ pub(super) fn load_posed(
             let is_mirrored = convention.mirrored_world;
             point_files::read(dir, &cameras, &poses.original_from_world, is_mirrored)?
         }
-        false => observed_by(poses.points, &rectifications, &kept),
+        false => {
+            let mut points = rectified_points(poses.points, &rectifications);
+            keep_observations(&mut points, &kept);
+            points
+        }
     };
-    let images: Vec<PosedImage> = (poses.views.into_iter().zip(&kept))
-        .filter_map(|(image, kept)| kept.map(|_| image))
-        .collect();
+    let mut kept = kept.into_iter();
+    poses.views.retain(|_| kept.next() == Some(true));
+    let masks = masks::find(dir, &poses.views);
     let sphere = Evidence {
         dir,
-        images: &images,
+        masks: masks.as_ref(),
         cameras: &cameras,
         points: &points,
         declared_radius: poses.declared_radius,
@@ -183,7 +187,7 @@ pub(super) fn load_posed(
     if sphere.source == SphereSource::Unknown {
         warnings.push(SceneWarning::SphereUnknown);
     }
-    let files = input_files(dir, &poses.path, &images);
+    let files = input_files(dir, &poses.path, &poses.views, masks);
     let scene = Scene {
         name: scene_name(dir),
         views,
@@ -219,7 +223,12 @@ const BESIDE_POSES: [&str; 8] = [
 ];
 
 /// The files that a scene was read from, sorted.
-fn input_files(dir: &Path, poses: &Path, images: &[PosedImage]) -> Vec<PathBuf> {
+fn input_files(
+    dir: &Path,
+    poses: &Path,
+    images: &[PosedImage],
+    masks: Option<MaskFiles>,
+) -> Vec<PathBuf> {
     let hawp_dir = dir.join(HAWP_DIR);
     let mut files: Vec<PathBuf> = images.iter().map(|view| view.image.clone()).collect();
     files.extend(
@@ -235,11 +244,7 @@ fn input_files(dir: &Path, poses: &Path, images: &[PosedImage]) -> Vec<PathBuf> 
         files.extend(BESIDE_POSES.map(|name| poses.with_file_name(name)));
     }
     files.extend(BESIDE_POSES.map(|name| dir.join(name)));
-    files.extend(
-        masks::find(dir, images)
-            .into_iter()
-            .flat_map(|masks| masks.files),
-    );
+    files.extend(masks.into_iter().flat_map(|masks| masks.files));
     files.retain(|file| file.is_file());
     files.sort();
     files.dedup();
@@ -265,18 +270,7 @@ fn drop_missing_images(poses: &mut Poses) -> Result<Option<SceneWarning>, SceneE
         first: first.image.clone(),
         views: missing.len(),
     };
-    let mut next = 0..;
-    let new_index: Vec<Option<usize>> = (is_there.iter())
-        .map(|&is_there| is_there.then(|| next.next()).flatten())
-        .collect();
-    for point in &mut poses.points {
-        point.observations = (point.observations.iter())
-            .filter_map(|&Observation { view, pixel }| {
-                let view = (*new_index.get(view)?)?;
-                Some(Observation { view, pixel })
-            })
-            .collect();
-    }
+    keep_observations(&mut poses.points, &is_there);
     let mut is_there = is_there.into_iter();
     poses.views.retain(|_| is_there.next() == Some(true));
     Ok(Some(warning))
@@ -324,20 +318,15 @@ fn cache_warning(photographs: &[Photograph], options: &LoadOptions) -> Option<Sc
     Some(SceneWarning::NotCached { dir, reason })
 }
 
-/// `points` with the observations that the images of the kept views show, under
-/// their new indices.
-fn observed_by(
+/// `points` with their observations where the rectified images show them.
+fn rectified_points(
     mut points: Vec<SparsePoint>,
     rectifications: &[Rectification],
-    kept: &[Option<usize>],
 ) -> Vec<SparsePoint> {
     points.par_iter_mut().for_each(|point| {
         point.observations = (point.observations.iter())
-            .filter_map(|observation| {
-                let pixel = rectifications
-                    .get(observation.view)?
-                    .point(&observation.pixel)?;
-                let view = (*kept.get(observation.view)?)?;
+            .filter_map(|&Observation { view, pixel }| {
+                let pixel = rectifications.get(view)?.point(&pixel)?;
                 Some(Observation { view, pixel })
             })
             .collect();

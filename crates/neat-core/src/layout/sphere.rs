@@ -1,7 +1,6 @@
 //! Which evidence in a scene's folder places its sphere.
 
-use super::masks;
-use super::poses::PosedImage;
+use super::masks::{self, MaskFiles};
 use crate::scene_sphere::{
     Ball, SceneSphere, SphereChoice, SphereSource, from_cameras, from_masks, from_points,
     is_centered, visible_radius,
@@ -12,11 +11,11 @@ use std::path::Path;
 
 /// What there is to place a sphere by, in the world of the poses as read.
 pub(super) struct Evidence<'a> {
-    /// Folder of the scene, which may hold masks.
+    /// Folder of the scene, for messages.
     pub dir: &'a Path,
-    /// The views, as the files name them.
-    pub images: &'a [PosedImage],
-    /// Their cameras.
+    /// The masks of all views, if there are any.
+    pub masks: Option<&'a MaskFiles>,
+    /// The cameras of the views.
     pub cameras: &'a [Camera],
     /// Sparse points; empty where there are none.
     pub points: &'a [SparsePoint],
@@ -94,10 +93,10 @@ impl Evidence<'_> {
     }
 
     fn by_masks(&self) -> Result<Option<Ball>, SceneError> {
-        let Some(files) = masks::find(self.dir, self.images) else {
+        let Some(files) = self.masks else {
             return Ok(None);
         };
-        let masks = masks::read(&files)?;
+        let masks = masks::read(files)?;
         Ok(masks.and_then(|masks| from_masks(self.cameras, &masks)))
     }
 }

@@ -1,7 +1,6 @@
 //! A run in progress: its folder, its scene, and its manifest kept up to date.
 
 use super::RunOptions;
-use crate::background::fit_background;
 use crate::config::Config;
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage, timed};
@@ -47,16 +46,14 @@ impl<'a> Session<'a> {
             on_event(Event::Warning(warning.clone()));
         }
         let cache = options.cache.as_ref();
-        let prepared = {
-            let placed = earlier.as_ref().and_then(|e| e.sphere.as_ref());
-            prepare_scene(&scene_dir, &options.config, placed, cache, on_event)?
-        };
+        let placed = earlier.as_ref().and_then(|e| e.sphere.as_ref());
+        let mut config = options.config.clone();
+        let prepared = prepare_scene(&scene_dir, &mut config, placed, cache, on_event)?;
         warnings.extend(prepared.warnings);
         let mut seconds = prepared.seconds;
         if options.examine && options.existing != Existing::Resume {
-            let data = &options.config.data;
             let (found, time) = timed(on_event, Stage::Examine, |on_event| {
-                examine_quickly(&prepared.scene, data, on_event)
+                examine_quickly(&prepared.scene, &config.data, on_event)
             })?;
             warnings.extend(found);
             seconds.insert(Stage::Examine, time);
@@ -68,8 +65,6 @@ impl<'a> Session<'a> {
             warnings.push(warning);
         }
 
-        let mut config = options.config.clone();
-        fit_background(&mut config, &prepared.scene);
         let dir = RunDir::create(&options.out, options.existing)?;
         dir.write_config(&config)?;
         let now = utc_now();
@@ -231,11 +226,8 @@ fn read_run(
     }
     let manifest = dir.manifest()?;
     let scene_dir = scene.unwrap_or(&manifest.scene);
-    let prepared = {
-        let placed = manifest.sphere.as_ref();
-        prepare_scene(scene_dir, &config, placed, cache, on_event)?
-    };
-    fit_background(&mut config, &prepared.scene);
+    let placed = manifest.sphere.as_ref();
+    let prepared = prepare_scene(scene_dir, &mut config, placed, cache, on_event)?;
     let checkpoint = dir.read_latest_checkpoint()?;
     let field = TrainedField::load(&config, &checkpoint, &device)?;
     Ok(OpenedRun {
