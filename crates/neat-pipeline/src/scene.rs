@@ -131,7 +131,6 @@ pub fn examine_quickly(
         &ExamineOptions {
             depth: Depth::Quick,
             read_with: Repair::of(&load_options(config, None)),
-            ..ExamineOptions::default()
         },
     );
     let lines = |level: Level| -> Vec<String> {

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use neat_wireframe::Wireframe3d;
 use neat_wireframe::export::{
-    ExportError, WireframeDocument, read_json, write_json, write_obj, write_ply,
+    ExportError, SupportingSegment, WireframeDocument, read_json, write_json, write_obj, write_ply,
 };
 use neat_wireframe::validity::WireframeFlaw;
 use std::path::Path;
@@ -185,6 +185,15 @@ fn fields_and_metadata_read_back() {
     document.junction_fields.insert("votes".into(), votes);
     let views = vec![5.0, 6.0, 7.0];
     document.edge_fields.insert("visible_views".into(), views);
+    document.junction_covariances = vec![None; 4];
+    document.junction_covariances[1] = Some([1e-6, 0.1, -3e-9, 2.0, 0.0, 4.0]);
+    document.views = vec!["0000".into(), "0001".into()];
+    document.edge_support = vec![Vec::new(); 3];
+    document.edge_support[2].push(SupportingSegment {
+        view: 1,
+        segment: [0.1, -2.0, 1e3, 7.0],
+        residual: 0.25,
+    });
     write_json(&path, &document).unwrap();
     let read = read_json(&path).unwrap();
     assert_eq!(read, document);
@@ -194,10 +203,22 @@ fn fields_and_metadata_read_back() {
         document.edge_fields.insert("score".into(), bad);
         let error = write_json(&path, &document).unwrap_err().to_string();
         assert!(
-            error.contains("`score`") && error.contains("3 finite"),
+            error.contains("`score`") && error.contains("3 entries"),
             "{error}"
         );
     }
+    document.edge_fields.remove("score");
+
+    let mut without_view = document.clone();
+    without_view.views.pop();
+    let mut too_short = document.clone();
+    too_short.junction_covariances.pop();
+    let mut infinite = document.clone();
+    infinite.junction_covariances[0] = Some([f64::INFINITY; 6]);
+    for bad in [without_view, too_short, infinite] {
+        write_json(&path, &bad).unwrap_err();
+    }
+    write_json(&path, &document).unwrap();
 }
 
 #[test]

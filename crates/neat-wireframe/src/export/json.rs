@@ -16,7 +16,10 @@ use std::path::Path;
 ///   "junctions": [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]],
 ///   "edges": [[0, 1]],
 ///   "junction_fields": {"votes": [7.0, 5.0]},
-///   "edge_fields": {"visible_views": [12.0]}
+///   "edge_fields": {"visible_views": [12.0]},
+///   "junction_covariances": [[1e-6, 0.0, 0.0, 1e-6, 0.0, 4e-6], null],
+///   "views": ["0000", "0001"],
+///   "edge_support": [[{"view": 1, "segment": [10.0, 20.5, 80.25, 21.0], "residual": 0.3}]]
 /// }
 /// ```
 ///
@@ -38,6 +41,30 @@ pub struct WireframeDocument {
     /// Named numbers, one per edge.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub edge_fields: BTreeMap<String, Vec<f64>>,
+    /// The upper triangle `[xx, xy, xz, yy, yz, zz]` of every junction's
+    /// covariance in squared units of the user's frame; `None` where the
+    /// observations do not determine the position. Empty, or one per junction.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub junction_covariances: Vec<Option<[f64; 6]>>,
+    /// Names of the views that `edge_support` counts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub views: Vec<String>,
+    /// The 2D segments that support every edge. Empty, or one list per edge.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub edge_support: Vec<Vec<SupportingSegment>>,
+}
+
+/// A 2D segment of one view that supports an edge.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SupportingSegment {
+    /// Index into [`WireframeDocument::views`].
+    pub view: usize,
+    /// Its ends `[x, y, x, y]` in pixels of the undistorted image, in the order
+    /// of the edge's junctions.
+    pub segment: [f64; 4],
+    /// Root mean square distance of its two ends from the projected edge's line,
+    /// in pixels.
+    pub residual: f64,
 }
 
 impl WireframeDocument {
@@ -65,6 +92,32 @@ impl WireframeDocument {
                     of,
                 });
             }
+        }
+        let covariances = self.junction_covariances.iter().flatten();
+        let covariances_fit = self.junction_covariances.is_empty()
+            || self.junction_covariances.len() == self.junctions.len();
+        if !covariances_fit || covariances.flatten().any(|x| !x.is_finite()) {
+            return Err(ExportError::BadField {
+                path: path.into(),
+                field: "junction_covariances".into(),
+                expected: self.junctions.len(),
+                of: "junction",
+            });
+        }
+        let finite = |support: &SupportingSegment| {
+            support.view < self.views.len()
+                && support.residual.is_finite()
+                && support.segment.iter().all(|x| x.is_finite())
+        };
+        let support_fits =
+            self.edge_support.is_empty() || self.edge_support.len() == self.edges.len();
+        if !support_fits || !self.edge_support.iter().flatten().all(finite) {
+            return Err(ExportError::BadField {
+                path: path.into(),
+                field: "edge_support".into(),
+                expected: self.edges.len(),
+                of: "edge",
+            });
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ mod json;
 mod obj;
 mod ply;
 
-pub use json::{WireframeDocument, read_json, write_json};
+pub use json::{SupportingSegment, WireframeDocument, read_json, write_json};
 pub use obj::write_obj;
 pub use ply::write_ply;
 
@@ -28,8 +28,11 @@ pub enum ExportError {
         /// What is wrong.
         source: WireframeFlaw,
     },
-    /// An extra field does not hold one finite number per junction or edge.
-    #[error("{path}: the field `{field}` must hold {expected} finite numbers, one per {of}")]
+    /// An extra field does not hold one entry of finite numbers per junction or
+    /// edge, or names a view that does not exist.
+    #[error(
+        "{path}: the field `{field}` must hold {expected} entries of finite numbers, one per {of}"
+    )]
     BadField {
         /// The file.
         path: PathBuf,
