@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Settings of [`clean_up`]; lengths in world units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,7 +24,7 @@ impl Default for CleanupConfig {
     fn default() -> Self {
         Self {
             merge_distance: 0.015,
-            collinear_distance: 0.015,
+            collinear_distance: 0.006,
             end_margin: 0.02,
         }
     }
@@ -36,6 +36,8 @@ type EdgesByPair = BTreeMap<[usize; 2], SupportedEdge>;
 /// Merges near junctions, keeps either a long edge or its parts, and drops the
 /// junctions without edges.
 ///
+/// Junctions of a pair `[a, b]`, a < b, of `told_apart` stay two however near.
+///
 /// Indices in the result are those of the returned junctions; edges are sorted.
 ///
 /// # Panics
@@ -43,9 +45,10 @@ type EdgesByPair = BTreeMap<[usize; 2], SupportedEdge>;
 pub fn clean_up(
     junctions: &[Vector3<f64>],
     edges: &[SupportedEdge],
+    told_apart: &BTreeSet<[usize; 2]>,
     config: &CleanupConfig,
 ) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
-    let merging = Merging::new(junctions, edges, config.merge_distance);
+    let merging = Merging::new(junctions, edges, told_apart, config.merge_distance);
     let mut by_pair = merging.apply(edges);
     resolve_collinear(&mut by_pair, junctions, &merging.kept, config);
     drop_isolated(junctions, by_pair.into_values())
@@ -60,7 +63,12 @@ struct Merging {
 }
 
 impl Merging {
-    fn new(junctions: &[Vector3<f64>], edges: &[SupportedEdge], distance: f64) -> Self {
+    fn new(
+        junctions: &[Vector3<f64>],
+        edges: &[SupportedEdge],
+        told_apart: &BTreeSet<[usize; 2]>,
+        distance: f64,
+    ) -> Self {
         let mut support = vec![0; junctions.len()];
         for edge in edges {
             for junction in edge.junctions {
@@ -72,9 +80,11 @@ impl Merging {
         let mut kept: Vec<usize> = Vec::new();
         let mut representative: Vec<usize> = (0..junctions.len()).collect();
         for junction in order {
-            let near = kept
-                .iter()
-                .find(|other| (junctions[**other] - junctions[junction]).norm() < distance);
+            let near = kept.iter().find(|other| {
+                let pair = [junction.min(**other), junction.max(**other)];
+                (junctions[**other] - junctions[junction]).norm() < distance
+                    && !told_apart.contains(&pair)
+            });
             match near {
                 Some(other) => representative[junction] = *other,
                 None => kept.push(junction),
@@ -206,7 +216,12 @@ mod tests {
     type Graph = (Vec<Vector3<f64>>, Vec<([usize; 2], usize)>);
 
     fn cleaned(junctions: &[Vector3<f64>], edges: &[SupportedEdge]) -> Graph {
-        let (junctions, edges) = clean_up(junctions, edges, &CleanupConfig::default());
+        let (junctions, edges) = clean_up(
+            junctions,
+            edges,
+            &BTreeSet::new(),
+            &CleanupConfig::default(),
+        );
         let edges = edges.iter().map(|e| (e.junctions, e.support)).collect();
         (junctions, edges)
     }
@@ -240,7 +255,7 @@ mod tests {
 
     #[test]
     fn a_junction_where_nothing_else_hangs_goes() {
-        let junctions = [at(0.0, 0.0), at(1.0, 0.0), at(0.5, 0.01)];
+        let junctions = [at(0.0, 0.0), at(1.0, 0.0), at(0.5, 0.004)];
         let edges = [edge(0, 1, 5), edge(0, 2, 8), edge(1, 2, 8)];
         assert_eq!(
             cleaned(&junctions, &edges),

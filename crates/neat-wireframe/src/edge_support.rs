@@ -21,6 +21,9 @@ pub struct EdgeSupportConfig {
     pub min_required_views: usize,
     /// … and never more than this.
     pub max_required_views: usize,
+    /// Share of an edge's supporting views in which a detection must fit it
+    /// better than any other edge.
+    pub min_exclusive_share: f64,
 }
 
 impl Default for EdgeSupportConfig {
@@ -31,6 +34,7 @@ impl Default for EdgeSupportConfig {
             required_share_of_views: 0.2,
             min_required_views: 2,
             max_required_views: 5,
+            min_exclusive_share: 0.5,
         }
     }
 }

@@ -14,12 +14,15 @@ use crate::attraction_hypotheses::{AttractionHypothesesConfig, attraction_hypoth
 use crate::bundle_adjustment::{BundleAdjustmentConfig, bundle_adjust};
 use crate::cleanup::{CleanupConfig, clean_up};
 use crate::edge_completion::complete_edges;
+use crate::edge_splitting::{EdgeSplittingConfig, split_edges};
 use crate::edge_support::{EdgeSupportConfig, SupportedEdge, edge_support};
 use crate::evidence::Evidence;
+use crate::exclusive_support::exclusively_supported;
 use crate::junction_modes::{JunctionModesConfig, junction_modes, supported_junctions};
+use crate::junction_splitting::{JunctionSplittingConfig, SplitJunctions, split_junctions};
 use crate::occlusion::{OcclusionConfig, visible_views};
 use crate::segment_ends::{SegmentEndConfig, segment_ends};
-use crate::triangulation::{TriangulationConfig, retriangulate};
+use crate::triangulation::{TriangulationConfig, associate, retriangulate};
 use crate::{SegmentProposal, SignedDistance, ViewObservation};
 use nalgebra::Vector3;
 use neat_core::Wireframe3d;
@@ -35,20 +38,28 @@ pub struct FastBackEndConfig {
     pub use_perceived_junctions: bool,
     /// Re-estimate the junctions from the 2D ends.
     pub retriangulation: bool,
+    /// Split junctions that views show side by side.
+    pub junction_splitting: bool,
     /// Test all pairs of junctions as edges; off: those that proposals suggest.
     pub edge_completion: bool,
+    /// Count every detection for the edge that it fits best, not for all.
+    pub exclusive_support: bool,
     /// Move all junctions until the projected edges lie on the detections.
     pub bundle_adjustment: bool,
     /// Drop edges supported in too few of the views in which they are visible.
     pub occlusion_test: bool,
     /// Merge near junctions and collinear edges, drop isolated junctions.
     pub cleanup: bool,
+    /// Split edges where others end on them or cross them.
+    pub edge_splitting: bool,
     /// Which segment ends count, and how much.
     pub ends: SegmentEndConfig,
     /// Constants of the junction candidates.
     pub modes: JunctionModesConfig,
     /// Constants of the re-triangulation.
     pub triangulation: TriangulationConfig,
+    /// Constants of the splitting.
+    pub splitting: JunctionSplittingConfig,
     /// Constants of the edges that proposals suggest.
     pub attraction: AttractionHypothesesConfig,
     /// When views support an edge.
@@ -59,6 +70,8 @@ pub struct FastBackEndConfig {
     pub occlusion: OcclusionConfig,
     /// Constants of the clean-up.
     pub merging: CleanupConfig,
+    /// Constants of the splitting of edges.
+    pub crossings: EdgeSplittingConfig,
 }
 
 impl Default for FastBackEndConfig {
@@ -67,18 +80,23 @@ impl Default for FastBackEndConfig {
             use_junction_modes: true,
             use_perceived_junctions: true,
             retriangulation: true,
+            junction_splitting: true,
             edge_completion: true,
+            exclusive_support: true,
             bundle_adjustment: true,
             occlusion_test: true,
             cleanup: true,
+            edge_splitting: true,
             ends: SegmentEndConfig::default(),
             modes: JunctionModesConfig::default(),
             triangulation: TriangulationConfig::default(),
+            splitting: JunctionSplittingConfig::default(),
             attraction: AttractionHypothesesConfig::default(),
             support: EdgeSupportConfig::default(),
             adjustment: BundleAdjustmentConfig::default(),
             occlusion: OcclusionConfig::default(),
             merging: CleanupConfig::default(),
+            crossings: EdgeSplittingConfig::default(),
         }
     }
 }
@@ -125,6 +143,8 @@ pub struct FastBackEndReport {
     pub added_perceived_junctions: usize,
     /// Junctions after re-triangulation.
     pub triangulated_junctions: usize,
+    /// Junctions split off from these.
+    pub split_junctions: usize,
     /// Edges with enough support before any bundle adjustment.
     pub supported_edges: usize,
     /// Edges with enough support after it.
@@ -214,7 +234,7 @@ impl BackEnd<'_> {
         &self,
         perceived: &[Vector3<f64>],
         report: &mut FastBackEndReport,
-    ) -> Vec<Vector3<f64>> {
+    ) -> SplitJunctions {
         let config = self.config;
         let ends = segment_ends(self.views, self.proposals, &config.ends);
         report.segment_ends = ends.len();
@@ -239,14 +259,36 @@ impl BackEnd<'_> {
             );
         }
         report.triangulated_junctions = junctions.len();
-        junctions
+        let mut split = SplitJunctions {
+            junctions,
+            ..SplitJunctions::default()
+        };
+        if let (true, Some(round)) = (
+            config.junction_splitting,
+            config.triangulation.rounds.first(),
+        ) {
+            let observations = associate(&split.junctions, &ends, self.views, round);
+            split = split_junctions(
+                &split.junctions,
+                &observations,
+                self.views,
+                self.required_views,
+                &config.triangulation,
+                &config.splitting,
+            );
+        }
+        report.split_junctions = split.junctions.len() - report.triangulated_junctions;
+        split
     }
 
     /// The edges that the evidence confirms, with the junctions where it puts
     /// them.
     fn find_edges(
         &self,
-        mut junctions: Vec<Vector3<f64>>,
+        SplitJunctions {
+            mut junctions,
+            told_apart,
+        }: SplitJunctions,
         report: &mut FastBackEndReport,
     ) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
         let config = self.config;
@@ -272,11 +314,14 @@ impl BackEnd<'_> {
         report.unoccluded_edges = edges.len();
 
         if config.cleanup {
-            (junctions, edges) = clean_up(&junctions, &edges, &config.merging);
+            (junctions, edges) = clean_up(&junctions, &edges, &told_apart, &config.merging);
         }
         if config.bundle_adjustment {
             let association = config.adjustment.final_association_in_pixels;
             junctions = self.adjust(&junctions, &edges, association);
+        }
+        if config.edge_splitting {
+            (junctions, edges) = split_edges(&junctions, &edges, &config.crossings);
         }
         (junctions, edges)
     }
@@ -288,12 +333,20 @@ impl BackEnd<'_> {
         hypotheses: Option<Vec<[usize; 2]>>,
     ) -> Vec<SupportedEdge> {
         let config = &self.config.support;
-        let Some(hypotheses) = hypotheses else {
-            return complete_edges(self.views, junctions, self.required_views, config);
+        let required = self.required_views;
+        let edges = match hypotheses {
+            None => complete_edges(self.views, junctions, required, config),
+            Some(hypotheses) => {
+                let mut edges = edge_support(self.views, junctions, &hypotheses, config);
+                edges.retain(|edge| edge.support >= required);
+                edges
+            }
         };
-        let mut edges = edge_support(self.views, junctions, &hypotheses, config);
-        edges.retain(|edge| edge.support >= self.required_views);
-        edges
+        if self.config.exclusive_support {
+            exclusively_supported(self.views, junctions, &edges, required, config)
+        } else {
+            edges
+        }
     }
 
     fn adjust(

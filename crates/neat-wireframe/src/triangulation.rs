@@ -168,7 +168,7 @@ struct Candidate {
 }
 
 /// The observations of every junction: the 2D ends of the segment ends near it.
-fn associate(
+pub(crate) fn associate(
     junctions: &[Vector3<f64>],
     ends: &[SegmentEnd],
     views: &[ViewObservation],
