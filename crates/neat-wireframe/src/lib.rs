@@ -30,6 +30,7 @@ pub mod robust_segments;
 pub mod segment_ends;
 pub mod segment_matching;
 pub mod signed_distance;
+pub mod supported_truth;
 pub mod triangulation;
 pub mod validity;
 pub mod visibility;
