@@ -3,13 +3,13 @@
 use crate::output;
 use neat_core::SceneError;
 use neat_core::synthetic::SyntheticError;
+use neat_eval::EvalError;
 use neat_pipeline::compare_backends::CompareError;
 use neat_pipeline::error::PipelineError;
 use neat_pipeline::overrides::OverrideError;
 use neat_pipeline::run_dir::RunDirError;
 use neat_pipeline::trainer::TrainError;
 use neat_tensor::BackendError;
-use neat_wireframe::metrics::MetricsError;
 use std::error::Error;
 use std::process::ExitCode;
 
@@ -40,6 +40,9 @@ pub enum CliError {
         /// What there is.
         known: String,
     },
+    /// Options that do not go together.
+    #[error("{0}")]
+    Usage(String),
     /// A scene with problems, which have been printed.
     #[error("the scene is not ready: solve its problems first")]
     NotReady,
@@ -71,7 +74,7 @@ through_pipeline!(
     BackendError,
     TrainError,
     SyntheticError,
-    MetricsError
+    EvalError
 );
 
 impl CliError {
@@ -91,9 +94,11 @@ impl CliError {
         match self {
             Self::Pipeline(PipelineError::Interrupted { .. }) => INTERRUPTED,
             Self::Pipeline(error) if error.is_bad_input() => BAD_INPUT,
-            Self::Override(_) | Self::UnknownView { .. } | Self::Threads(_) | Self::NotReady => {
-                BAD_INPUT
-            }
+            Self::Override(_)
+            | Self::UnknownView { .. }
+            | Self::Usage(_)
+            | Self::Threads(_)
+            | Self::NotReady => BAD_INPUT,
             // `neat info SCENE | head` is no failure.
             Self::Output(_) if self.is_closed_pipe() => 0,
             _ => FAILED,

@@ -332,4 +332,11 @@ fn wrong_files_for_evaluation() {
     ]);
     assert!(stderr(&command.assert().code(2)).contains("cloud.ply"));
     neat(&["eval", "--pred", &truth]).assert().code(2);
+    let eval = |arguments: &[&str]| {
+        let mut command = neat(&["eval", "--pred", &truth, "--gt", &truth]);
+        stderr(&command.args(arguments).assert().code(2))
+    };
+    assert!(eval(&["--protocol", "best"]).contains("neat-abc"));
+    assert!(eval(&["--protocol", "limap-tnt"]).contains("--points"));
+    assert!(eval(&["--plane", "Plane24.mat"]).contains("no meaning for neat-abc"));
 }

@@ -131,7 +131,18 @@ fn eval_prints_and_saves_scores() {
         "{table}"
     );
     let scores = json(&scene.file("scores.json"));
-    assert_eq!(scores["wireframe"]["segments_max"][0]["recall"], 1.0);
+    assert_eq!(scores[0]["protocol"], "neat-abc");
+    let segments = &scores[0]["scores"]["wireframe"]["segments_max"];
+    assert_eq!(segments[0]["recall"], 1.0);
+    let all = "neat-abc,emap,curve-gaussian,edge-gaussians,nef,hss,wed";
+    let assert = neat(&["eval", "--pred", &truth, "--gt", &truth])
+        .args(["--protocol", all, "--format", "markdown"])
+        .assert()
+        .success();
+    let tables = stdout(&assert);
+    for protocol in all.split(',') {
+        assert!(tables.contains(&format!("{protocol}: ")), "{tables}");
+    }
 
     let cloud = scene.file("cloud.ply");
     let header = "ply\nformat ascii 1.0\nelement vertex 1\n\
@@ -177,7 +188,7 @@ fn demo_goes_all_the_way() {
     assert!(stdout(&assert).contains("junctions"));
     assert!(scene.file("demo/scene/gt_wireframe.json").exists());
     assert!(scene.file("demo/run/wireframe.json").exists());
-    assert!(json(&scene.file("demo/evaluation.json"))["wireframe"].is_object());
+    assert!(json(&scene.file("demo/evaluation.json"))["scores"]["wireframe"].is_object());
 
     demo().assert().code(2);
     demo().arg("--overwrite").assert().success();

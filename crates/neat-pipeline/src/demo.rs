@@ -5,11 +5,11 @@ use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage, timed};
 use crate::reconstruct::{Reconstruction, RunOptions, reconstruct};
 use crate::run_dir::{Existing, RunDir};
+use neat_core::SceneError;
 use neat_core::ground_truth::{GroundTruth, write_ground_truth};
 use neat_core::layout::abc;
 use neat_core::synthetic::{SyntheticScene, generate};
-use neat_core::{SceneError, file};
-use neat_wireframe::metrics::{Evaluation, EvaluationConfig};
+use neat_eval::{EvaluationReport, NeatAbc, Scores};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -23,7 +23,7 @@ pub struct Demo {
     /// What was reconstructed.
     pub reconstruction: Reconstruction,
     /// How good it is.
-    pub evaluation: Evaluation,
+    pub evaluation: EvaluationReport,
     /// Where that is written, as JSON.
     pub evaluation_file: PathBuf,
 }
@@ -78,10 +78,11 @@ pub fn demo(
     })?;
     let reconstruction = reconstruct(&options, cancelled, on_event)?;
     let (evaluation, _) = timed(on_event, Stage::Evaluate, |_| {
-        let metrics = EvaluationConfig::default();
-        Ok(metrics.evaluate(&reconstruction.wireframe, Some(&truth.wireframe), None)?)
+        let scores =
+            NeatAbc::default().evaluate(&reconstruction.wireframe, None, &truth.wireframe)?;
+        Ok(EvaluationReport::new(Scores::NeatAbc(scores)))
     })?;
-    write_evaluation(&evaluation_file, &evaluation)?;
+    evaluation.write_json(&evaluation_file)?;
     on_event(Event::FileWritten(evaluation_file.clone()));
     Ok(Demo {
         reconstruction,
@@ -103,16 +104,4 @@ fn remove_earlier_demo(out: &Path) -> Result<(), PipelineError> {
         source,
     })?;
     Ok(())
-}
-
-/// Writes an evaluation as JSON.
-///
-/// # Errors
-/// If the file cannot be written.
-pub fn write_evaluation(path: &Path, evaluation: &Evaluation) -> Result<(), SceneError> {
-    let json = serde_json::to_vec_pretty(evaluation).map_err(|error| SceneError::Write {
-        path: path.into(),
-        source: error.into(),
-    })?;
-    file::write_atomically(path, &json)
 }

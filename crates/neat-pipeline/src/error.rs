@@ -5,10 +5,10 @@ use crate::run_dir::RunDirError;
 use crate::trainer::TrainError;
 use neat_core::SceneError;
 use neat_core::synthetic::SyntheticError;
+use neat_eval::EvalError;
 use neat_tensor::BackendError;
 use neat_tensor::checkpoint::CheckpointError;
 use neat_wireframe::export::ExportError;
-use neat_wireframe::metrics::MetricsError;
 use std::path::PathBuf;
 
 /// Why a run did not finish.
@@ -48,7 +48,7 @@ pub enum PipelineError {
     Export(#[from] ExportError),
     /// A result could not be measured.
     #[error(transparent)]
-    Metrics(#[from] MetricsError),
+    Evaluation(#[from] EvalError),
     /// A person stopped the run.
     #[error("interrupted after step {step}: {checkpoint} holds the state")]
     Interrupted {
@@ -73,7 +73,7 @@ impl PipelineError {
             | Self::Backend(_)
             | Self::SceneDirNotEmpty(_)
             | Self::Synthetic(_)
-            | Self::Metrics(_)
+            | Self::Evaluation(_)
             | Self::Detector(_)
             | Self::NotReady(_) => true,
             Self::Train(error) => matches!(

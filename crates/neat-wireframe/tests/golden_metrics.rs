@@ -3,13 +3,12 @@
 mod golden;
 
 use golden::{Geometry, Golden};
-use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use neat_wireframe::Wireframe3d;
 use neat_wireframe::distance_matrix::DistanceMatrix;
 use neat_wireframe::metrics::{
-    EvaluationConfig, Matching, PointCloud, SegmentDistance, junction_distances,
-    mean_nearest_distance, precision_recall, sample_segments, segment_distances,
+    Matching, PointCloud, SegmentDistance, junction_distances, mean_nearest_distance,
+    precision_recall, sample_segments, segment_distances,
 };
 
 /// Float64 on both sides: only the order of additions differs.
@@ -131,57 +130,4 @@ fn accuracy_and_completeness() {
         let completeness = mean_nearest_distance(&surface, &samples, 20.0).unwrap();
         assert_close(&[completeness], &expected("comp_lines"), set);
     }
-}
-
-/// The same numbers through the whole evaluation of a graph with shared ends.
-#[test]
-fn evaluation_of_a_graph() {
-    let case = Case::read();
-    let surface = case.golden.points("surface_points");
-    for set in ["A", "B"] {
-        let graph = graph_of(&case.golden.segments(&format!("{set}/lines")));
-        let expected = |name: &str| case.golden.numbers(&format!("{set}/{name}"));
-        assert_eq!(
-            graph.junctions.len() as f64,
-            expected("n_unique_endpoints")[0]
-        );
-        let evaluation = EvaluationConfig::default()
-            .evaluate(&graph, Some(&case.truth), Some(&surface))
-            .unwrap();
-        let scores = evaluation.wireframe.unwrap();
-        let recall: Vec<f64> = scores.segments_max.iter().map(|s| s.recall).collect();
-        assert_close(&recall, &expected("lines_max/recall"), set);
-        let surface = evaluation.surface.unwrap();
-        let accuracy = [
-            surface.junction_accuracy.unwrap(),
-            surface.segment_accuracy.unwrap(),
-        ];
-        assert_close(
-            &accuracy,
-            &[
-                expected("acc_junctions_unique_endpoints")[0],
-                expected("acc_lines")[0],
-            ],
-            set,
-        );
-    }
-}
-
-/// Segments whose ends are equal share a junction.
-fn graph_of(segments: &[LineSegment3]) -> Wireframe3d {
-    let mut junctions: Vec<Vector3<f64>> = Vec::new();
-    let mut index = |point: Vector3<f64>| {
-        junctions
-            .iter()
-            .position(|p| *p == point)
-            .unwrap_or_else(|| {
-                junctions.push(point);
-                junctions.len() - 1
-            })
-    };
-    let edges = segments
-        .iter()
-        .map(|s| [index(s.start), index(s.end)])
-        .collect();
-    Wireframe3d { junctions, edges }
 }

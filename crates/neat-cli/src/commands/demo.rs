@@ -64,7 +64,7 @@ impl DemoArgs {
         output::print(&format!(
             "{}\n\n{}\nall numbers: {}",
             summary(&demo.reconstruction),
-            demo.evaluation.to_markdown(),
+            demo.evaluation.to_text(),
             demo.evaluation_file.display(),
         ))
     }

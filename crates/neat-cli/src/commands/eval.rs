@@ -3,54 +3,84 @@
 use crate::arguments::positive;
 use crate::error::CliError;
 use crate::output;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use neat_core::ground_truth::read_wireframe;
+use neat_core::file;
+use neat_core::ground_truth::GroundTruth;
 use neat_core::point_cloud::read_ply;
-use neat_pipeline::demo::write_evaluation;
-use neat_wireframe::metrics::{EvaluationConfig, Matching};
+use neat_eval::{
+    EdgeModel, EdgePointScores, EdgePoints, EditDistance, EvalError, EvaluationReport, GroundPlane,
+    LimapLength, NeatAbc, NeatSurface, ObservationMask, Protocol, ScannedSurface, Scores,
+    StructureScore, foreign,
+};
+use neat_wireframe::metrics::Matching;
 use std::path::PathBuf;
 
-/// Measure a wireframe against the truth, or against a point cloud
+/// Measure a wireframe against the truth or a scanned surface, by a published protocol
 ///
-/// Prints precision and recall of junctions and of segments (by the larger and by the mean
-/// distance of their ends) at every threshold, and with --points the mean distance to the
-/// cloud (ACC). Everything must be in one frame and unit.
+/// Without --protocol, a true wireframe asks for neat-abc and points for neat-blended-mvs.
+/// Everything must be in one frame and unit: that of the protocol, where it names one.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   neat eval --pred RUN/wireframe.json --gt SCENE/gt_wireframe.json
   neat eval --pred RUN/wireframe.json --points scan.ply --json scores.json
+  neat eval --pred parametric_edges.json --gt gt_wireframe.json --protocol emap,edge-gaussians
+  neat eval --pred RUN/wireframe.json --points stl024_total.ply --protocol neat-dtu \\
+      --obs-mask ObsMask24_10.mat --plane Plane24.mat
 
-Both files are JSON with `junctions` [[x, y, z], ...] and `edges` or `lines` [[i, j], ...].")]
+Results and truths are wireframe.json, parametric_edges.json (EMAP), .obj, .ply with edges, the
+.npz of the published NEAT, LIMAP's .npy, and Line3D++'s .txt.")]
 pub struct EvalArgs {
-    /// Wireframe to measure
+    /// Result to measure
     #[arg(long, value_name = "FILE")]
     pred: PathBuf,
+    /// The same result before its visibility check (neat-abc)
+    #[arg(long, value_name = "FILE")]
+    before: Option<PathBuf>,
     /// True wireframe
     #[arg(long, value_name = "FILE", required_unless_present = "points")]
     gt: Option<PathBuf>,
     /// Points on the true surface, as PLY
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
-    /// Distances at which precision and recall are taken, in the unit of the files
-    #[arg(long, value_name = "D,D,...", value_delimiter = ',', value_parser = positive, default_value = "0.01,0.02,0.05")]
-    thresholds: Vec<f64>,
-    /// How predictions are paired with the truth
+    /// How to measure; several with commas
+    #[arg(long = "protocol", value_name = "NAME,...", value_delimiter = ',', value_parser = protocol_parser())]
+    protocols: Vec<Protocol>,
+    /// Cells that DTU's scanner saw, ObsMaskN_10.mat (neat-dtu)
+    #[arg(long, value_name = "FILE")]
+    obs_mask: Option<PathBuf>,
+    /// Plane of DTU's table, PlaneN.mat (neat-dtu)
+    #[arg(long, value_name = "FILE")]
+    plane: Option<PathBuf>,
+    /// Distances at which shares are taken instead of the protocol's
+    #[arg(long, value_name = "D,D,...", value_delimiter = ',', value_parser = positive)]
+    thresholds: Option<Vec<f64>>,
+    /// How predictions are paired with the truth (neat-abc)
+    #[arg(long, value_enum)]
+    matching: Option<MatchingArg>,
+    /// Distances to the surface that are this long or longer are ignored (neat-dtu, neat-blended-mvs)
+    #[arg(long, value_name = "D", value_parser = positive)]
+    max_distance: Option<f64>,
+    /// Size of the normalised object by that of its CAD model, whose unit the published sampling
+    /// of the truth has (emap, curve-gaussian, edge-gaussians)
+    #[arg(long, value_name = "S", value_parser = positive)]
+    truth_scale: Option<f64>,
+    /// Seed of what is random: the thinning of neat-dtu and the volumes of hss
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// How to print
     #[arg(long, value_enum, default_value_t)]
-    matching: MatchingArg,
-    /// Distances to the cloud that are this long or longer are ignored
-    #[arg(long, value_name = "D", value_parser = positive, default_value_t = EvaluationConfig::default().max_surface_distance)]
-    max_distance: f64,
-    /// Write all numbers to this file too
+    format: Format,
+    /// Write all numbers to this file too: a list with one report per protocol
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
 
 /// How predictions are paired with the truth.
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum MatchingArg {
     /// One pairing with the smallest sum of distances, as in the published evaluation
-    #[default]
     MinimumSum,
     /// The largest pairing at each threshold
     PerThreshold,
@@ -65,21 +95,231 @@ impl From<MatchingArg> for Matching {
     }
 }
 
+/// How reports are printed.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum Format {
+    /// Aligned columns
+    #[default]
+    Text,
+    /// Tables for documents
+    Markdown,
+    /// What --json writes
+    Json,
+}
+
+fn protocol_parser() -> impl TypedValueParser<Value = Protocol> {
+    let values = Protocol::ALL
+        .map(|protocol| PossibleValue::new(protocol.name()).help(protocol.explanation()));
+    PossibleValuesParser::new(values).try_map(|name| name.parse::<Protocol>())
+}
+
+/// What the protocols are given.
+struct Inputs {
+    predicted: EdgeModel,
+    before: Option<EdgeModel>,
+    truth: GroundTruth,
+    surface: ScannedSurface,
+}
+
 impl EvalArgs {
     pub fn run(self) -> Result<(), CliError> {
-        let predicted = read_wireframe(&self.pred)?;
-        let truth = self.gt.as_deref().map(read_wireframe).transpose()?;
-        let surface = self.points.as_deref().map(read_ply).transpose()?;
-        let config = EvaluationConfig {
-            thresholds: self.thresholds,
-            matching: self.matching.into(),
-            max_surface_distance: self.max_distance,
-            ..EvaluationConfig::default()
+        let protocols = self.protocols();
+        self.check(&protocols)?;
+        let inputs = self.read()?;
+        let reports = protocols
+            .iter()
+            .map(|protocol| Ok(EvaluationReport::new(self.scores(*protocol, &inputs)?)))
+            .collect::<Result<Vec<_>, EvalError>>()?;
+        let json = || {
+            let texts: Vec<String> = reports.iter().map(EvaluationReport::to_json).collect();
+            format!("[\n{}\n]\n", texts.join(",\n"))
         };
-        let evaluation = config.evaluate(&predicted, truth.as_ref(), surface.as_deref())?;
         if let Some(path) = &self.json {
-            write_evaluation(path, &evaluation)?;
+            file::write_atomically(path, json().as_bytes())?;
         }
-        output::print(&evaluation.to_markdown())
+        let join = |print: fn(&EvaluationReport) -> String| {
+            let texts: Vec<String> = reports.iter().map(print).collect();
+            texts.join("\n")
+        };
+        output::print(&match self.format {
+            Format::Text => join(EvaluationReport::to_text),
+            Format::Markdown => join(EvaluationReport::to_markdown),
+            Format::Json => json(),
+        })
+    }
+
+    /// Those asked for, or those that the truth suggests.
+    fn protocols(&self) -> Vec<Protocol> {
+        if !self.protocols.is_empty() {
+            return self.protocols.clone();
+        }
+        let for_wireframe = self.gt.is_some().then_some(Protocol::NeatAbc);
+        let for_points = self.points.is_some().then_some(Protocol::NeatBlendedMvs);
+        for_wireframe.into_iter().chain(for_points).collect()
+    }
+
+    /// Refuses what is missing, and options that no protocol would look at.
+    fn check(&self, protocols: &[Protocol]) -> Result<(), CliError> {
+        let usage = |message: String| Err(CliError::Usage(message));
+        for protocol in protocols {
+            if protocol.needs_surface() && self.points.is_none() {
+                return usage(format!(
+                    "{protocol} measures against a surface: give --points"
+                ));
+            }
+            if !protocol.needs_surface() && self.gt.is_none() {
+                return usage(format!(
+                    "{protocol} measures against a wireframe: give --gt"
+                ));
+            }
+        }
+        let any = |wanted: &[Protocol]| protocols.iter().any(|p| wanted.contains(p));
+        if any(&[Protocol::NeatDtu]) && (self.obs_mask.is_none() || self.plane.is_none()) {
+            return usage(
+                "neat-dtu needs --obs-mask and --plane; neat-blended-mvs does without".into(),
+            );
+        }
+        let sampled = [
+            Protocol::Emap,
+            Protocol::CurveGaussian,
+            Protocol::EdgeGaussians,
+        ];
+        let surfaces = [Protocol::NeatDtu, Protocol::NeatBlendedMvs];
+        let without_thresholds =
+            |p: &Protocol| surfaces.contains(p) || matches!(p, Protocol::Hss | Protocol::Wed);
+        for (option, given, is_used) in [
+            ("--before", self.before.is_some(), any(&[Protocol::NeatAbc])),
+            (
+                "--matching",
+                self.matching.is_some(),
+                any(&[Protocol::NeatAbc]),
+            ),
+            (
+                "--obs-mask",
+                self.obs_mask.is_some(),
+                any(&[Protocol::NeatDtu]),
+            ),
+            ("--plane", self.plane.is_some(), any(&[Protocol::NeatDtu])),
+            (
+                "--max-distance",
+                self.max_distance.is_some(),
+                any(&surfaces),
+            ),
+            ("--truth-scale", self.truth_scale.is_some(), any(&sampled)),
+            (
+                "--thresholds",
+                self.thresholds.is_some(),
+                !protocols.iter().all(without_thresholds),
+            ),
+        ] {
+            if given && !is_used {
+                let names: Vec<&str> = protocols.iter().map(|p| p.name()).collect();
+                return usage(format!("{option} has no meaning for {}", names.join(", ")));
+            }
+        }
+        Ok(())
+    }
+
+    fn read(&self) -> Result<Inputs, EvalError> {
+        let mut surface = ScannedSurface::default();
+        if let Some(points) = &self.points {
+            surface.points = read_ply(points)?;
+        }
+        if let Some(mask) = &self.obs_mask {
+            surface.mask = Some(ObservationMask::read(mask)?);
+        }
+        if let Some(plane) = &self.plane {
+            surface.ground_plane = Some(GroundPlane::read(plane)?);
+        }
+        let truth = self.gt.as_deref().map(foreign::read_truth).transpose()?;
+        Ok(Inputs {
+            predicted: foreign::read(&self.pred)?,
+            before: self.before.as_deref().map(foreign::read).transpose()?,
+            truth: truth.unwrap_or_default(),
+            surface,
+        })
+    }
+
+    fn scores(&self, protocol: Protocol, inputs: &Inputs) -> Result<Scores, EvalError> {
+        let predicted = &inputs.predicted.wireframe;
+        let truth = &inputs.truth.wireframe;
+        Ok(match protocol {
+            Protocol::NeatAbc => {
+                let mut neat = NeatAbc::default();
+                replace(&mut neat.thresholds, &self.thresholds);
+                replace(&mut neat.matching, &self.matching.map(Matching::from));
+                let before = inputs.before.as_ref().map(|model| &model.wireframe);
+                Scores::NeatAbc(neat.evaluate(predicted, before, truth)?)
+            }
+            Protocol::NeatDtu => {
+                let neat = self.surface_protocol(NeatSurface::dtu());
+                Scores::NeatDtu(neat.evaluate(predicted, &inputs.surface)?)
+            }
+            Protocol::NeatBlendedMvs => {
+                let neat = self.surface_protocol(NeatSurface::blended_mvs());
+                // Not part of this protocol, even if given for another one.
+                let surface = ScannedSurface {
+                    points: inputs.surface.points.clone(),
+                    ..ScannedSurface::default()
+                };
+                Scores::NeatBlendedMvs(neat.evaluate(predicted, &surface)?)
+            }
+            Protocol::Emap => Scores::Emap(self.edge_points(EdgePoints::emap(), inputs)?),
+            Protocol::CurveGaussian => {
+                Scores::CurveGaussian(self.edge_points(EdgePoints::curve_gaussian(), inputs)?)
+            }
+            Protocol::EdgeGaussians => {
+                Scores::EdgeGaussians(self.edge_points(EdgePoints::edge_gaussians(), inputs)?)
+            }
+            Protocol::Nef => Scores::Nef(self.edge_points(EdgePoints::nef(), inputs)?),
+            Protocol::LimapHypersim | Protocol::LimapTnt => {
+                let is_hypersim = protocol == Protocol::LimapHypersim;
+                let mut limap = if is_hypersim {
+                    LimapLength::hypersim()
+                } else {
+                    LimapLength::tanks_and_temples()
+                };
+                replace(&mut limap.thresholds, &self.thresholds);
+                let scores = limap.evaluate(&predicted.segments(), &inputs.surface.points)?;
+                if is_hypersim {
+                    Scores::LimapHypersim(scores)
+                } else {
+                    Scores::LimapTnt(scores)
+                }
+            }
+            Protocol::Hss => {
+                let hss = StructureScore {
+                    seed: self.seed,
+                    ..StructureScore::default()
+                };
+                Scores::Hss(hss.evaluate(predicted, truth)?)
+            }
+            Protocol::Wed => Scores::Wed(EditDistance::default().evaluate(predicted, truth)?),
+        })
+    }
+
+    fn surface_protocol(&self, published: NeatSurface) -> NeatSurface {
+        NeatSurface {
+            max_distance: self.max_distance.unwrap_or(published.max_distance),
+            seed: self.seed,
+            ..published
+        }
+    }
+
+    fn edge_points(
+        &self,
+        mut protocol: EdgePoints,
+        inputs: &Inputs,
+    ) -> Result<EdgePointScores, EvalError> {
+        replace(&mut protocol.thresholds, &self.thresholds);
+        replace(&mut protocol.truth_spacing_scale, &self.truth_scale);
+        protocol.evaluate(&inputs.predicted, &inputs.truth)
+    }
+}
+
+/// Puts a value that was given in the place of a published one.
+fn replace<T: Clone>(published: &mut T, given: &Option<T>) {
+    if let Some(given) = given {
+        published.clone_from(given);
     }
 }

@@ -7,9 +7,9 @@ use crate::output;
 use crate::progress::Progress;
 use clap::Args;
 use neat_core::{View, file};
-use neat_pipeline::image_io::{
-    color_image, depth_image, every_nth_pixel, normal_image, psnr, write_png,
-};
+use neat_eval::image_colouring::{DepthColors, color_image, depth_image, normal_image};
+use neat_eval::image_quality::psnr;
+use neat_pipeline::image_io::{every_nth_pixel, write_png};
 use neat_pipeline::reconstruct::{OpenedRun, open_run};
 use neat_pipeline::render::render_view;
 use std::path::{Path, PathBuf};
@@ -91,7 +91,10 @@ fn render(
     let (width, height) = (rendered.width, rendered.height);
     let images = [
         ("color", color_image(width, height, &rendered.color)),
-        ("depth", depth_image(width, height, &rendered.depth)),
+        (
+            "depth",
+            depth_image(width, height, &rendered.depth, DepthColors::Gray),
+        ),
         ("normal", normal_image(width, height, &rendered.normal)),
     ];
     for (kind, image) in images {
@@ -100,6 +103,7 @@ fn render(
     Ok(psnr(
         &rendered.color,
         &every_nth_pixel(&view.image, downscale),
+        None,
     ))
 }
 

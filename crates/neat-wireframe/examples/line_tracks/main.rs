@@ -19,7 +19,10 @@ use neat_core::{LoadOptions, load_scene};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::line_tracks::{LineTracksConfig, run};
-use neat_wireframe::metrics::{EvaluationConfig, ImageEvidenceConfig, image_evidence};
+use neat_wireframe::metrics::{
+    ImageEvidenceConfig, Matching, SegmentDistance, image_evidence, junction_distances,
+    precision_recall, segment_distances,
+};
 use std::path::PathBuf;
 
 type AnyError = Box<dyn std::error::Error>;
@@ -112,8 +115,17 @@ fn main() -> Result<(), AnyError> {
         .map(|junction| scene.original_from_world.apply(junction));
     if let Some(path) = &arguments.truth {
         let truth = read_wireframe(path)?;
-        let evaluation = EvaluationConfig::default().evaluate(&wireframe, Some(&truth), None)?;
-        println!("{}", evaluation.to_markdown());
+        let junctions = junction_distances(&wireframe.junctions, &truth.junctions);
+        let (ours, true_ones) = (wireframe.segments(), truth.segments());
+        let segments = segment_distances(&ours, &true_ones, SegmentDistance::Max);
+        for (name, distances) in [("junctions", junctions), ("segments", segments)] {
+            for score in precision_recall(&distances, &[0.01, 0.02, 0.05], Matching::MinimumSum)? {
+                println!(
+                    "{name:>12} within {}: precision {:.3}, recall {:.3}",
+                    score.threshold, score.precision, score.recall
+                );
+            }
+        }
     }
     let views_per_edge: Vec<usize> = result.edges.iter().map(|edge| edge.views).collect();
     if let Some(dir) = &arguments.out {

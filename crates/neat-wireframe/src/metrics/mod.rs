@@ -1,16 +1,11 @@
 //! How good a wireframe is: precision and recall against a true wireframe,
-//! accuracy and completeness against a scanned surface, agreement with the images
-//! where there is no truth.
+//! distances from and to a scanned surface, agreement with the images where there
+//! is no truth. The published protocols that these make up are in `neat-eval`.
 
-mod evaluation;
 mod image_evidence;
 mod precision_recall;
 mod surface_distance;
-mod table;
 
-pub use evaluation::{
-    Evaluation, EvaluationConfig, SurfaceScores, WireframeCounts, WireframeScores,
-};
 pub use image_evidence::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 pub use precision_recall::{
     Matching, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,

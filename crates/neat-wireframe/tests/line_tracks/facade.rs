@@ -2,11 +2,11 @@
 //! on a line in front of it. Repetition makes wrong matches, and edges along the
 //! baseline cannot be triangulated by any pair of views.
 
+use crate::scores::scores_within;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::{Camera, Intrinsics, LineSegment2, ScoredSegment2, Wireframe3d};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::line_tracks::{LineTracksConfig, run};
-use neat_wireframe::metrics::EvaluationConfig;
 
 /// Reproducible uniform numbers in [-1, 1) (SplitMix64).
 struct Noise(u64);
@@ -113,15 +113,7 @@ fn windows_come_back_with_their_corners() {
         .map(|camera| observe(camera, &truth, &mut noise))
         .collect();
     let result = run(&observations, &[], None, 1.2, &LineTracksConfig::default());
-    let scores = EvaluationConfig {
-        thresholds: vec![0.01],
-        ..Default::default()
-    }
-    .evaluate(&result.wireframe, Some(&truth), None)
-    .unwrap()
-    .wireframe
-    .unwrap();
-    let (junctions, segments) = (&scores.junctions[0], &scores.segments_max[0]);
+    let (junctions, segments) = scores_within(0.01, &result.wireframe, &truth);
     assert!(
         junctions.recall >= 0.95 && junctions.precision >= 0.9,
         "junctions: {junctions:?}"

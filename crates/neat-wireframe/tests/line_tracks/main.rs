@@ -3,5 +3,6 @@
 
 mod facade;
 mod hostile_input;
+mod scores;
 mod solids;
 mod toy_object;

@@ -1,8 +1,8 @@
 //! Solids with noisy, incomplete and false detections.
 
+use crate::scores::scores_within;
 use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
 use neat_wireframe::line_tracks::{LineTracksConfig, LineTracksResult, run};
-use neat_wireframe::metrics::EvaluationConfig;
 use neat_wireframe::{SegmentProposal, ViewObservation};
 
 fn scene(solid: Solid, seed: u64) -> SyntheticData {
@@ -30,15 +30,7 @@ fn reconstruct(data: &SyntheticData) -> LineTracksResult {
 
 /// (precision, recall) of segments within 0.01 at both ends.
 fn precision_and_recall(data: &SyntheticData, result: &LineTracksResult) -> (f64, f64) {
-    let scores = EvaluationConfig {
-        thresholds: vec![0.01],
-        ..Default::default()
-    }
-    .evaluate(&result.wireframe, Some(&data.truth), None)
-    .unwrap()
-    .wireframe
-    .unwrap();
-    let segments = &scores.segments_max[0];
+    let (_, segments) = scores_within(0.01, &result.wireframe, &data.truth);
     (segments.precision, segments.recall)
 }
 

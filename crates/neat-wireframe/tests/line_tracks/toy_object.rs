@@ -3,11 +3,11 @@
 //! The data are not part of the repository: set `NEAT_DATA`, or keep them in
 //! `../shared/data`.
 
+use crate::scores::scores_within;
 use neat_core::ground_truth::read_wireframe;
 use neat_core::{LoadOptions, load_scene};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::line_tracks::{LineTracksConfig, run};
-use neat_wireframe::metrics::EvaluationConfig;
 use std::path::PathBuf;
 
 /// The folder of the toy object, or `None`, said aloud, where there is none.
@@ -36,17 +36,10 @@ fn the_true_graph_comes_back_and_little_else() {
     let wireframe = result
         .wireframe
         .map(|junction| scene.original_from_world.apply(junction));
-    let scores = EvaluationConfig {
-        thresholds: vec![0.01],
-        ..Default::default()
-    }
-    .evaluate(&wireframe, Some(&truth), None)
-    .unwrap()
-    .wireframe
-    .unwrap();
-    assert_eq!(scores.junctions[0].recall, 1.0);
-    assert_eq!(scores.segments_max[0].recall, 1.0);
+    let (junctions, segments) = scores_within(0.01, &wireframe, &truth);
+    assert_eq!(junctions.recall, 1.0);
+    assert_eq!(segments.recall, 1.0);
     // Chords of the round hole are seen by many views too; they are no truth.
-    assert!(scores.junctions[0].precision >= 0.8);
-    assert!(scores.segments_max[0].precision >= 0.9);
+    assert!(junctions.precision >= 0.8);
+    assert!(segments.precision >= 0.9);
 }

@@ -1,0 +1,124 @@
+//! What is evaluated: straight edges, and curves where a method finds them.
+
+use nalgebra::Vector3;
+use neat_core::{LineSegment3, Wireframe3d};
+
+/// Edges that some method found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EdgeModel {
+    /// The straight edges. A method without junctions has two for every segment.
+    pub wireframe: Wireframe3d,
+    /// The other edges.
+    pub curves: Vec<CubicBezier>,
+}
+
+/// A cubic Bézier curve, as EMAP, NEF and their successors write curves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CubicBezier {
+    /// Start, two points that pull the curve, and end.
+    pub control_points: [Vector3<f64>; 4],
+}
+
+/// Panels of Simpson's rule for the length: as many as EMAP takes, since the
+/// length decides the number of samples.
+const LENGTH_PANELS: usize = 10_000;
+
+impl CubicBezier {
+    /// The point at parameter `t`: 0 is the start, 1 the end.
+    pub fn point_at(&self, t: f64) -> Vector3<f64> {
+        let [a, b, c, d] = self.control_points;
+        let s = 1.0 - t;
+        a * (s * s * s) + b * (3.0 * s * s * t) + c * (3.0 * s * t * t) + d * (t * t * t)
+    }
+
+    /// Length of the curve, by Simpson's rule.
+    pub fn length(&self) -> f64 {
+        let [a, b, c, d] = self.control_points;
+        let speed = |t: f64| {
+            let s = 1.0 - t;
+            (3.0 * ((b - a) * (s * s) + (c - b) * (2.0 * s * t) + (d - c) * (t * t))).norm()
+        };
+        let width = 1.0 / LENGTH_PANELS as f64;
+        let weighted: f64 = (0..=LENGTH_PANELS)
+            .map(|i| {
+                let weight = match i {
+                    0 | LENGTH_PANELS => 1.0,
+                    i if i % 2 == 1 => 4.0,
+                    _ => 2.0,
+                };
+                weight * speed(i as f64 * width)
+            })
+            .sum();
+        weighted * width / 3.0
+    }
+}
+
+impl From<Wireframe3d> for EdgeModel {
+    fn from(wireframe: Wireframe3d) -> Self {
+        Self {
+            wireframe,
+            curves: Vec::new(),
+        }
+    }
+}
+
+/// A graph of segments without known junctions: ends that are exactly equal are
+/// one junction.
+///
+/// Junctions are in the order in which they first occur.
+pub fn wireframe_of_segments(segments: &[LineSegment3]) -> Wireframe3d {
+    let mut index_of = std::collections::BTreeMap::new();
+    let mut wireframe = Wireframe3d::default();
+    for segment in segments {
+        let ends = segment.ends().map(|end| {
+            // Adding zero makes -0 and 0 the same point.
+            let key = [end.x, end.y, end.z].map(|x| (x + 0.0).to_bits());
+            *index_of.entry(key).or_insert_with(|| {
+                wireframe.junctions.push(end);
+                wireframe.junctions.len() - 1
+            })
+        });
+        wireframe.edges.push(ends);
+    }
+    wireframe
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_straight_curve_is_a_segment_and_a_bent_one_longer() {
+        let at = |x, y| Vector3::new(x, y, 0.0);
+        let straight = CubicBezier {
+            control_points: [at(0.0, 0.0), at(1.0, 0.0), at(2.0, 0.0), at(3.0, 0.0)],
+        };
+        assert!((straight.length() - 3.0).abs() < 1e-12);
+        assert!((straight.point_at(0.25) - at(0.75, 0.0)).norm() < 1e-15);
+        // With the last three points equal the speed is 3 (1-t)², which
+        // integrates to the distance of the ends.
+        let eased = CubicBezier {
+            control_points: [at(0.0, 0.0), at(1.0, 1.0), at(1.0, 1.0), at(1.0, 1.0)],
+        };
+        assert!((eased.length() - 2.0_f64.sqrt()).abs() < 1e-12);
+        // The usual cubic imitation of a quarter of the unit circle.
+        let k = 0.552_284_749_8;
+        let arc = CubicBezier {
+            control_points: [at(1.0, 0.0), at(1.0, k), at(k, 1.0), at(0.0, 1.0)],
+        };
+        assert!((arc.length() - std::f64::consts::FRAC_PI_2).abs() < 3e-4);
+    }
+
+    #[test]
+    fn equal_ends_are_one_junction() {
+        let at = |x| Vector3::new(x, 0.0, 0.0);
+        let segments = [
+            LineSegment3::new(at(0.0), at(1.0)),
+            LineSegment3::new(at(1.0), at(2.0)),
+            LineSegment3::new(at(-0.0), at(2.0)),
+        ];
+        let wireframe = wireframe_of_segments(&segments);
+        assert_eq!(wireframe.junctions, [at(0.0), at(1.0), at(2.0)]);
+        assert_eq!(wireframe.edges, [[0, 1], [1, 2], [0, 2]]);
+    }
+}

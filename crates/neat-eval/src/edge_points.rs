@@ -1,0 +1,187 @@
+//! Edges as points: the sampling and the down-sampling of the ABC-NEF protocols.
+
+use crate::edge_model::EdgeModel;
+use nalgebra::Vector3;
+use neat_core::ground_truth::GroundTruth;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// How edges become points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EdgeSampling {
+    /// As many points as the length holds whole spacings, both ends included: an
+    /// edge shorter than the spacing has none, one shorter than two its start.
+    Spacing(f64),
+    /// So many points, both ends included, equidistant in the parameter.
+    Count(usize),
+    /// The ends of segments and the given points of curves, as they are.
+    GivenPoints,
+}
+
+/// A grid whose cells are emptied to the mean of their points.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VoxelGrid {
+    /// Edge length of a cell.
+    pub cell: f64,
+    /// A corner of the grid; `None` is the smallest coordinates of the points
+    /// less half a cell.
+    pub origin: Option<Vector3<f64>>,
+}
+
+impl VoxelGrid {
+    /// The mean of the points of every cell, by ascending cell. Points outside of
+    /// the box that a protocol names have cells too.
+    pub fn averages(&self, points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let origin = self.origin.unwrap_or_else(|| {
+            let smallest = points
+                .iter()
+                .fold(Vector3::repeat(f64::INFINITY), |min, p| min.inf(p));
+            smallest.add_scalar(-0.5 * self.cell)
+        });
+        let mut cells: BTreeMap<[i64; 3], (Vector3<f64>, usize)> = BTreeMap::new();
+        for point in points {
+            let position = (point - origin) / self.cell;
+            let cell = [position.x, position.y, position.z].map(|x| x.floor() as i64);
+            let (sum, count) = cells.entry(cell).or_default();
+            *sum += point;
+            *count += 1;
+        }
+        cells
+            .into_values()
+            .map(|(sum, count)| sum / count as f64)
+            .collect()
+    }
+}
+
+/// Points of a prediction: curves first, then segments, as published.
+pub fn sample_prediction(model: &EdgeModel, sampling: EdgeSampling) -> Vec<Vector3<f64>> {
+    let mut points = Vec::new();
+    for curve in &model.curves {
+        if sampling == EdgeSampling::GivenPoints {
+            points.extend(curve.control_points);
+        } else {
+            let count = point_count(sampling, || curve.length());
+            points.extend(parameters(count).map(|t| curve.point_at(t)));
+        }
+    }
+    for segment in model.wireframe.segments() {
+        if sampling == EdgeSampling::GivenPoints {
+            points.extend(segment.ends());
+        } else {
+            let count = point_count(sampling, || segment.length());
+            points.extend(parameters(count).map(|t| segment.point_at(t)));
+        }
+    }
+    points
+}
+
+/// Points of a truth: segments, then curves piece by piece.
+///
+/// A piece begins to be sampled at its second end, as published, which matters
+/// only where a single point fits.
+pub fn sample_truth(truth: &GroundTruth, sampling: EdgeSampling) -> Vec<Vector3<f64>> {
+    let segments = truth.wireframe.segments();
+    let segments = segments.iter().map(|segment| segment.ends().to_vec());
+    let curves = truth.curves.iter().map(|curve| curve.points.clone());
+    let mut points = Vec::new();
+    for polyline in segments.chain(curves) {
+        if sampling == EdgeSampling::GivenPoints {
+            points.extend(polyline);
+            continue;
+        }
+        for piece in polyline.windows(2) {
+            let (start, end) = (piece[0], piece[1]);
+            let count = point_count(sampling, || (end - start).norm());
+            points.extend(parameters(count).map(|t| start * t + end * (1.0 - t)));
+        }
+    }
+    points
+}
+
+fn point_count(sampling: EdgeSampling, length: impl Fn() -> f64) -> usize {
+    match sampling {
+        // A cast saturates: a length that is no number has no point.
+        EdgeSampling::Spacing(spacing) => (length() / spacing).floor() as usize,
+        EdgeSampling::Count(count) => count,
+        EdgeSampling::GivenPoints => 0,
+    }
+}
+
+/// `count` parameters from 0 to 1; 0 alone for one.
+fn parameters(count: usize) -> impl Iterator<Item = f64> {
+    let intervals = count.saturating_sub(1).max(1) as f64;
+    (0..count).map(move |i| i as f64 / intervals)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use neat_core::Wireframe3d;
+    use neat_core::ground_truth::Curve;
+
+    fn segment(length: f64) -> Wireframe3d {
+        Wireframe3d {
+            junctions: vec![Vector3::zeros(), Vector3::new(length, 0.0, 0.0)],
+            edges: vec![[0, 1]],
+        }
+    }
+
+    fn x(points: &[Vector3<f64>]) -> Vec<f64> {
+        points.iter().map(|p| p.x).collect()
+    }
+
+    #[test]
+    fn the_number_of_points_follows_the_length() {
+        let sample = |length: f64| {
+            let model = EdgeModel::from(segment(length));
+            x(&sample_prediction(&model, EdgeSampling::Spacing(0.25)))
+        };
+        assert_eq!(sample(1.0), [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]);
+        assert_eq!(sample(0.3), [0.0]);
+        assert!(sample(0.2).is_empty());
+    }
+
+    #[test]
+    fn truth_is_sampled_piece_by_piece_from_the_second_end() {
+        let truth = GroundTruth {
+            wireframe: segment(0.3),
+            curves: vec![Curve {
+                kind: "Circle".into(),
+                points: [0.0, 0.5, 0.6, 1.1]
+                    .map(|x| Vector3::new(x, 1.0, 0.0))
+                    .to_vec(),
+            }],
+        };
+        let sampled = sample_truth(&truth, EdgeSampling::Spacing(0.25));
+        // 0.3 holds one spacing; 0.5 two; 0.1 none; 0.5 again.
+        assert_eq!(x(&sampled), [0.3, 0.5, 0.0, 1.1, 0.6]);
+        let given = sample_truth(&truth, EdgeSampling::GivenPoints);
+        assert_eq!(x(&given), [0.0, 0.3, 0.0, 0.5, 0.6, 1.1]);
+    }
+
+    /// Compared with point-cloud-utils 0.34, which the protocols use.
+    #[test]
+    fn cells_are_averaged_outside_of_the_box_too() {
+        let points = [0.1, 0.2, 0.9, 1.5, -0.3].map(|x| Vector3::new(x, 0.1, 0.1));
+        let fixed = VoxelGrid {
+            cell: 0.5,
+            origin: Some(Vector3::zeros()),
+        };
+        let found = x(&fixed.averages(&points));
+        let expected = [-0.3, 0.15, 0.9, 1.5];
+        assert_eq!(found.len(), expected.len());
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-15);
+        }
+        let points = [0.0, 0.3, 0.45, 0.55].map(|x| Vector3::new(x, 0.0, 0.0));
+        let free = VoxelGrid {
+            cell: 0.5,
+            origin: None,
+        };
+        let found = x(&free.averages(&points));
+        assert_eq!(found.len(), 2);
+        assert!((found[1] - 1.3 / 3.0).abs() < 1e-15);
+        assert!(free.averages(&[]).is_empty());
+    }
+}

@@ -1,0 +1,33 @@
+//! Why something could not be measured.
+
+use neat_core::SceneError;
+use neat_wireframe::metrics::MetricsError;
+use std::path::PathBuf;
+
+/// Why an evaluation could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EvalError {
+    /// A wireframe or a surface is broken.
+    #[error(transparent)]
+    Metrics(#[from] MetricsError),
+    /// A file could not be read.
+    #[error(transparent)]
+    File(#[from] SceneError),
+    /// A truth that nothing can be compared to.
+    #[error("the truth has no {missing}: the protocol {protocol} needs some; give another file")]
+    EmptyTruth {
+        /// Name of the protocol.
+        protocol: &'static str,
+        /// What it lacks.
+        missing: &'static str,
+    },
+    /// A file whose ending says nothing about its format.
+    #[error(
+        "{path}: no reader for this ending; give .json, .obj, .ply, .npz, .npy, or the .txt of Line3D++"
+    )]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+}

@@ -1,0 +1,213 @@
+//! Results of other programs.
+//!
+//! | ending | what | written by |
+//! | --- | --- | --- |
+//! | `.json` | `junctions` and `edges` or `lines` | neat |
+//! | `.json` | `lines_end_pts`, `curves_ctl_pts` | EMAP and its successors, as `parametric_edges.json` |
+//! | `.npz` | `lines3d` `[n, 2, 3]` | the published NEAT |
+//! | `.npy` | `[n, 2, 3]` or `[n, 6]` | LIMAP |
+//! | `.obj` | `v` and `l` | LIMAP, Line3D++, neat, CAD programs |
+//! | `.ply` | `vertex`, and `edge` with `vertex1` and `vertex2` | neat, MeshLab, Open3D |
+//! | `.txt` | a 3D line per line, with its 2D residuals | Line3D++ |
+//!
+//! Formats without junctions give a graph in which ends that are exactly equal
+//! are one junction.
+
+mod line3dpp;
+mod numpy;
+mod obj;
+mod parametric_edges;
+mod ply;
+
+pub use line3dpp::parse_line3dpp;
+pub use numpy::{parse_neat_npz, parse_npy_lines};
+pub use obj::parse_obj;
+pub use parametric_edges::parse_parametric_edges;
+pub use ply::parse_ply_edges;
+
+use crate::edge_model::EdgeModel;
+use crate::error::EvalError;
+use neat_core::ground_truth::{self, GroundTruth};
+use neat_core::{SceneError, Wireframe3d, file};
+use std::path::Path;
+
+const REMEDY: &str = "give a result as .json, .obj, .ply, .npz, .npy or Line3D++'s .txt";
+
+/// Reads the edges of a result; the ending of its name says how.
+///
+/// # Errors
+/// If the file is missing, empty, damaged, or its ending is none of those above.
+pub fn read(path: &Path) -> Result<EdgeModel, EvalError> {
+    let parse: fn(&[u8], &Path) -> Result<EdgeModel, SceneError> = match ending(path).as_str() {
+        "json" => parse_json,
+        "npz" => |bytes, path| parse_neat_npz(bytes, path).map(EdgeModel::from),
+        "npy" => |bytes, path| parse_npy_lines(bytes, path).map(EdgeModel::from),
+        "obj" => |bytes, path| parse_obj(bytes, path).map(EdgeModel::from),
+        "ply" => |bytes, path| parse_ply_edges(bytes, path).map(EdgeModel::from),
+        "txt" => |bytes, path| parse_line3dpp(bytes, path).map(EdgeModel::from),
+        _ => return Err(EvalError::UnknownFormat { path: path.into() }),
+    };
+    Ok(parse(&file::read(path, REMEDY)?, path)?)
+}
+
+/// Reads true edges: a `gt_wireframe.json` with its curves, or straight edges of
+/// any format of [`read`].
+///
+/// # Errors
+/// As [`read`].
+pub fn read_truth(path: &Path) -> Result<GroundTruth, EvalError> {
+    if ending(path) == "json" {
+        return Ok(ground_truth::read_ground_truth(path)?);
+    }
+    Ok(GroundTruth {
+        wireframe: read(path)?.wireframe,
+        curves: Vec::new(),
+    })
+}
+
+fn ending(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension.to_string_lossy().to_lowercase()
+}
+
+/// Either of the two kinds of JSON.
+fn parse_json(bytes: &[u8], path: &Path) -> Result<EdgeModel, SceneError> {
+    if parametric_edges::is_parametric(bytes) {
+        parse_parametric_edges(bytes, path)
+    } else {
+        ground_truth::parse(bytes, path).map(|truth| truth.wireframe.into())
+    }
+}
+
+/// [`SceneError::Malformed`] for the file at `path`.
+fn malformed(path: &Path, reason: String) -> SceneError {
+    SceneError::Malformed {
+        path: path.into(),
+        reason,
+    }
+}
+
+/// The graph, if its edges name vertices that exist and all is finite.
+fn checked(wireframe: Wireframe3d, path: &Path) -> Result<Wireframe3d, SceneError> {
+    neat_wireframe::validity::check_wireframe(&wireframe.junctions, &wireframe.edges)
+        .map_err(|flaw| malformed(path, flaw.to_string()))?;
+    Ok(wireframe)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+    use neat_core::ground_truth::write_wireframe;
+    use neat_core::npz::{NpyArray, write_npz};
+    use neat_wireframe::export::{write_obj, write_ply};
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+    use std::fs;
+
+    fn l_shape() -> Wireframe3d {
+        Wireframe3d {
+            junctions: [[0.0, 0.5, 0.0], [1.25, 0.5, 0.0], [1.25, 2.0, -3.0]]
+                .map(Vector3::from)
+                .to_vec(),
+            edges: vec![[0, 1], [1, 2]],
+        }
+    }
+
+    /// The same wireframe in every format, as (name, bytes).
+    fn every_format() -> Vec<(&'static str, Vec<u8>)> {
+        let dir = tempfile::tempdir().unwrap();
+        let file = |name: &str| dir.path().join(name);
+        write_wireframe(&file("a.json"), &l_shape()).unwrap();
+        write_obj(&file("a.obj"), &l_shape()).unwrap();
+        write_ply(&file("a.ply"), &l_shape()).unwrap();
+        let ends = l_shape().segments();
+        let values = ends.iter().flat_map(|s| s.ends());
+        let lines = NpyArray {
+            shape: vec![2, 2, 3],
+            values: values.flat_map(|p| [p.x, p.y, p.z]).collect(),
+        };
+        write_npz(&file("a.npz"), &BTreeMap::from([("lines3d", lines)])).unwrap();
+        fs::write(
+            file("a.txt"),
+            "1 0 0.5 0 1.25 0.5 0 2 0 7 1 2 3 4 5 9 10 20 30 40\n1 1.25 0.5 0 1.25 2 -3 0\n",
+        )
+        .unwrap();
+        fs::write(
+            file("parametric_edges.json"),
+            r#"{"curves_ctl_pts": [], "lines_end_pts":
+                [[[0, 0.5, 0], [1.25, 0.5, 0]], [1.25, 0.5, 0, 1.25, 2, -3]]}"#,
+        )
+        .unwrap();
+        [
+            "a.json",
+            "a.obj",
+            "a.ply",
+            "a.npz",
+            "a.txt",
+            "parametric_edges.json",
+        ]
+        .into_iter()
+        .map(|name| (name, fs::read(file(name)).unwrap()))
+        .collect()
+    }
+
+    #[test]
+    fn every_format_gives_the_same_graph() {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, bytes) in every_format() {
+            let path = dir.path().join(name);
+            fs::write(&path, bytes).unwrap();
+            assert_eq!(read(&path).unwrap().wireframe, l_shape(), "{name}");
+            if name != "parametric_edges.json" {
+                assert_eq!(read_truth(&path).unwrap().wireframe, l_shape(), "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn errors_name_the_file() {
+        let message = |name: &str| read(Path::new(name)).unwrap_err().to_string();
+        assert!(message("/nowhere/a.obj").contains("a.obj does not exist"));
+        assert!(message("result.dxf").contains("no reader for this ending"));
+    }
+
+    fn parse_any(name: &str, bytes: &[u8]) -> Option<EdgeModel> {
+        let path = Path::new(name);
+        match name.rsplit('.').next().unwrap() {
+            "json" => parse_json(bytes, path).ok(),
+            "obj" => parse_obj(bytes, path).ok().map(EdgeModel::from),
+            "ply" => parse_ply_edges(bytes, path).ok().map(EdgeModel::from),
+            "npz" => parse_neat_npz(bytes, path).ok().map(EdgeModel::from),
+            _ => parse_line3dpp(bytes, path).ok().map(EdgeModel::from),
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+        #[test]
+        fn damaged_and_truncated_files_do_not_panic(
+            changes in prop::collection::vec(
+                (any::<prop::sample::Index>(), prop::collection::vec(any::<u8>(), 0..4), 0..4_usize),
+                1..4,
+            ),
+            end: prop::sample::Index,
+            truncate: bool,
+        ) {
+            for (name, bytes) in every_format() {
+                let mut damaged = bytes.clone();
+                for (at, new, removed) in &changes {
+                    let at = at.index(damaged.len().max(1));
+                    let end = (at + removed).min(damaged.len());
+                    damaged.splice(at.min(end)..end, new.iter().copied());
+                }
+                if truncate {
+                    damaged.truncate(end.index(damaged.len().max(1)));
+                }
+                if let Some(model) = parse_any(name, &damaged) {
+                    prop_assert!(checked(model.wireframe, Path::new(name)).is_ok());
+                }
+            }
+        }
+    }
+}

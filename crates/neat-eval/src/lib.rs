@@ -1,0 +1,81 @@
+//! How good a 3D wireframe is, by the published protocols, each under its name.
+//!
+//! Numbers of different papers look alike and are not: "precision at 20 mm" is
+//! one thing with one-to-one matching of segments, another with points sampled
+//! every 5 mm, and a third with points averaged in cells. So every protocol here
+//! is a type with the constants of its published code, a file that says where they
+//! are from, and a name in [`Protocol`]:
+//!
+//! | name | type | compared with |
+//! | --- | --- | --- |
+//! | `neat-abc` | [`NeatAbc`] | a true wireframe |
+//! | `neat-dtu`, `neat-blended-mvs` | [`NeatSurface`] | a scanned surface |
+//! | `emap`, `curve-gaussian`, `edge-gaussians`, `nef` | [`EdgePoints`] | true edges with curves |
+//! | `limap-hypersim`, `limap-tnt` | [`LimapLength`] | a scanned surface |
+//! | `hss` | [`StructureScore`] | a true wireframe |
+//! | `wed` | [`EditDistance`] | a true wireframe |
+//!
+//! All take plain points and segments, so that anything can be measured; results
+//! of other programs come in through [`foreign::read`]. An [`EvaluationReport`]
+//! prints scores as a table, as Markdown and as JSON. [`image_quality`] measures
+//! rendered views, [`image_colouring`] turns them into pictures.
+//!
+//! # Example
+//!
+//! ```
+//! use nalgebra::Vector3;
+//! use neat_core::Wireframe3d;
+//! use neat_eval::{EvaluationReport, NeatAbc, Scores};
+//!
+//! let truth = Wireframe3d {
+//!     junctions: vec![Vector3::zeros(), Vector3::x(), Vector3::y()],
+//!     edges: vec![[0, 1], [0, 2]],
+//! };
+//! // One edge is missing, and the rest is a hundredth and a half too high.
+//! let mut predicted = truth.map(|p| p + Vector3::new(0.0, 0.0, 0.015));
+//! predicted.edges.pop();
+//!
+//! let scores = NeatAbc::default().evaluate(&predicted, None, &truth)?;
+//! let at_2_percent = scores.wireframe.segments_max[1];
+//! assert_eq!((at_2_percent.precision, at_2_percent.recall), (1.0, 0.5));
+//!
+//! let report = EvaluationReport::new(Scores::NeatAbc(scores));
+//! assert!(report.to_text().contains("segments, larger end distance"));
+//! # Ok::<(), neat_eval::EvalError>(())
+//! ```
+
+pub mod foreign;
+pub mod image_colouring;
+pub mod image_quality;
+pub mod mat_file;
+
+mod abc_nef;
+mod counts;
+mod edge_model;
+mod edge_points;
+mod edit_distance;
+mod error;
+mod limap_length;
+mod neat_abc;
+mod neat_dtu;
+mod observation_mask;
+mod protocol;
+mod report;
+mod structure_score;
+mod table;
+mod thinning;
+
+pub use abc_nef::{EdgePointScores, EdgePoints, PointPrecisionRecall};
+pub use counts::WireframeCounts;
+pub use edge_model::{CubicBezier, EdgeModel, wireframe_of_segments};
+pub use edge_points::{EdgeSampling, VoxelGrid, sample_prediction, sample_truth};
+pub use edit_distance::{EditDistance, EditScores};
+pub use error::EvalError;
+pub use limap_length::{LengthRecall, LengthScores, LimapLength};
+pub use neat_abc::{GraphScores, NeatAbc, NeatAbcScores};
+pub use neat_dtu::{NeatSurface, ScannedSurface, SurfaceScores};
+pub use observation_mask::{GroundPlane, ObservationMask};
+pub use protocol::{Protocol, UnknownProtocol};
+pub use report::{EvaluationReport, Scores};
+pub use structure_score::{StructureScore, StructureScores};
+pub use thinning::thin_points;
