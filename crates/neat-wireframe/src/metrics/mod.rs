@@ -11,6 +11,7 @@ mod table;
 pub use evaluation::{
     Evaluation, EvaluationConfig, SurfaceScores, WireframeCounts, WireframeScores,
 };
+pub(crate) use image_evidence::visible_projection;
 pub use image_evidence::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 pub use precision_recall::{
     Matching, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,
