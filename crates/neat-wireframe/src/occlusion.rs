@@ -86,17 +86,19 @@ pub fn visible_views(
         .iter()
         .map(|[a, b]| {
             let edge = LineSegment3::new(junctions[*a], junctions[*b]);
-            visible_views_of_edge(views, &edge, surface, config)
+            let sees = views_that_see(views, &edge, surface, config);
+            sees.into_iter().filter(|sees| *sees).count()
         })
         .collect()
 }
 
-fn visible_views_of_edge(
+/// Whether each view sees an edge, see [`visible_views`].
+pub(crate) fn views_that_see(
     views: &[ViewObservation],
     edge: &LineSegment3,
     surface: &dyn SignedDistance,
     config: &OcclusionConfig,
-) -> usize {
+) -> Vec<bool> {
     let points = linspace(
         config.end_margin,
         1.0 - config.end_margin,
@@ -134,11 +136,11 @@ fn visible_views_of_edge(
         .collect();
     visible
         .chunks(config.points_per_edge.max(1))
-        .filter(|points| {
+        .map(|points| {
             let count = points.iter().filter(|visible| **visible).count();
             count as f64 >= config.min_visible_share * points.len() as f64
         })
-        .count()
+        .collect()
 }
 
 /// Appends the samples of the line from `point` to the camera that can hide it.

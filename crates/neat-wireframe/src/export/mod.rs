@@ -1,14 +1,19 @@
-//! Wireframes as files: JSON, OBJ and PLY.
+//! Wireframes as files: JSON, OBJ, PLY and LIMAP's line tracks.
 //!
 //! All formats keep shared vertices shared, write every float so that it reads
 //! back as the same number, and replace an existing file only when the new one is
 //! complete.
 
 mod json;
+mod limap;
 mod obj;
 mod ply;
 
 pub use json::{SupportingSegment, WireframeDocument, read_json, write_json};
+pub use limap::{
+    LineTrack, TrackSegment, read_all_tracks, read_image_list, read_track_folder, write_all_tracks,
+    write_image_list, write_track_folder,
+};
 pub use obj::write_obj;
 pub use ply::write_ply;
 

@@ -31,7 +31,7 @@ mod line_refinement;
 mod neighbours;
 mod projected_line;
 mod report;
-mod segment_index;
+pub(crate) mod segment_index;
 mod straight_junctions;
 mod t_junctions;
 mod track_merging;

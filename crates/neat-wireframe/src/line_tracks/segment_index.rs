@@ -10,7 +10,7 @@ const MAX_CELLS: usize = 512;
 
 /// Segments by the cells that they touch.
 #[derive(Clone, Debug)]
-pub(super) struct SegmentIndex {
+pub(crate) struct SegmentIndex {
     cell: f64,
     columns: usize,
     rows: usize,
@@ -21,7 +21,7 @@ pub(super) struct SegmentIndex {
 impl SegmentIndex {
     /// Indexes finite segments of a `width × height` image. Parts outside the
     /// image count to the nearest cell.
-    pub(super) fn new(segments: &[LineSegment2], width: u32, height: u32) -> Self {
+    pub(crate) fn new(segments: &[LineSegment2], width: u32, height: u32) -> Self {
         let longest = f64::from(width.max(height));
         let cell = CELL.max(longest / MAX_CELLS as f64);
         let count = |size: u32| ((f64::from(size) / cell).ceil() as usize).clamp(1, MAX_CELLS);
@@ -41,7 +41,7 @@ impl SegmentIndex {
     }
 
     /// The segments that may lie within one cell's side of `segment`, ascending.
-    pub(super) fn near(&self, segment: &LineSegment2) -> Vec<usize> {
+    pub(crate) fn near(&self, segment: &LineSegment2) -> Vec<usize> {
         let mut found: Vec<usize> = self
             .cells_of(segment, 1)
             .into_iter()

@@ -174,7 +174,7 @@ fn explains(
 }
 
 /// The projection of the part of an edge that lies in front of the camera.
-fn visible_projection(camera: &Camera, edge: &LineSegment3) -> Option<LineSegment2> {
+pub(crate) fn visible_projection(camera: &Camera, edge: &LineSegment3) -> Option<LineSegment2> {
     /// Share of the farther end's depth at which the edge is cut.
     const NEAR: f64 = 1e-3;
     let [a, b] = edge.ends().map(|end| camera.to_camera(&end).z);

@@ -6,6 +6,7 @@ mod image_evidence;
 mod precision_recall;
 mod surface_distance;
 
+pub(crate) use image_evidence::visible_projection;
 pub use image_evidence::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 pub use precision_recall::{
     Matching, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,

@@ -1,0 +1,122 @@
+//! The independent observations behind the supports of all edges.
+//!
+//! A detected end is one 2D point with one noise, however many segments meet in
+//! it: it is counted once, either as an observation of a junction, near whose
+//! projection it lies, or of the lines of the edges that it lies on. Only the
+//! first says something along an edge.
+
+use super::provenance::EdgeProvenance;
+use crate::ViewObservation;
+use crate::projection::project_in_front;
+use nalgebra::{Vector2, Vector3};
+use std::collections::BTreeMap;
+
+/// A detected end.
+#[derive(Clone, Debug)]
+pub(super) struct DetectedEnd {
+    /// Index of the view.
+    pub view: usize,
+    /// Where it is, in image coordinates.
+    pub pixel: Vector2<f64>,
+    /// What it shows.
+    pub shows: Shown,
+}
+
+/// What a detected end shows.
+#[derive(Clone, Debug)]
+pub(super) enum Shown {
+    /// A junction.
+    Junction {
+        /// Its index.
+        junction: usize,
+        /// Unit direction of the segment that ends there; `None` where several of
+        /// the view do.
+        direction: Option<Vector2<f64>>,
+    },
+    /// Some place on edges, given by their junctions.
+    Lines(Vec<[usize; 2]>),
+}
+
+/// Gathers the ends of all supports, by view and position.
+pub(super) fn detected_ends(
+    observations: &[ViewObservation],
+    junctions: &[Vector3<f64>],
+    edges: &[[usize; 2]],
+    provenance: &[EdgeProvenance],
+    max_end_distance_in_pixels: f64,
+) -> Vec<DetectedEnd> {
+    // Ends of one vertex have the same coordinates: that is how 2D wireframes
+    // reach this crate.
+    let key = |view: usize, end: &Vector2<f64>| (view, [end.x, end.y].map(f64::to_bits));
+    let mut ends: BTreeMap<_, Gathered> = BTreeMap::new();
+    for (edge, found) in edges.iter().zip(provenance) {
+        if edge[0] == edge[1] {
+            continue;
+        }
+        for support in &found.supports {
+            let camera = &observations[support.view].camera;
+            let along = support.segment.end - support.segment.start;
+            for (junction, end) in edge.iter().zip(support.segment.ends()) {
+                let gathered = ends
+                    .entry(key(support.view, &end))
+                    .or_insert_with(|| Gathered::new(end));
+                gathered.edges.push(*edge);
+                gathered.direction = along.normalize();
+                let distance = project_in_front(camera, &junctions[*junction])
+                    .map_or(f64::INFINITY, |pixel| (pixel - end).norm());
+                if distance < gathered.distance.min(max_end_distance_in_pixels) {
+                    gathered.distance = distance;
+                    gathered.junction = Some(*junction);
+                }
+            }
+        }
+    }
+    for (view, observation) in observations.iter().enumerate() {
+        for end in observation.segments.iter().flat_map(|s| s.segment.ends()) {
+            if let Some(gathered) = ends.get_mut(&key(view, &end)) {
+                gathered.segments += 1;
+            }
+        }
+    }
+    ends.into_iter()
+        .map(|((view, _), gathered)| DetectedEnd {
+            view,
+            pixel: gathered.pixel,
+            shows: match gathered.junction {
+                Some(junction) => Shown::Junction {
+                    junction,
+                    direction: (gathered.segments < 2).then_some(gathered.direction),
+                },
+                None => Shown::Lines(gathered.edges),
+            },
+        })
+        .collect()
+}
+
+/// What is known about one end.
+struct Gathered {
+    pixel: Vector2<f64>,
+    /// The edges that its segments support.
+    edges: Vec<[usize; 2]>,
+    /// Of one of its segments.
+    direction: Vector2<f64>,
+    /// All segments of the view that end there.
+    segments: usize,
+    /// The nearest junction of these edges, if one is near.
+    junction: Option<usize>,
+    /// Its distance.
+    distance: f64,
+}
+
+impl Gathered {
+    fn new(pixel: Vector2<f64>) -> Self {
+        Self {
+            pixel,
+            edges: Vec::new(),
+            direction: Vector2::x(),
+            segments: 0,
+            junction: None,
+            distance: f64::INFINITY,
+        }
+    }
+}
