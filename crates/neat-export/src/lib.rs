@@ -25,15 +25,21 @@
 //! assert_eq!((written.junctions, written.edges), (2, 1));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! [`marching_cubes`](marching_cubes::marching_cubes) turns a
+//! [`SignedDistance`](neat_wireframe::SignedDistance) into a [`TriangleMesh`].
 
 pub mod confidence;
 pub mod edge_filter;
 pub mod error;
 pub mod format;
+pub mod marching_cubes;
 pub mod options;
 pub mod orthographic;
+pub mod triangle_mesh;
 
 mod colmap;
+mod cube_case;
 mod dxf;
 mod export;
 mod geojson;
@@ -51,3 +57,4 @@ pub use export::{Written, export};
 pub use format::Format;
 pub use options::{ExportOptions, LengthUnit};
 pub use orthographic::ViewDirection;
+pub use triangle_mesh::TriangleMesh;
