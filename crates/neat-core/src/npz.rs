@@ -31,6 +31,15 @@ pub struct NpyArray {
     pub values: Vec<f64>,
 }
 
+/// A dense array of integers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NpyIntegers {
+    /// Length of each axis.
+    pub shape: Vec<usize>,
+    /// The elements in C order.
+    pub values: Vec<i64>,
+}
+
 /// An `.npz` archive held in memory.
 pub struct NpzReader {
     path: PathBuf,
@@ -149,7 +158,19 @@ pub fn parse_npy(bytes: &[u8], path: &Path) -> Result<NpyArray, SceneError> {
 /// # Errors
 /// If the file cannot be written, or a shape does not fit its values.
 pub fn write_npz(path: &Path, arrays: &BTreeMap<&str, NpyArray>) -> Result<(), SceneError> {
-    let bytes = npz_bytes(arrays).map_err(|source| SceneError::Write {
+    write_npz_with_integers(path, arrays, &BTreeMap::new())
+}
+
+/// [`write_npz`], with arrays of integers, as `i8`, after those of floats.
+///
+/// # Errors
+/// As [`write_npz`].
+pub fn write_npz_with_integers(
+    path: &Path,
+    floats: &BTreeMap<&str, NpyArray>,
+    integers: &BTreeMap<&str, NpyIntegers>,
+) -> Result<(), SceneError> {
+    let bytes = archive_bytes(floats, integers).map_err(|source| SceneError::Write {
         path: path.into(),
         source,
     })?;
@@ -157,25 +178,37 @@ pub fn write_npz(path: &Path, arrays: &BTreeMap<&str, NpyArray>) -> Result<(), S
 }
 
 /// [`write_npz`] to memory.
+#[cfg(test)]
 pub(crate) fn npz_bytes(arrays: &BTreeMap<&str, NpyArray>) -> io::Result<Vec<u8>> {
+    archive_bytes(arrays, &BTreeMap::new())
+}
+
+fn archive_bytes(
+    floats: &BTreeMap<&str, NpyArray>,
+    integers: &BTreeMap<&str, NpyIntegers>,
+) -> io::Result<Vec<u8>> {
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, array) in arrays {
+    for (name, array) in floats {
         archive.start_file(npyz::npz::file_name_from_array_name(name), options)?;
-        archive.write_all(&npy_bytes(array)?)?;
+        archive.write_all(&npy_bytes(&array.shape, &array.values)?)?;
+    }
+    for (name, array) in integers {
+        archive.start_file(npyz::npz::file_name_from_array_name(name), options)?;
+        archive.write_all(&npy_bytes(&array.shape, &array.values)?)?;
     }
     Ok(archive.finish()?.into_inner())
 }
 
-fn npy_bytes(array: &NpyArray) -> io::Result<Vec<u8>> {
-    let shape: Vec<u64> = array.shape.iter().map(|&n| n as u64).collect();
+fn npy_bytes<T: npyz::AutoSerialize + Copy>(shape: &[usize], values: &[T]) -> io::Result<Vec<u8>> {
+    let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
     let mut bytes = Vec::new();
     let mut writer = npyz::WriteOptions::new()
         .default_dtype()
         .shape(&shape)
         .writer(&mut bytes)
         .begin_nd()?;
-    writer.extend(array.values.iter().copied())?;
+    writer.extend(values.iter().copied())?;
     writer.finish()?;
     Ok(bytes)
 }

@@ -76,7 +76,13 @@ impl WireframeDocument {
         }
     }
 
-    fn check(&self, path: &Path) -> Result<(), ExportError> {
+    /// Checks everything that [`write_json`] and every other export rely on; `path`
+    /// is for messages.
+    ///
+    /// # Errors
+    /// If a number is not finite, an edge names no junction, or a field has the
+    /// wrong length.
+    pub fn check(&self, path: &Path) -> Result<(), ExportError> {
         check(path, &self.junctions, &self.edges)?;
         let per_junction = (&self.junction_fields, self.junctions.len(), "junction");
         let per_edge = (&self.edge_fields, self.edges.len(), "edge");

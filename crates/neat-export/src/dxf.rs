@@ -1,0 +1,122 @@
+//! DXF of AutoCAD Release 12: `LINE` entities on layers by confidence.
+//!
+//! Release 12 is the version that every CAD program reads. It states no unit and
+//! shares no vertices; lines that meet have the same numbers at their ends, and all
+//! junctions are `POINT`s on a layer of their own.
+
+use crate::Confidence;
+use nalgebra::Vector3;
+use neat_wireframe::export::WireframeDocument;
+use std::fmt::{Display, Write};
+
+/// Layer of the junctions.
+const JUNCTIONS: &str = "JUNCTIONS";
+
+/// The text of a DXF file.
+pub fn text(document: &WireframeDocument) -> String {
+    let mut dxf = Dxf::default();
+    dxf.section("HEADER", |dxf| {
+        dxf.group(9, "$ACADVER");
+        dxf.group(1, "AC1009");
+    });
+    dxf.section("TABLES", |dxf| {
+        dxf.table("LTYPE", 1, |dxf| {
+            dxf.group(0, "LTYPE");
+            dxf.group(2, "CONTINUOUS");
+            dxf.group(70, 0);
+            dxf.group(3, "Solid line");
+            dxf.group(72, 65);
+            dxf.group(73, 0);
+            dxf.number(40, 0.0);
+        });
+        dxf.table("LAYER", Confidence::ALL.len() + 2, |dxf| {
+            dxf.layer("0", 7);
+            dxf.layer(JUNCTIONS, 8);
+            for class in Confidence::ALL {
+                dxf.layer(layer(class), color_number(class));
+            }
+        });
+    });
+    dxf.section("ENTITIES", |dxf| {
+        for ([a, b], class) in document.edges.iter().zip(Confidence::of_edges(document)) {
+            dxf.group(0, "LINE");
+            dxf.group(8, layer(class));
+            dxf.point(10, &document.junctions[*a]);
+            dxf.point(11, &document.junctions[*b]);
+        }
+        for junction in &document.junctions {
+            dxf.group(0, "POINT");
+            dxf.group(8, JUNCTIONS);
+            dxf.point(10, junction);
+        }
+    });
+    dxf.group(0, "EOF");
+    dxf.text
+}
+
+fn layer(class: Confidence) -> &'static str {
+    match class {
+        Confidence::Unknown => "CONFIDENCE_UNKNOWN",
+        Confidence::Low => "CONFIDENCE_LOW",
+        Confidence::Medium => "CONFIDENCE_MEDIUM",
+        Confidence::High => "CONFIDENCE_HIGH",
+    }
+}
+
+/// AutoCAD colour index nearest to [`Confidence::color`]; 7 is black on white and
+/// white on black.
+fn color_number(class: Confidence) -> u8 {
+    match class {
+        Confidence::Unknown => 7,
+        Confidence::Low => 1,
+        Confidence::Medium => 40,
+        Confidence::High => 5,
+    }
+}
+
+/// A growing file: pairs of a group code and a value, a line each.
+#[derive(Default)]
+struct Dxf {
+    text: String,
+}
+
+impl Dxf {
+    /// Floats are written as `{:?}`, the shortest text that reads back as the same
+    /// number.
+    fn number(&mut self, code: u32, value: f64) {
+        let _ = writeln!(self.text, "{code}\n{value:?}");
+    }
+
+    fn group(&mut self, code: u32, value: impl Display) {
+        let _ = writeln!(self.text, "{code}\n{value}");
+    }
+
+    fn point(&mut self, code: u32, point: &Vector3<f64>) {
+        self.number(code, point.x);
+        self.number(code + 10, point.y);
+        self.number(code + 20, point.z);
+    }
+
+    fn layer(&mut self, name: &str, color: u8) {
+        self.group(0, "LAYER");
+        self.group(2, name);
+        self.group(70, 0);
+        self.group(62, color);
+        self.group(6, "CONTINUOUS");
+    }
+
+    fn section(&mut self, name: &str, fill: impl FnOnce(&mut Self)) {
+        self.group(0, "SECTION");
+        self.group(2, name);
+        fill(self);
+        self.group(0, "ENDSEC");
+    }
+
+    fn table(&mut self, name: &str, entries: usize, fill: impl FnOnce(&mut Self)) {
+        self.group(0, "TABLE");
+        self.group(2, name);
+        self.group(70, entries);
+        fill(self);
+        self.group(0, "ENDTAB");
+    }
+}

@@ -1,0 +1,69 @@
+//! Why a wireframe or a mesh could not be exported.
+
+use neat_core::SceneError;
+use std::path::PathBuf;
+
+/// Why a wireframe or a mesh could not be exported.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// A file name whose ending belongs to no format.
+    #[error("the ending of {path} names no format: use one of {known}, or name the format")]
+    UnknownEnding {
+        /// The file.
+        path: PathBuf,
+        /// All endings.
+        known: String,
+    },
+    /// A name that no format has.
+    #[error("there is no format `{name}`: use one of {known}")]
+    UnknownFormat {
+        /// What was asked for.
+        name: String,
+        /// All names.
+        known: String,
+    },
+    /// An option outside its range.
+    #[error("{option} cannot be {value}: give {expected}")]
+    BadOption {
+        /// The option.
+        option: &'static str,
+        /// What was asked for.
+        value: String,
+        /// What it can be.
+        expected: &'static str,
+    },
+    /// A filter on a field that the wireframe does not have.
+    #[error(
+        "the wireframe has no edge field `{field}`: leave out {option}, or reconstruct it with a version of neat that writes the field"
+    )]
+    NoField {
+        /// The field.
+        field: &'static str,
+        /// The option that needs it.
+        option: &'static str,
+    },
+    /// Coordinates beyond what the format can hold.
+    #[error("{path}: the wireframe extends too far for {format}: use a format with 64-bit numbers")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Name of the format.
+        format: &'static str,
+    },
+    /// The distance of a mesh's surface is no number somewhere.
+    #[error("the signed distance at {point:?} is {value}: the field is not usable there")]
+    BadDistance {
+        /// Where.
+        point: [f64; 3],
+        /// What it is instead of a number.
+        value: f64,
+    },
+    /// The document is not valid, or one of the formats of `neat-wireframe` could
+    /// not be written.
+    #[error(transparent)]
+    Wireframe(#[from] neat_wireframe::export::ExportError),
+    /// The file could not be written.
+    #[error(transparent)]
+    File(#[from] SceneError),
+}

@@ -1,0 +1,49 @@
+//! GeoJSON (RFC 7946): a `LineString` with z per edge, a `Point` per junction
+//! without edges.
+//!
+//! The RFC means WGS 84 longitude and latitude. Coordinates are written as they are
+//! in the document instead, which programs accept when told the reference system;
+//! the member `coordinate_frame` says so.
+
+use crate::Confidence;
+use crate::isolated::isolated_junctions;
+use neat_wireframe::export::WireframeDocument;
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+
+/// The text of a GeoJSON file.
+pub fn text(document: &WireframeDocument) -> String {
+    let position = |junction: usize| document.junctions[junction].as_slice();
+    let classes = Confidence::of_edges(document);
+    let edges = document.edges.iter().enumerate().map(|(edge, [a, b])| {
+        let mut properties = fields(&document.edge_fields, edge);
+        properties.insert("edge".into(), edge.into());
+        properties.insert("junctions".into(), json!([a, b]));
+        properties.insert("confidence".into(), classes[edge].name().into());
+        let line = json!({"type": "LineString", "coordinates": [position(*a), position(*b)]});
+        feature(line, properties)
+    });
+    let isolated = isolated_junctions(document).into_iter().map(|junction| {
+        let mut properties = fields(&document.junction_fields, junction);
+        properties.insert("junction".into(), junction.into());
+        let point = json!({"type": "Point", "coordinates": position(junction)});
+        feature(point, properties)
+    });
+    let collection = json!({
+        "type": "FeatureCollection",
+        "coordinate_frame": "the frame of the reconstructed scene, not WGS 84",
+        "features": edges.chain(isolated).collect::<Vec<_>>(),
+    });
+    format!("{collection}\n")
+}
+
+fn fields(fields: &BTreeMap<String, Vec<f64>>, index: usize) -> Map<String, Value> {
+    fields
+        .iter()
+        .map(|(name, values)| (name.clone(), values[index].into()))
+        .collect()
+}
+
+fn feature(geometry: Value, properties: Map<String, Value>) -> Value {
+    json!({"type": "Feature", "geometry": geometry, "properties": properties})
+}

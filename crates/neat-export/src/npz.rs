@@ -1,0 +1,34 @@
+//! NumPy arrays: `lines3d` as the published NEAT code saves it, and the graph.
+
+use neat_core::SceneError;
+use neat_core::npz::{NpyArray, NpyIntegers, write_npz_with_integers};
+use neat_wireframe::export::WireframeDocument;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Writes `lines3d` `[E, 2, 3]`, the one array of the published code's
+/// `…-wfi_checked.npz` (`neat-final-parsing.py`), and beside it `junctions` `[J, 3]`
+/// and `edges` `[E, 2]`, by which lines share their ends. All numbers have 64 bits.
+pub fn write(path: &Path, document: &WireframeDocument) -> Result<(), SceneError> {
+    let ends = document.edges.iter().flatten();
+    let lines3d = NpyArray {
+        shape: vec![document.edges.len(), 2, 3],
+        values: ends
+            .clone()
+            .flat_map(|end| document.junctions[*end].iter().copied())
+            .collect(),
+    };
+    let junctions = NpyArray {
+        shape: vec![document.junctions.len(), 3],
+        values: document.junctions.iter().flatten().copied().collect(),
+    };
+    let edges = NpyIntegers {
+        shape: vec![document.edges.len(), 2],
+        values: ends.map(|end| *end as i64).collect(),
+    };
+    write_npz_with_integers(
+        path,
+        &BTreeMap::from([("junctions", junctions), ("lines3d", lines3d)]),
+        &BTreeMap::from([("edges", edges)]),
+    )
+}

@@ -1,0 +1,92 @@
+//! SVG 1.1: an orthographic view with a group per class of confidence.
+//!
+//! Coordinates are pixels, to a millionth; the attributes `data-scale` and
+//! `data-center` of the root lead back to the units of the document:
+//! right = center₀ + (x − width / 2) / scale, up = center₁ − (y − height / 2) / scale.
+
+use crate::Confidence;
+use crate::orthographic::Drawing;
+use neat_wireframe::export::WireframeDocument;
+use std::fmt::Write;
+
+/// The text of an SVG file.
+pub fn text(document: &WireframeDocument, drawing: &Drawing) -> String {
+    let (width, height) = (drawing.width, drawing.height);
+    let [right, up] = drawing.direction.right_and_up();
+    let scene = document
+        .metadata
+        .get("scene")
+        .and_then(|name| name.as_str());
+    let line_width = drawing.line_width(document.edges.len());
+    let mut svg = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+         viewBox=\"0 0 {width} {height}\" \
+         data-direction=\"{}\" data-right=\"{:?} {:?} {:?}\" data-up=\"{:?} {:?} {:?}\" \
+         data-scale=\"{:?}\" data-center=\"{:?} {:?}\">\n\
+         <title>{}</title>\n\
+         <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n",
+        drawing.direction.name(),
+        right.x,
+        right.y,
+        right.z,
+        up.x,
+        up.y,
+        up.z,
+        drawing.scale,
+        drawing.center.x,
+        drawing.center.y,
+        escaped(scene.unwrap_or("wireframe")),
+    );
+    let classes = Confidence::of_edges(document);
+    for class in Confidence::ALL {
+        if !classes.contains(&class) {
+            continue;
+        }
+        let (name, [red, green, blue]) = (class.name(), class.color());
+        let _ = writeln!(
+            svg,
+            "<g id=\"confidence-{name}\" stroke=\"#{red:02x}{green:02x}{blue:02x}\" \
+             stroke-width=\"{line_width:.3}\" stroke-linecap=\"round\">\n\
+             <title>confidence: {name}</title>"
+        );
+        for (edge, [a, b]) in document.edges.iter().enumerate() {
+            if classes[edge] == class {
+                let [start, end] = [a, b].map(|junction| drawing.points[*junction]);
+                let _ = writeln!(
+                    svg,
+                    "<line data-edge=\"{edge}\" data-junctions=\"{a} {b}\" \
+                     x1=\"{:.6}\" y1=\"{:.6}\" x2=\"{:.6}\" y2=\"{:.6}\"/>",
+                    start.x, start.y, end.x, end.y
+                );
+            }
+        }
+        svg.push_str("</g>\n");
+    }
+    svg.push_str("<g id=\"junctions\" fill=\"#111111\">\n");
+    for point in &drawing.points {
+        let _ = writeln!(
+            svg,
+            "<circle cx=\"{:.6}\" cy=\"{:.6}\" r=\"{line_width:.3}\"/>",
+            point.x, point.y
+        );
+    }
+    svg.push_str("</g>\n</svg>\n");
+    svg
+}
+
+/// Text as XML content. What XML 1.0 cannot hold at all becomes U+FFFD.
+fn escaped(text: &str) -> String {
+    let mut escaped = String::new();
+    for character in text.chars() {
+        match character {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '\t' | '\n' | '\r' => escaped.push(' '),
+            '\0'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => escaped.push('\u{fffd}'),
+            _ => escaped.push(character),
+        }
+    }
+    escaped
+}

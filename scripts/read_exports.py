@@ -1,0 +1,381 @@
+#!/usr/bin/env python3
+"""Opens what `export_all` has written with readers of other projects.
+
+    read_exports.py WIREFRAME.json OUT
+
+OUT is the folder that
+
+    cargo run --release -p neat-export --example export_all -- WIREFRAME.json OUT
+
+has filled. Every format must hold as many vertices and edges as WIREFRAME.json, the
+same edges, and the same coordinates to 1e-6 of the wireframe's extent. Prints a line
+per file; the exit code is 1 if one differs. Needs scripts/requirements-readers.txt.
+"""
+
+import json
+import math
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+
+TOLERANCE = 1e-6
+SCHEMA = Path(__file__).resolve().parent.parent / "docs" / "wireframe.schema.json"
+
+
+class Wireframe:
+    """Vertices [V, 3] and index pairs [E, 2]."""
+
+    def __init__(self, vertices, edges):
+        self.vertices = np.asarray(vertices, dtype=float).reshape(-1, 3)
+        self.edges = np.asarray(edges, dtype=int).reshape(-1, 2)
+
+    def extent(self):
+        if len(self.vertices) == 0:
+            return 1.0
+        return max(float(np.ptp(self.vertices, axis=0).max()), 1e-300)
+
+    def isolated(self):
+        """Indices of the vertices without edges."""
+        return sorted(set(range(len(self.vertices))) - set(self.edges.ravel().tolist()))
+
+    def without(self, vertices=(), edges=()):
+        """The same without some vertices and edges."""
+        kept = [v for v in range(len(self.vertices)) if v not in set(vertices)]
+        new_index = {old: new for new, old in enumerate(kept)}
+        pairs = [[new_index[a], new_index[b]]
+                 for i, (a, b) in enumerate(self.edges.tolist()) if i not in set(edges)]
+        return Wireframe(self.vertices[kept], pairs)
+
+
+def check(condition, sentence):
+    if not condition:
+        raise AssertionError(sentence)
+
+
+def check_close(found, expected, extent, what):
+    check(found.shape == expected.shape, f"{what}: {found.shape}, not {expected.shape}")
+    if found.size:
+        worst = float(np.abs(found - expected).max())
+        # A number itself is known to 1e-15 of its size only.
+        limit = TOLERANCE * extent + 1e-15 * float(np.abs(expected).max())
+        check(worst <= limit, f"{what} differ by {worst}, more than {limit}")
+
+
+def same_graph(found, expected):
+    """Vertices in the same order, edges in any order and direction."""
+    check_close(found.vertices, expected.vertices, expected.extent(), "vertices")
+
+    def undirected(wireframe):
+        return sorted(sorted(edge) for edge in wireframe.edges.tolist())
+
+    check(undirected(found) == undirected(expected), "the edges join other vertices")
+
+
+def same_lines(ends, expected, extent):
+    """Ends [E, 2, 3] in the order and direction of the edges."""
+    check_close(np.asarray(ends, dtype=float).reshape(-1, 2, 3),
+                expected.vertices[expected.edges], extent, "ends of lines")
+
+
+def read_json(path, expected):
+    import jsonschema
+
+    document = json.loads(path.read_text())
+    schema = json.loads(SCHEMA.read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.Draft202012Validator(schema).validate(document)
+    for broken in ({}, {"junctions": [[0, 0]], "edges": []},
+                   {"junctions": [], "edges": [[0, -1]]},
+                   dict(document, views=[1]), dict(document, junction_covariances=[[0] * 5])):
+        check(not jsonschema.Draft202012Validator(schema).is_valid(broken),
+              f"the schema accepts {str(broken)[:80]}")
+    same_graph(Wireframe(document["junctions"], document["edges"]), expected)
+    return "jsonschema"
+
+
+def vtk_wireframe(data):
+    """Points and two-point lines of a vtkPolyData."""
+    from vtk.util.numpy_support import vtk_to_numpy
+
+    lines = data.GetLines()
+    edges = vtk_to_numpy(lines.GetConnectivityArray()) if lines.GetNumberOfCells() else []
+    check(len(edges) == 2 * lines.GetNumberOfCells(), "lines of more than two points")
+    points = data.GetPoints()
+    count = points.GetNumberOfPoints() if points else 0
+    return Wireframe(vtk_to_numpy(points.GetData()) if count else [], edges)
+
+
+def read_obj(path, expected):
+    import vtk
+
+    reader = vtk.vtkOBJReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    same_graph(vtk_wireframe(reader.GetOutput()), expected)
+    return "VTK"
+
+
+def read_ply(path, expected):
+    from plyfile import PlyData
+
+    ply = PlyData.read(str(path))
+    vertex, edge = ply["vertex"], ply["edge"]
+    same_graph(Wireframe(np.stack([vertex[axis] for axis in "xyz"], axis=-1),
+                         np.stack([edge["vertex1"], edge["vertex2"]], axis=-1)), expected)
+    return "plyfile"
+
+
+def read_gltf(path, expected):
+    import pygltflib
+    import vtk
+
+    gltf = pygltflib.GLTF2().load(str(path))
+    if len(expected.vertices) == 0:
+        check(not gltf.nodes and not gltf.meshes, "an empty scene has nodes")
+        return "pygltflib"
+
+    def data(index):
+        accessor = gltf.accessors[index]
+        view = gltf.bufferViews[accessor.bufferView]
+        if path.suffix == ".glb":
+            blob = gltf.binary_blob()
+        else:
+            blob = gltf.get_data_from_buffer_uri(gltf.buffers[view.buffer].uri)
+        check(len(blob) >= gltf.buffers[view.buffer].byteLength, "the buffer is short")
+        kind = {5126: "<f4", 5125: "<u4"}[accessor.componentType]
+        width = {"VEC3": 3, "SCALAR": 1}[accessor.type]
+        start = (view.byteOffset or 0) + (accessor.byteOffset or 0)
+        array = np.frombuffer(blob, kind, accessor.count * width, start).reshape(-1, width)
+        if accessor.min:
+            check(np.array_equal(array.min(axis=0), np.float32(accessor.min)), "min")
+            check(np.array_equal(array.max(axis=0), np.float32(accessor.max)), "max")
+        return array
+
+    (node,) = gltf.nodes
+    primitives = gltf.meshes[node.mesh].primitives
+    (positions,) = {primitive.attributes.POSITION for primitive in primitives}
+    vertices = data(positions).astype(float) + np.asarray(node.translation)
+    lines = [data(p.indices).reshape(-1, 2) for p in primitives if p.mode == 1]
+    points = [data(p.indices).ravel().tolist() for p in primitives if p.mode == 0]
+    same_graph(Wireframe(vertices, np.concatenate(lines) if lines else []), expected)
+    check(sum(points, []) == expected.isolated(), "isolated junctions")
+
+    # A second reader, that applies the translation itself, in 32 bits. (trimesh takes
+    # the vertices of GL_LINES in their order and ignores the indices.)
+    reader = vtk.vtkGLTFReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    blocks = reader.GetOutput().NewIterator()
+    edges = []
+    while not blocks.IsDoneWithTraversal():
+        found = vtk_wireframe(blocks.GetCurrentDataObject())
+        rounding = 1.2e-7 * float(np.abs(expected.vertices).max())
+        check_close(found.vertices, expected.vertices,
+                    expected.extent() + rounding / TOLERANCE, "vertices in VTK")
+        edges += found.edges.tolist()
+        blocks.GoToNextItem()
+    same_graph(Wireframe(expected.vertices, edges), expected)
+    return "pygltflib and VTK"
+
+
+def read_dxf(path, expected):
+    import ezdxf
+
+    dxf = ezdxf.readfile(path)
+    auditor = dxf.audit()
+    check(not auditor.errors and not auditor.fixes,
+          f"ezdxf finds {auditor.errors} and fixes {auditor.fixes}")
+    space = dxf.modelspace()
+    layers = {layer.dxf.name for layer in dxf.layers}
+    check({"JUNCTIONS", "CONFIDENCE_HIGH", "CONFIDENCE_MEDIUM", "CONFIDENCE_LOW",
+           "CONFIDENCE_UNKNOWN"} <= layers, f"layers {layers}")
+    check({entity.dxf.layer for entity in space} <= layers, "an entity on no layer")
+    same_lines([[line.dxf.start, line.dxf.end] for line in space.query("LINE")],
+               expected, expected.extent())
+    points = [point.dxf.location for point in space.query("POINT")]
+    same_graph(Wireframe([list(point) for point in points], expected.edges), expected)
+    return "ezdxf, audit clean"
+
+
+def read_step(path, expected):
+    from OCP.BRep import BRep_Tool
+    from OCP.IFSelect import IFSelect_ReturnStatus
+    from OCP.STEPControl import STEPControl_Reader
+    from OCP.TopAbs import TopAbs_ShapeEnum
+    from OCP.TopExp import TopExp_Explorer
+    from OCP.TopoDS import TopoDS
+
+    lengths = [np.linalg.norm(np.subtract(*expected.vertices[edge])) for edge in expected.edges]
+    flat = [i for i, length in enumerate(lengths) if length == 0.0]
+    expected = expected.without(edges=flat)
+    expected = expected.without(vertices=expected.isolated())
+
+    reader = STEPControl_Reader()
+    check(reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone, "not read")
+    reader.TransferRoots()
+    shape = reader.OneShape()
+    if len(expected.edges) == 0:
+        return "Open CASCADE"
+
+    def parts(shape, kind):
+        explorer = TopExp_Explorer(shape, kind)
+        while explorer.More():
+            yield explorer.Current()
+            explorer.Next()
+
+    vertex_kind, edge_kind = TopAbs_ShapeEnum.TopAbs_VERTEX, TopAbs_ShapeEnum.TopAbs_EDGE
+    as_vertex = getattr(TopoDS, "Vertex_s", None) or TopoDS.Vertex
+    vertices = []
+    buckets = {}
+
+    def index(vertex):
+        """One index per topological vertex: shared ones are the same."""
+        candidates = buckets.setdefault(hash(vertex), [])
+        for known, number in candidates:
+            if known.IsSame(vertex):
+                return number
+        point = BRep_Tool.Pnt_s(as_vertex(vertex))
+        vertices.append([point.X(), point.Y(), point.Z()])
+        candidates.append((vertex, len(vertices) - 1))
+        return len(vertices) - 1
+
+    edges = [[index(vertex) for vertex in parts(edge, vertex_kind)]
+             for edge in parts(shape, edge_kind)]
+    found = Wireframe(vertices, edges)
+    check(len(vertices) == len(expected.vertices),
+          f"{len(vertices)} vertices, not {len(expected.vertices)}")
+    # Edges come in their order, each from one end to the other.
+    check(len(found.edges) == len(expected.edges), "number of edges")
+    ends, truth = found.vertices[found.edges], expected.vertices[expected.edges]
+    turned = np.abs(ends - truth).max(axis=(1, 2)) > np.abs(ends[:, ::-1] - truth).max(axis=(1, 2))
+    ends[turned] = ends[turned, ::-1]
+    same_lines(ends, expected, expected.extent())
+    return "Open CASCADE"
+
+
+def read_svg(path, expected):
+    root = ElementTree.parse(path).getroot()
+    space = "{http://www.w3.org/2000/svg}"
+    check(root.tag == space + "svg", "the root is no svg")
+    numbers = {name: np.array([float(x) for x in root.attrib["data-" + name].split()])
+               for name in ("right", "up", "scale", "center")}
+    width, height = float(root.attrib["width"]), float(root.attrib["height"])
+    axes = np.stack([numbers["right"], numbers["up"]])
+
+    def in_units(x, y):
+        offset = np.array([x - width / 2, height / 2 - y]) / numbers["scale"]
+        return numbers["center"] + offset
+
+    circles = [in_units(float(c.attrib["cx"]), float(c.attrib["cy"]))
+               for c in root.iter(space + "circle")]
+    projected = expected.vertices @ axes.T
+    check_close(np.reshape(circles, (-1, 2)), projected, expected.extent(), "circles")
+    lines = sorted(root.iter(space + "line"), key=lambda line: int(line.attrib["data-edge"]))
+    ends = [[in_units(float(l.attrib["x1"]), float(l.attrib["y1"])),
+             in_units(float(l.attrib["x2"]), float(l.attrib["y2"]))] for l in lines]
+    check_close(np.reshape(ends, (-1, 2, 2)), projected[expected.edges],
+                expected.extent(), "lines")
+    return "ElementTree"
+
+
+def read_png(path, expected):
+    from PIL import Image
+
+    image = np.asarray(Image.open(path).convert("L"), dtype=float)
+    svg = ElementTree.parse(path.with_suffix(".svg")).getroot()
+    check(image.shape == (int(svg.attrib["height"]), int(svg.attrib["width"])), "size")
+    # Ink where the vector graphics have lines, and white elsewhere.
+    space = "{http://www.w3.org/2000/svg}"
+    for line in svg.iter(space + "line"):
+        x1, y1, x2, y2 = (float(line.attrib[name]) for name in ("x1", "y1", "x2", "y2"))
+        column, row = int((x1 + x2) / 2), int((y1 + y2) / 2)
+        check(image[row, column] < 200, f"no line at {column}, {row}")
+    circles = len(list(svg.iter(space + "circle")))
+    check((image < 60).any() == (circles > 0), "junctions")
+    check((image == 255).mean() > 0.5, "the background is not white")
+    return "Pillow"
+
+
+def read_geojson(path, expected):
+    collection = json.loads(path.read_text())
+    check(collection["type"] == "FeatureCollection", "type")
+    features = collection["features"]
+    lines = [f for f in features if f["geometry"]["type"] == "LineString"]
+    points = [f for f in features if f["geometry"]["type"] == "Point"]
+    check(len(lines) + len(points) == len(features), "other features")
+    same_lines([line["geometry"]["coordinates"] for line in lines],
+               expected, expected.extent())
+    check([line["properties"]["junctions"] for line in lines] == expected.edges.tolist(),
+          "the properties name other junctions")
+    isolated = expected.isolated()
+    check([p["properties"]["junction"] for p in points] == isolated, "isolated junctions")
+    check_close(np.reshape([p["geometry"]["coordinates"] for p in points], (-1, 3)),
+                expected.vertices[isolated], expected.extent(), "points")
+    return "json"
+
+
+def read_npz(path, expected):
+    arrays = np.load(path)
+    # As the published evaluation reads it.
+    same_lines(arrays["lines3d"], expected, expected.extent())
+    check(arrays["lines3d"].shape == (len(expected.edges), 2, 3), "shape of lines3d")
+    same_graph(Wireframe(arrays["junctions"], arrays["edges"]), expected)
+    check(np.array_equal(arrays["junctions"][arrays["edges"]], arrays["lines3d"]),
+          "edges do not lead to lines3d")
+    return "numpy"
+
+
+def read_colmap(path, expected):
+    import pycolmap
+
+    model = pycolmap.Reconstruction(str(path))
+    ids = sorted(model.points3D)
+    check(ids == list(range(1, len(expected.vertices) + 1)), "point ids")
+    rows = [line.split() for line in (path / "lines3D.txt").read_text().splitlines()
+            if not line.startswith("#")]
+    check([int(row[0]) for row in rows] == list(range(1, len(expected.edges) + 1)), "line ids")
+    same_graph(Wireframe([model.points3D[i].xyz for i in ids],
+                         [[int(row[1]) - 1, int(row[2]) - 1] for row in rows]), expected)
+    return "pycolmap"
+
+
+def read_mesh(path, expected):
+    import trimesh
+
+    mesh = trimesh.load(path, process=False)
+    check(mesh.is_watertight and mesh.is_winding_consistent, "the mesh has holes")
+    check(mesh.euler_number == 2, "Euler characteristic")
+    check(abs(mesh.volume / (4 / 3 * math.pi * 0.75**3) - 1) < 2e-3, "volume")
+    return f"trimesh, {len(mesh.vertices)} vertices, {len(mesh.faces)} triangles"
+
+
+def main(arguments):
+    if len(arguments) != 2:
+        sys.exit(__doc__)
+    truth = json.loads(Path(arguments[0]).read_text())
+    directory = Path(arguments[1])
+    expected = Wireframe(truth["junctions"], truth.get("edges", truth.get("lines", [])))
+    readers = [("wireframe.json", read_json), ("wireframe.obj", read_obj),
+               ("wireframe.ply", read_ply), ("wireframe.gltf", read_gltf),
+               ("wireframe.glb", read_gltf), ("wireframe.dxf", read_dxf),
+               ("wireframe.step", read_step), ("wireframe.geojson", read_geojson),
+               ("wireframe.npz", read_npz), ("colmap", read_colmap)]
+    for view in ("front", "top", "side", "isometric"):
+        readers += [(f"wireframe-{view}.svg", read_svg), (f"wireframe-{view}.png", read_png)]
+    readers.append(("ball.ply", read_mesh))
+    failed = 0
+    for name, read in readers:
+        try:
+            print(f"{name}: the same in {read(directory / name, expected)}")
+        except Exception as error:  # One bad file must not hide the next.
+            failed += 1
+            print(f"{name}: FAILED: {type(error).__name__}: {error}")
+    print(f"{len(expected.vertices)} vertices, {len(expected.edges)} edges: "
+          f"{len(readers) - failed} of {len(readers)} files agree")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
