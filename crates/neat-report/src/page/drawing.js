@@ -1,0 +1,102 @@
+// What is drawn in 3D: strokes of the edges, the junctions and the cameras.
+
+/** Lines and dots (lines without length), for a renderer. */
+class Strokes {
+  /** Those with the larger bias are drawn over others at about the same depth. */
+  constructor(bias) {
+    this.bias = bias;
+    this.numbers = [];
+  }
+
+  get count() {
+    return this.numbers.length / 10;
+  }
+
+  line(start, end, color, width) {
+    this.numbers.push(...start, ...end, color[0] / 255, color[1] / 255, color[2] / 255, width);
+  }
+
+  dot(point, color, width) {
+    this.line(point, point, color, width);
+  }
+}
+
+/** With many edges thick lines would hide each other. */
+const thinness = (edges) => clamp(Math.sqrt(150 / Math.max(edges, 1)), 0.5, 1);
+
+/** Everything, in the order of drawing. */
+function drawScene(viewer) {
+  const { data, state, through } = viewer;
+  const cameras = new Strokes(0);
+  const edges = new Strokes(0);
+  const dots = new Strokes(2e-4);
+  const marked = new Strokes(4e-4);
+  const colors = theme();
+  const thin = thinness(data.edges.length);
+  const snapshot = data.evolution[state.snapshot];
+  const chosen = (kind, index) => (item) => item?.kind === kind && item.index === index;
+  const is = (item, kind, index) => chosen(kind, index)(item);
+
+  if (state.showCameras && through === null) {
+    const supporting = supportingViews(data, state.selection);
+    data.views.forEach((view, index) => {
+      const picked = is(state.selection, "view", index);
+      const hot = picked || is(state.hover, "view", index);
+      const color = picked || supporting.has(index) ? colors.accent : hot ? colors.ink : colors.muted;
+      drawFrustum(cameras, view, color, hot ? 2 : supporting.has(index) ? 1.4 : 1);
+    });
+  }
+  data.edges.forEach(([a, b], index) => {
+    if (!viewer.visible[index]) return;
+    const [start, end] = [data.points[a], data.points[b]];
+    const picked = is(state.selection, "segment", index);
+    const hot = is(state.hover, "segment", index);
+    let color = edgeColor(state.measure, index);
+    if (snapshot && !picked) color = mixPoints(color, colors.stage, 0.72);
+    const width = (through === null ? 3 : 2.2) * thin;
+    if (picked) marked.line(start, end, colors.accent, width + 3);
+    else (hot ? marked : edges).line(start, end, color, hot ? width + 2.4 : width);
+  });
+  if (snapshot) {
+    for (const point of snapshot.points) dots.dot(point, colors.evolution, 6.5 * thin);
+  }
+  data.points.forEach((point, index) => {
+    const picked = is(state.selection, "junction", index);
+    const hot = is(state.hover, "junction", index);
+    if (picked || hot) marked.dot(point, picked ? colors.accent : colors.ink, picked ? 13 : 11);
+    else if (state.showJunctions && !snapshot && viewer.junctionVisible[index]) {
+      dots.dot(point, colors.ink, (through === null ? 6.5 : 5) * thin);
+    }
+  });
+  return [cameras, edges, dots, marked];
+}
+
+function drawFrustum(strokes, { position, frustum: corners }, color, width) {
+  corners.forEach((corner, i) => {
+    strokes.line(position, corner, color, width);
+    strokes.line(corner, corners[(i + 1) % 4], color, width);
+  });
+  // The small roof says which side of the image is its upper one.
+  const [left, right, , below] = corners;
+  const middle = mixPoints(left, right, 0.5);
+  const tip = add(middle, scale(subtract(left, below), 0.22));
+  strokes.line(mixPoints(left, right, 0.3), tip, color, width);
+  strokes.line(mixPoints(left, right, 0.7), tip, color, width);
+}
+
+/** Indices of the views that support a segment, or any segment of a junction. */
+function supportingViews(data, selection) {
+  const views = new Set();
+  if (selection?.kind === "view") return views;
+  for (const edge of edgesOf(data, selection)) {
+    for (const [view] of data.support[edge] ?? []) views.add(view);
+  }
+  return views;
+}
+
+/** The edges that a selection is about. */
+function edgesOf(data, selection) {
+  if (selection?.kind === "segment") return [selection.index];
+  if (selection?.kind !== "junction") return [];
+  return data.edges.flatMap((ends, index) => (ends.includes(selection.index) ? [index] : []));
+}
