@@ -157,8 +157,11 @@ export class Browser {
 
   async press(key, code = key) {
     const text = key.length === 1 ? key : undefined;
-    await this.send("Input.dispatchKeyEvent", { type: "keyDown", key, code, text });
-    await this.send("Input.dispatchKeyEvent", { type: "keyUp", key, code });
+    // What the browser itself does with a key goes by this number.
+    const windowsVirtualKeyCode = { Escape: 27, Tab: 9 }[key];
+    const event = { key, code, windowsVirtualKeyCode };
+    await this.send("Input.dispatchKeyEvent", { ...event, type: "keyDown", text });
+    await this.send("Input.dispatchKeyEvent", { ...event, type: "keyUp" });
     await this.settle();
   }
 

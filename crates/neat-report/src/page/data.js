@@ -15,7 +15,7 @@ function readData() {
   for (const view of data.views) Object.assign(view, viewAxes(view), { position: toModel(view.center) });
   data.frustumSize = frustumSize(data.views);
   for (const view of data.views) view.frustum = frustum(view, data.frustumSize);
-  data.up = upDirection(data.views);
+  data.up = upDirection(data);
   data.supportCounts = supportCounts(data);
   data.measures = edgeMeasures(data);
   for (const snapshot of data.evolution) snapshot.points = decodePoints(snapshot.junctions, toModel);
@@ -59,20 +59,34 @@ function frustum({ size: [width, height], intrinsics, position, right, down, for
   });
 }
 
+const cosine = (degrees) => Math.cos((degrees * Math.PI) / 180);
+
 /**
- * Where up is: the mean of what is up in the photographs, or a coordinate axis that
- * is almost that. Cameras that cancel out leave +z.
+ * Where up is: about what is up in the photographs. A coordinate axis that is almost
+ * that, or else the direction of the most edges near it, stands upright. Cameras that
+ * cancel out leave +z.
  */
-function upDirection(views) {
+function upDirection({ views, edges, points }) {
   const sum = views.reduce((total, { down }) => subtract(total, down), [0, 0, 0]);
   if (norm(sum) < 0.05 * views.length || !views.length) return [0, 0, 1];
   const up = normalize(sum);
   for (const axis of [0, 1, 2]) {
-    if (Math.abs(up[axis]) > Math.cos((15 * Math.PI) / 180)) {
+    if (Math.abs(up[axis]) > cosine(10)) {
       return [0, 1, 2].map((i) => (i === axis ? Math.sign(up[axis]) : 0));
     }
   }
-  return up;
+  // Photographs of an object on a table look down on it, and so are tilted.
+  const steep = edges.map(([a, b]) => subtract(points[b], points[a]))
+    .map((edge) => (dot(edge, up) < 0 ? scale(edge, -1) : edge))
+    .filter((edge) => dot(edge, up) > cosine(35) * norm(edge))
+    .sort((a, b) => norm(b) - norm(a)).slice(0, 400);
+  const along = (direction) => steep.filter((edge) => dot(edge, direction) > cosine(3) * norm(edge))
+    .reduce(add, [0, 0, 0]);
+  const best = steep.map((edge) => along(normalize(edge)))
+    .reduce((most, bundle) => (norm(bundle) > norm(most) ? bundle : most), [0, 0, 0]);
+  // A few parallel edges may be anything.
+  const total = steep.reduce((length, edge) => length + norm(edge), 0);
+  return norm(best) > 0.3 * total && steep.length >= 6 ? normalize(best) : up;
 }
 
 /** In how many views each edge has support; null where nothing is known of it. */
@@ -114,10 +128,11 @@ function rootMeanSquare(list) {
   return Math.sqrt(list.reduce((sum, [, , residual]) => sum + residual * residual, 0) / list.length);
 }
 
-/** The range of a scale: all values but the outermost hundredths. */
+/** The range of a scale: most values; a few that are far off would leave one colour to
+ * all others. */
 function spread(values) {
   const sorted = values.filter(Number.isFinite).sort((a, b) => a - b);
-  const [low, high] = [quantile(sorted, 0.01), quantile(sorted, 0.99)];
+  const [low, high] = [quantile(sorted, 0.02), quantile(sorted, 0.93)];
   return [low, high > low ? high : low + 1e-9 + Math.abs(low) * 1e-6];
 }
 

@@ -2,9 +2,13 @@
 
 /** Lines and dots (lines without length), for a renderer. */
 class Strokes {
-  /** Those with the larger bias are drawn over others at about the same depth. */
-  constructor(bias) {
+  /** Those with the larger bias are drawn over others at about the same depth; `haze`
+   * says how much of the view's fog they get, and `clearance` how far before the
+   * camera they vanish, as a share of the distance of its target. */
+  constructor(bias, haze = 1, clearance = 0) {
     this.bias = bias;
+    this.haze = haze;
+    this.clearance = clearance;
     this.numbers = [];
   }
 
@@ -27,7 +31,7 @@ const thinness = (edges) => clamp(Math.sqrt(150 / Math.max(edges, 1)), 0.5, 1);
 /** Everything, in the order of drawing. */
 function drawScene(viewer) {
   const { data, state, through } = viewer;
-  const cameras = new Strokes(0);
+  const cameras = new Strokes(0, 0.5, 0.3);
   const edges = new Strokes(0);
   const dots = new Strokes(2e-4);
   const marked = new Strokes(4e-4);

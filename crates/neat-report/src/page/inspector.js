@@ -95,17 +95,21 @@ function observations(viewer, edge) {
     drawObservations(viewer, cards);
   };
   showMore(FIRST_OBSERVATIONS);
-  const more = list.length > FIRST_OBSERVATIONS
-    ? element("button", { type: "button", class: "more", onclick: () => { showMore(list.length); more.remove(); } },
-      `Show all ${list.length}`)
-    : null;
+  const more = [];
+  if (list.length > FIRST_OBSERVATIONS) {
+    const showAll = () => {
+      showMore(list.length);
+      more[0].remove();
+    };
+    more.push(element("button", { type: "button", class: "more", onclick: showAll }, `Show all ${list.length}`));
+  }
   const views = new Set(list.map(([view]) => view)).size;
   return [
     element("h3", {}, countOf(views, "supporting view")),
     element("p", { class: "key" },
       element("span", { class: "swatch observed" }), "2D segment ",
       element("span", { class: "swatch projected" }), "this edge projected"),
-    cards, more,
+    cards, ...more,
   ];
 }
 

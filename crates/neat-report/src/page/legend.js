@@ -23,8 +23,10 @@ function makeLegend(viewer) {
   const draw = () => {
     const { measure } = state;
     const digits = measure.whole ? 6 : 3;
-    low.textContent = formatNumber(measure.range[0], digits);
-    high.textContent = formatNumber(measure.range[1], digits);
+    const beyond = (test) => measure.values.some((value) => value !== null && test(value));
+    const [from, to] = measure.range;
+    low.textContent = (beyond((value) => value < from) ? "≤ " : "") + formatNumber(from, digits);
+    high.textContent = (beyond((value) => value > to) ? "≥ " : "") + formatNumber(to, digits);
     picture.setAttribute("aria-label",
       `${measure.label} from ${low.textContent} to ${high.textContent}, and how often each value occurs`);
     picture.replaceChildren(...histogram(measure));
@@ -62,14 +64,14 @@ function makeFilter(viewer) {
   const { section, content } = panel("Filter");
   const { probability } = data.edgeFields;
   if (probability) {
-    content.append(slider("Least probability", {
+    content.append(slider("Minimum probability", {
       min: 0, max: 1, step: 0.01, value: 0, words: (x) => x.toFixed(2),
       oninput: (minProbability) => viewer.change({ minProbability }),
     }).row);
   }
   if (data.supportCounts) {
-    const most = Math.max(0, ...data.supportCounts);
-    content.append(slider("Least supporting views", {
+    const most = data.supportCounts.reduce((a, b) => Math.max(a, b), 0);
+    content.append(slider("Minimum supporting views", {
       min: 0, max: most, step: 1, value: 0, words: (x) => String(x),
       oninput: (minViews) => viewer.change({ minViews }),
     }).row);

@@ -17,25 +17,43 @@ class Orbit {
     this.animation = 0;
   }
 
-  /** From where the photographs were taken, a little to the side: lines of an object
-   * seen straight on hide each other. */
+  /** From where the photographs were taken, and there from where the junctions hide
+   * each other least. */
   firstPose() {
-    const pose = { target: [0, 0, 0], distance: 1.12 / Math.sin(FIELD_OF_VIEW / 2), yaw: 0.6, pitch: 0.42 };
+    const pose = { target: [0, 0, 0], distance: 1.12 / Math.sin(FIELD_OF_VIEW / 2), yaw: 0, pitch: 0.42 };
     const { views } = this.data;
-    if (!views.length) return pose;
     const directions = views.map((view) => normalize(view.position));
-    const mean = scale(directions.reduce(add, [0, 0, 0]), 1 / views.length);
+    const mean = scale(directions.reduce(add, [0, 0, 0]), 1 / Math.max(views.length, 1));
+    let reach = Math.PI;
     // Cameras all around say nothing.
-    if (norm(mean) < 0.35) return pose;
-    const height = dot(normalize(mean), this.up);
-    pose.yaw = Math.atan2(dot(mean, this.east), dot(mean, this.north)) + 0.35;
-    pose.pitch = clamp(Math.asin(clamp(height, -1, 1)), 0.2, 1);
+    if (norm(mean) > 0.35) {
+      const height = dot(normalize(mean), this.up);
+      pose.yaw = Math.atan2(dot(mean, this.east), dot(mean, this.north));
+      pose.pitch = clamp(Math.asin(clamp(height, -1, 1)), 0.2, 1);
+      reach = 0.6;
+    }
+    const yaws = Array.from({ length: 25 }, (_, i) => pose.yaw + reach * (i / 12 - 1));
+    const clarity = yaws.map((yaw) => this.clarity({ ...pose, yaw }));
+    pose.yaw = yaws[clarity.indexOf(Math.max(...clarity))];
     return pose;
   }
 
+  /** How far apart the junctions appear: the mean logarithm of the distance from each
+   * to its nearest neighbour, of some hundred. */
+  clarity(pose) {
+    const { right, down } = this.camera(pose);
+    const { points } = this.data;
+    const stride = Math.ceil(points.length / 200);
+    const flat = points.filter((_, i) => i % stride === 0).map((p) => [dot(right, p), dot(down, p)]);
+    return flat.reduce((sum, [x, y]) => {
+      const distances = flat.map(([u, v]) => Math.hypot(u - x, v - y) || Infinity);
+      return sum + Math.log(clamp(Math.min(...distances), 1e-3, 1));
+    }, 0);
+  }
+
   /** The camera's centre and axes in model coordinates. */
-  camera() {
-    const { target, distance, yaw, pitch } = this.pose;
+  camera(pose = this.pose) {
+    const { target, distance, yaw, pitch } = pose;
     const level = add(scale(this.north, Math.cos(yaw)), scale(this.east, Math.sin(yaw)));
     const back = add(scale(level, Math.cos(pitch)), scale(this.up, Math.sin(pitch)));
     const forward = scale(back, -1);
@@ -52,7 +70,7 @@ class Orbit {
     const pinhole = { fx: focal, fy: focal, cx: width / 2, cy: height / 2, skew: 0 };
     const projection = pinholeProjection(pinhole, width, height, near, distance + 60);
     const matrix = multiply(projection, cameraFromWorld(right, down, forward, center));
-    return { matrix, width, height, near, fog: [distance - 0.9, distance + 1.5, 0.62] };
+    return { matrix, width, height, near, distance, fog: [distance - 0.9, distance + 1.5, 0.62] };
   }
 
   /** In pixels: the shorter side of the viewport spans the field of view. */

@@ -29,7 +29,7 @@ function makeCameras(viewer) {
     const context = sharpContext(canvas, width, height);
     const transform = fitBox([0, 0, ...view.size], width, height, 0);
     drawImage(context, view, image, transform);
-    if (!image) drawSegments(context, view, transform, "rgb(128 128 128 / 0.8)");
+    if (!image) drawSegments(context, view, transform, OBSERVATION_COLOR, 0.7);
   };
   // Only what is scrolled into view is decoded.
   const watcher = new IntersectionObserver((entries) => {
@@ -82,7 +82,8 @@ function makeThroughBar(viewer) {
     bar.hidden = viewer.through === null;
     const view = viewer.data.views[viewer.through];
     const name = byId("through-name");
-    const text = view ? view.name : "";
+    const missing = view && !view.photograph ? " (photograph not embedded)" : "";
+    const text = view ? view.name + missing : "";
     if (name.textContent !== text) name.textContent = text;
     byId("through-segments").setAttribute("aria-pressed", String(viewer.state.showSegments));
   });

@@ -44,13 +44,14 @@ function drawImage(context, view, image, { zoom, offset }) {
 }
 
 /** A line between two points of the image, with a dark rim so that it shows on any
- * photograph. */
+ * photograph; a dashed one without, so that it does not cover what is below. */
 function drawLine(context, { zoom, offset }, [a, b], color, width, dash = []) {
+  const rim = ["rgb(0 0 0 / 0.55)", width + Math.min(width, 2)];
   context.lineCap = dash.length ? "butt" : "round";
-  for (const [style, extra] of [["rgb(0 0 0 / 0.55)", 2], [color, 0]]) {
+  context.setLineDash(dash);
+  for (const [style, lineWidth] of dash.length ? [[color, width]] : [rim, [color, width]]) {
     context.strokeStyle = style;
-    context.lineWidth = width + extra;
-    context.setLineDash(extra ? [] : dash);
+    context.lineWidth = lineWidth;
     context.beginPath();
     context.moveTo(a[0] * zoom + offset[0], a[1] * zoom + offset[1]);
     context.lineTo(b[0] * zoom + offset[0], b[1] * zoom + offset[1]);
@@ -59,16 +60,11 @@ function drawLine(context, { zoom, offset }, [a, b], color, width, dash = []) {
   context.setLineDash([]);
 }
 
-/** All 2D segments of a view, thin. */
-function drawSegments(context, view, transform, color) {
-  context.strokeStyle = color;
-  context.lineWidth = 1;
-  context.beginPath();
+/** All 2D segments of a view. */
+function drawSegments(context, view, transform, color, width) {
   for (const [x0, y0, x1, y1] of view.segments) {
-    context.moveTo(x0 * transform.zoom + transform.offset[0], y0 * transform.zoom + transform.offset[1]);
-    context.lineTo(x1 * transform.zoom + transform.offset[0], y1 * transform.zoom + transform.offset[1]);
+    drawLine(context, transform, [[x0, y0], [x1, y1]], color, width);
   }
-  context.stroke();
 }
 
 const OBSERVATION_COLOR = "#ffd23e";
@@ -89,9 +85,9 @@ async function drawObservation(canvas, data, viewIndex, edge, observed, whole) {
     ? fitBox([0, 0, ...view.size], width, height, 0)
     : fitBox(cropAround(segments, view.size), width, height, 0);
   drawImage(context, view, image, transform);
-  if (!image) drawSegments(context, view, transform, "rgb(128 128 128 / 0.8)");
+  if (!image) drawSegments(context, view, transform, OBSERVATION_COLOR, 1);
   if (observed) drawLine(context, transform, observed, OBSERVATION_COLOR, whole ? 3 : 4);
-  if (projected) drawLine(context, transform, projected, cssColor(theme().accent), 2, [6, 4]);
+  if (projected) drawLine(context, transform, projected, cssColor(theme().accent), 2, [7, 5]);
 }
 
 /** The box of the segments with a margin, not tiny and not larger than the image. */
@@ -144,7 +140,7 @@ class ThroughCamera {
     };
     const projection = pinholeProjection(pinhole, width, height, 1e-3, 200);
     const matrix = multiply(projection, cameraFromWorld(right, down, forward, position));
-    return { matrix, width, height, near: 1e-3, fog: [0, 1, 0] };
+    return { matrix, width, height, near: 1e-3, distance: 0, fog: [0, 1, 0] };
   }
 
   move(dx, dy) {

@@ -32,10 +32,11 @@ function pick(viewer, x, y, reach) {
     offer("segment", index, distance, depth, reach);
   });
   if (best || !state.showCameras || through !== null) return best;
+  const clear = Math.max(near, 0.45 * viewer.navigator.pose.distance);
   data.views.forEach(({ position, frustum: corners }, index) => {
     corners.forEach((corner, i) => {
       for (const end of [position, corners[(i + 1) % 4]]) {
-        const ends = projectSegment(matrix, corner, end, width, height, near);
+        const ends = projectSegment(matrix, corner, end, width, height, clear);
         if (!ends) continue;
         const { distance, depth } = distanceToSegment(x, y, ends);
         offer("view", index, distance, depth, 0.6 * reach);

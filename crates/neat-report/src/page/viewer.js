@@ -117,7 +117,7 @@ class Viewer {
     const view = this.data.views[index];
     const transform = this.navigator.transform(width, height);
     drawImage(context, view, image, transform);
-    if (this.state.showSegments || !image) drawSegments(context, view, transform, OBSERVATION_COLOR);
+    if (this.state.showSegments || !image) drawSegments(context, view, transform, OBSERVATION_COLOR, 1.4);
   }
 
   /** The axes of the user's frame in a corner. */

@@ -11,10 +11,11 @@ uniform vec2 size;                // of the canvas, in its pixels
 uniform float ratio;              // canvas pixels per pixel of the page
 uniform float near, bias;
 uniform vec3 fog;                 // begins, ends, strength
+uniform vec2 clearance;           // nearer than the first nothing, from the second on all
 uniform vec3 background;
 varying vec3 shade;
 varying vec2 place;               // along from the start, across
-varying float len, radius;
+varying float len, radius, opacity;
 
 void main() {
   vec4 a = clipFromModel * vec4(start, 1.0);
@@ -34,6 +35,7 @@ void main() {
   vec2 point = from + along * place.x + across * place.y;
   vec4 at = corner.x < 0.5 ? a : b;
   shade = mix(color, background, fog.z * smoothstep(fog.x, fog.y, at.w));
+  opacity = clamp((at.w - clearance.x) / (clearance.y - clearance.x), 0.0, 1.0);
   // w = 1: place is linear on the screen, not in space.
   gl_Position = vec4(point / (0.5 * size), at.z / at.w - bias, 1.0);
 }`;
@@ -47,14 +49,14 @@ precision mediump float;
 uniform float fringe;
 varying vec3 shade;
 varying vec2 place;
-varying float len, radius;
+varying float len, radius, opacity;
 
 void main() {
   float beyond = max(max(-place.x, place.x - len), 0.0);
   float coverage = clamp(radius + 0.5 - length(vec2(beyond, place.y)), 0.0, 1.0);
   // First the bodies, which hide what is behind; then their soft rims.
   if (coverage <= 0.0 || (coverage >= 0.5) == (fringe > 0.5)) discard;
-  gl_FragColor = vec4(shade * coverage, coverage);
+  gl_FragColor = vec4(shade, 1.0) * coverage * opacity;
 }`;
 
 const STROKE_ATTRIBUTES = [["start", 3, 0], ["end", 3, 12], ["color", 3, 24], ["width", 1, 36]];
@@ -63,7 +65,7 @@ const STROKE_BYTES = 40;
 class WebglRenderer {
   /** Throws where there is no WebGL with instances. */
   constructor(canvas) {
-    const options = { alpha: true, antialias: false, premultipliedAlpha: true, preserveDrawingBuffer: true };
+    const options = { alpha: true, antialias: false, premultipliedAlpha: true };
     this.canvas = canvas;
     this.gl = canvas.getContext("webgl2", options);
     this.kind = "WebGL 2";
@@ -99,7 +101,7 @@ class WebglRenderer {
     gl.useProgram(program);
     this.program = program;
     this.uniforms = {};
-    for (const name of ["clipFromModel", "size", "ratio", "near", "bias", "fog", "background", "fringe"]) {
+    for (const name of ["clipFromModel", "size", "ratio", "near", "bias", "fog", "clearance", "background", "fringe"]) {
       this.uniforms[name] = gl.getUniformLocation(program, name);
     }
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
@@ -121,7 +123,8 @@ class WebglRenderer {
       const buffer = gl.createBuffer();
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(strokes.numbers), gl.DYNAMIC_DRAW);
-      return { buffer, count: strokes.count, bias: strokes.bias };
+      const { count, bias, haze, clearance } = strokes;
+      return { buffer, count, bias, haze, clearance };
     });
   }
 
@@ -142,16 +145,15 @@ class WebglRenderer {
     gl.uniform2f(uniforms.size, width, height);
     gl.uniform1f(uniforms.ratio, ratio);
     gl.uniform1f(uniforms.near, view.near);
-    gl.uniform3fv(uniforms.fog, view.fog);
     gl.uniform3fv(uniforms.background, theme().stage.map((c) => c / 255));
     for (const fringe of [0, 1]) {
       gl.uniform1f(uniforms.fringe, fringe);
       gl.depthMask(!fringe);
-      for (const batch of this.batches) this.drawBatch(batch);
+      for (const batch of this.batches) this.drawBatch(batch, view);
     }
   }
 
-  drawBatch({ buffer, count, bias }) {
+  drawBatch({ buffer, count, bias, haze, clearance }, { fog: [begins, ends, strength], distance }) {
     const { gl, program } = this;
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
     for (const [name, size, offset] of STROKE_ATTRIBUTES) {
@@ -161,6 +163,8 @@ class WebglRenderer {
       this.setDivisor(location, 1);
     }
     gl.uniform1f(this.uniforms.bias, bias);
+    gl.uniform3f(this.uniforms.fog, begins, ends, strength * haze);
+    gl.uniform2f(this.uniforms.clearance, clearance * distance - 1e-6, 2 * clearance * distance);
     this.drawInstances(count);
   }
 }
