@@ -1,70 +1,89 @@
-//! A report on a synthetic scene, with everything that a report can hold.
+//! Reports on a synthetic scene, to look at and for `scripts/check_report.mjs`.
 //!
 //! ```text
-//! cargo run --release -p neat-report --example sample_report -- OUT.html [--hostile]
+//! cargo run --release -p neat-report --example sample_report -- FOLDER
 //! ```
 //!
-//! `--hostile` fills all texts with what would be markup or script if the page took
-//! it for that, and leaves out all photographs. `scripts/check_report.mjs` opens both
-//! in a browser.
+//! `sample.html` has everything that a report can hold. In `hostile.html` all texts
+//! would be markup or script if the page took them for that, and there are no
+//! photographs. In `empty.html` nothing was reconstructed.
 
 use nalgebra::Vector3;
-use neat_core::LineSegment2;
 use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
-use neat_report::{Curve, FactGroup, JunctionSnapshot, PhotographConfig, Report};
+use neat_core::{LineSegment2, file};
+use neat_report::{Curve, FactGroup, JunctionSnapshot, PhotographConfig, Report, ReportError};
 use neat_wireframe::export::{SupportingSegment, WireframeDocument};
 use std::error::Error;
-use std::path::Path;
+use std::path::PathBuf;
 
 const STEPS: u64 = 1000;
 const HOSTILE: &str =
     "</script><img src=x onerror=alert(1)><!-- {{data}} ${1} \u{2028} \"'&lt; &amp; \\u003c";
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args_os().skip(1);
-    let out = arguments.next().ok_or("name the file to write")?;
-    let hostile = arguments
-        .next()
-        .is_some_and(|argument| argument == "--hostile");
-
+    let folder = std::env::args_os()
+        .nth(1)
+        .ok_or("name the folder to write to")?;
+    let folder = PathBuf::from(folder);
+    file::create_dir(&folder)?;
     let data = generate(&SyntheticScene {
         solid: Solid::StairPrism,
         views: 24,
         image_size: 640,
         ..SyntheticScene::default()
     })?;
+    let sample = sample(&data)?;
+    sample.write(&folder.join("sample.html"))?;
+    hostile(&sample).write(&folder.join("hostile.html"))?;
+    empty(&sample).write(&folder.join("empty.html"))?;
+    Ok(())
+}
+
+fn sample(data: &SyntheticData) -> Result<Report, ReportError> {
     let photographs = PhotographConfig {
-        max_photographs: if hostile { 0 } else { 16 },
+        max_photographs: 16,
         ..PhotographConfig::default()
     };
-    let document = document(&data);
-    let mut report = Report::of_scene(&data.scene, document, 0.05, &photographs)?;
+    let mut report = Report::of_scene(&data.scene, document(data), 0.05, &photographs)?;
     report.junction_evolution = evolution(&report.document.junctions);
     report.curves = curves();
     report.facts = facts();
     report.warnings = vec![
         "Views 0003 and 0017 look alike: one of them adds little.".to_owned(),
-        "Two segments are supported by two views only.".to_owned(),
+        "Two segments are supported by no view.".to_owned(),
     ];
     report.configuration =
         "seed = 0\n\n[train]\nsteps = 1000\nrays = 1024\n\n[distill]\nmin_views = 2\n".to_owned();
-    if hostile {
-        let index_of_view_0 = &mut report.document.views[0];
-        *index_of_view_0 = HOSTILE.to_owned();
-        report.views[0].name = HOSTILE.to_owned();
-        report.title = HOSTILE.to_owned();
-        report.configuration = HOSTILE.to_owned();
-        report.warnings = vec![HOSTILE.to_owned()];
-        report.curves[0].name = HOSTILE.to_owned();
-        report.facts[0].facts[0] = (HOSTILE.to_owned(), HOSTILE.to_owned());
-        let lengths = report.document.edge_fields["probability"].clone();
-        report
-            .document
-            .edge_fields
-            .insert(HOSTILE.to_owned(), lengths);
+    Ok(report)
+}
+
+fn hostile(sample: &Report) -> Report {
+    let text = || HOSTILE.to_owned();
+    let mut report = sample.clone();
+    report.title = text();
+    report.configuration = text();
+    report.warnings = vec![text()];
+    report.curves[0].name = text();
+    report.facts[0].heading = text();
+    report.facts[0].facts[0] = (text(), text());
+    report.views[0].name = text();
+    report.document.views[0] = text();
+    for view in &mut report.views {
+        view.photograph = None;
     }
-    report.write(Path::new(&out))?;
-    Ok(())
+    let fields = &mut report.document.edge_fields;
+    let values = fields.values().next().cloned().unwrap_or_default();
+    fields.insert(text(), values);
+    report
+}
+
+fn empty(sample: &Report) -> Report {
+    Report {
+        title: sample.title.clone(),
+        views: sample.views[..1].to_vec(),
+        warnings: vec!["the wireframe has no edges".to_owned()],
+        ..Report::default()
+    }
 }
 
 /// The truth, slightly moved, with two edges too many and what the 2D segments say.

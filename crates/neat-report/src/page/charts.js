@@ -34,7 +34,7 @@ function makeChart(curve) {
   }, ...axisLines(x, y, logarithmic),
   svgElement("path", { class: "curve", d: path(curve.points, x, (v) => y.place(height(v))) }), marker, dot);
   const figure = element("figure", { class: "chart" },
-    element("figcaption", {}, element("span", {}, curve.name), value), svg);
+    element("figcaption", {}, element("span", {}, curve.name + (logarithmic ? " (log scale)" : "")), value), svg);
 
   const show = (step) => {
     const [at, v] = nearest(points, step);
