@@ -21,19 +21,20 @@ function ramp(colors, share) {
   return mixPoints(colors[index], colors[index + 1], place - index);
 }
 
-/** The colours of a measure from its lowest to its highest value. */
-function scaleOf(measure) {
-  const scheme = darkScheme.matches ? "dark" : "light";
+/** The colours of a measure from its lowest to its highest value; `bright` for lines
+ * on a photograph. */
+function scaleOf(measure, bright) {
+  const scheme = bright || darkScheme.matches ? "dark" : "light";
   if (!measure.good) return NEUTRAL[scheme];
   return measure.good === "high" ? TRUST[scheme] : [...TRUST[scheme]].reverse();
 }
 
 /** The colour of an edge by a measure; grey where nothing is known. */
-function edgeColor(measure, edge) {
+function edgeColor(measure, edge, bright) {
   const value = measure?.values[edge];
   if (value === null || value === undefined) return theme().muted;
   const [low, high] = measure.range;
-  return ramp(scaleOf(measure), (value - low) / (high - low));
+  return ramp(scaleOf(measure, bright), (value - low) / (high - low));
 }
 
 const cssColor = ([r, g, b]) => `rgb(${Math.round(r)} ${Math.round(g)} ${Math.round(b)})`;

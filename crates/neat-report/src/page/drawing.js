@@ -25,23 +25,33 @@ class Strokes {
   }
 }
 
-/** With many edges thick lines would hide each other. */
-const thinness = (edges) => clamp(Math.sqrt(150 / Math.max(edges, 1)), 0.5, 1);
+/** With many edges, and in a small window, thick lines would hide each other. */
+function thinness(edges, [width, height]) {
+  const room = clamp(Math.min(width, height) / 700, 0.6, 1);
+  return clamp(room * Math.sqrt(150 / Math.max(edges, 1)), 0.36, 1);
+}
+
+/** Around lines on a photograph, whatever their colour and its. */
+const RIM = [18, 22, 28];
+const PAPER = [255, 255, 255];
 
 /** Everything, in the order of drawing. */
 function drawScene(viewer) {
   const { data, state, through } = viewer;
   const cameras = new Strokes(0, 0.5, 0.3);
-  const edges = new Strokes(0);
+  const rims = new Strokes(0);
+  const edges = new Strokes(1e-4);
   const dots = new Strokes(2e-4);
   const marked = new Strokes(4e-4);
   const colors = theme();
-  const thin = thinness(data.edges.length);
+  const onPhotograph = through !== null;
+  const ink = onPhotograph ? PAPER : colors.ink;
+  const thin = thinness(data.edges.length, viewer.size());
   const snapshot = data.evolution[state.snapshot];
   const chosen = (kind, index) => (item) => item?.kind === kind && item.index === index;
   const is = (item, kind, index) => chosen(kind, index)(item);
 
-  if (state.showCameras && through === null) {
+  if (state.showCameras && !onPhotograph) {
     const supporting = supportingViews(data, state.selection);
     data.views.forEach((view, index) => {
       const picked = is(state.selection, "view", index);
@@ -55,9 +65,10 @@ function drawScene(viewer) {
     const [start, end] = [data.points[a], data.points[b]];
     const picked = is(state.selection, "segment", index);
     const hot = is(state.hover, "segment", index);
-    let color = edgeColor(state.measure, index);
+    let color = edgeColor(state.measure, index, onPhotograph);
     if (snapshot && !picked) color = mixPoints(color, colors.stage, 0.72);
-    const width = (through === null ? 3 : 2.2) * thin;
+    const width = (onPhotograph ? 2.4 : 3) * thin;
+    if (onPhotograph) rims.line(start, end, RIM, (picked ? width + 3 : width) + 1.4);
     if (picked) marked.line(start, end, colors.accent, width + 3);
     else (hot ? marked : edges).line(start, end, color, hot ? width + 2.4 : width);
   });
@@ -67,12 +78,14 @@ function drawScene(viewer) {
   data.points.forEach((point, index) => {
     const picked = is(state.selection, "junction", index);
     const hot = is(state.hover, "junction", index);
-    if (picked || hot) marked.dot(point, picked ? colors.accent : colors.ink, picked ? 13 : 11);
+    if (picked || hot) marked.dot(point, picked ? colors.accent : ink, picked ? 13 : 11);
     else if (state.showJunctions && !snapshot && viewer.junctionVisible[index]) {
-      dots.dot(point, colors.ink, (through === null ? 6.5 : 5) * thin);
+      const width = (onPhotograph ? 5 : 6.5) * thin;
+      if (onPhotograph) rims.dot(point, RIM, width + 2);
+      dots.dot(point, ink, width);
     }
   });
-  return [cameras, edges, dots, marked];
+  return [cameras, rims, edges, dots, marked];
 }
 
 function drawFrustum(strokes, { position, frustum: corners }, color, width) {

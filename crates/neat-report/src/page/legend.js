@@ -29,15 +29,15 @@ function makeLegend(viewer) {
     high.textContent = (beyond((value) => value > to) ? "≥ " : "") + formatNumber(to, digits);
     picture.setAttribute("aria-label",
       `${measure.label} from ${low.textContent} to ${high.textContent}, and how often each value occurs`);
-    picture.replaceChildren(...histogram(measure));
+    picture.replaceChildren(...histogram(measure, scaleOf(measure, viewer.through !== null)));
   };
-  viewer.onChange((keys) => { if (keys.includes("measure")) draw(); });
+  viewer.onChange((keys) => { if (keys.includes("measure") || keys.includes("through")) draw(); });
   darkScheme.addEventListener("change", draw);
   draw();
 }
 
 /** Bars over a band of colours: how many edges have which value. */
-function histogram(measure) {
+function histogram(measure, colors) {
   const [low, high] = measure.range;
   const counts = new Array(LEGEND_BINS).fill(0);
   for (const value of measure.values) {
@@ -48,7 +48,7 @@ function histogram(measure) {
   const most = Math.max(...counts);
   const step = LEGEND_WIDTH / LEGEND_BINS;
   return counts.flatMap((count, bin) => {
-    const fill = cssColor(ramp(scaleOf(measure), (bin + 0.5) / LEGEND_BINS));
+    const fill = cssColor(ramp(colors, (bin + 0.5) / LEGEND_BINS));
     const height = count ? Math.max((24 * count) / most, 1.5) : 0;
     return [
       svgElement("rect", { x: bin * step + 0.5, y: 27 - height, width: step - 1, height, fill, opacity: 0.85 }),

@@ -7,9 +7,9 @@ class Viewer {
     this.canvas = byId("scene");
     this.background = byId("photograph");
     this.listeners = [];
-    /** Index of the view that is looked through, or null. */
-    this.through = null;
     this.state = {
+      /** Index of the view that is looked through, or null. */
+      through: null,
       measure: data.measures[0],
       minProbability: 0,
       minViews: 0,
@@ -28,7 +28,7 @@ class Viewer {
     this.filter();
     this.renderer = this.chooseRenderer();
     controlCamera(this.canvas, this);
-    new ResizeObserver(() => this.redraw()).observe(this.stage);
+    new ResizeObserver(() => this.change({})).observe(this.stage);
     darkScheme.addEventListener("change", () => this.change({}));
   }
 
@@ -55,6 +55,10 @@ class Viewer {
     const notice = byId("notice");
     notice.textContent = text;
     notice.hidden = !text;
+  }
+
+  get through() {
+    return this.state.through;
   }
 
   size() {
@@ -193,10 +197,9 @@ class Viewer {
   /** Looks through a camera, or from outside for null. */
   lookThrough(index) {
     this.orbit.stop();
-    this.through = index;
     this.stage.classList.toggle("through-camera", index !== null);
     this.navigator = index === null ? this.orbit : new ThroughCamera(this.data.views[index], () => this.redraw());
-    this.change({ hover: null });
+    this.change({ through: index, hover: null });
   }
 
   stepThrough(by) {
