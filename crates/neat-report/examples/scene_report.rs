@@ -1,0 +1,120 @@
+//! A report on a scene folder without any training: 2D wireframes are detected where
+//! there are none, and the line-track back end reconstructs, unless a wireframe is
+//! given.
+//!
+//! ```text
+//! cargo run --release -p neat-report --example scene_report -- SCENE OUT.html [WIREFRAME.json]
+//! ```
+
+#![expect(clippy::print_stdout, reason = "an example tells what it does")]
+
+use neat_core::layout::HAWP_DIR;
+use neat_core::{LineSegment2, LoadOptions, Scene, Wireframe3d, load_scene};
+use neat_detect::{DetectorConfig, detect};
+use neat_report::{FactGroup, PhotographConfig, Report};
+use neat_wireframe::ViewObservation;
+use neat_wireframe::edge_support::EdgeSupportConfig;
+use neat_wireframe::export::{SupportingSegment, WireframeDocument, read_json};
+use neat_wireframe::line_tracks::{LineTracksConfig, run};
+use rayon::prelude::*;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+const MIN_SCORE: f64 = 0.05;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<PathBuf> = std::env::args_os().skip(1).map(PathBuf::from).collect();
+    let (folder, out, given) = match arguments.as_slice() {
+        [folder, out] => (folder, out, None),
+        [folder, out, given] => (folder, out, Some(given)),
+        _ => return Err("usage: scene_report SCENE OUT.html [WIREFRAME.json]".into()),
+    };
+    let detected = !folder.join(HAWP_DIR).is_dir();
+    let options = LoadOptions {
+        require_wireframes: !detected,
+        ..LoadOptions::default()
+    };
+    let start = Instant::now();
+    let loaded = load_scene(folder, &options)?;
+    let mut scene = loaded.scene;
+    if detected {
+        (scene.views.par_iter_mut()).for_each(|view| {
+            view.wireframe = detect(&view.image, &DetectorConfig::default());
+        });
+    }
+    let observations = ViewObservation::from_scene(&scene, MIN_SCORE);
+    let in_world = match given {
+        Some(path) => {
+            let world_from_original = scene.original_from_world.inverse();
+            (read_json(path)?.wireframe()).map(|point| world_from_original.apply(point))
+        }
+        None => {
+            let config = LineTracksConfig::default();
+            run(&observations, &[], None, scene.sphere_radius, &config).wireframe
+        }
+    };
+    let reconstructed = start.elapsed().as_secs_f64();
+    let document = document(&scene, &observations, &in_world);
+
+    let start = Instant::now();
+    let mut report = Report::of_scene(&scene, document, MIN_SCORE, &PhotographConfig::default())?;
+    report.warnings = loaded.warnings.iter().map(ToString::to_string).collect();
+    report.facts = vec![FactGroup {
+        heading: "Seconds".to_owned(),
+        facts: vec![("Reconstruction".to_owned(), format!("{reconstructed:.1}"))],
+    }];
+    report.write(Path::new(out))?;
+    let bytes = std::fs::metadata(out)?.len();
+    println!(
+        "{}: {} segments, {} views, {:.2} MB in {:.2} s",
+        out.display(),
+        report.document.edges.len(),
+        report.views.len(),
+        bytes as f64 / 1e6,
+        start.elapsed().as_secs_f64()
+    );
+    Ok(())
+}
+
+/// The wireframe in the frame of the files, with the 2D segments that lie on its
+/// edges end on end.
+fn document(scene: &Scene, views: &[ViewObservation], in_world: &Wireframe3d) -> WireframeDocument {
+    let config = EdgeSupportConfig::default();
+    let supporting = |edge: usize| -> Vec<SupportingSegment> {
+        let segment = in_world.segment(edge);
+        let in_view = |(index, view): (usize, &ViewObservation)| {
+            let ends = segment.ends().map(|end| view.camera.project(&end));
+            if ends.iter().any(|end| end.depth <= 0.0) {
+                return None;
+            }
+            let projected = LineSegment2::new(ends[0].pixel, ends[1].pixel);
+            let on_it = (view.segments.iter())
+                .map(|scored| projected.with_nearest_order(&scored.segment))
+                .filter(|observed| config.confirms(&projected, observed));
+            let residual = |observed: &LineSegment2| {
+                let distances = projected.end_distances(observed);
+                (distances.iter().map(|d| d * d).sum::<f64>() / 2.0).sqrt()
+            };
+            let (residual, best) = on_it
+                .map(|observed| (residual(&observed), observed))
+                .min_by(|a, b| a.0.total_cmp(&b.0))?;
+            Some(SupportingSegment {
+                view: index,
+                segment: [best.start.x, best.start.y, best.end.x, best.end.y],
+                residual,
+            })
+        };
+        views.iter().enumerate().filter_map(in_view).collect()
+    };
+    let support: Vec<_> = (0..in_world.edges.len())
+        .into_par_iter()
+        .map(supporting)
+        .collect();
+    let original = in_world.map(|point| scene.original_from_world.apply(point));
+    WireframeDocument {
+        views: scene.views.iter().map(|view| view.name.clone()).collect(),
+        edge_support: support,
+        ..WireframeDocument::from(&original)
+    }
+}
