@@ -11,6 +11,7 @@ use neat_field::AttractionNetworkConfig;
 use neat_gjp::{CandidateConfig, MatchingConfig, PerceiverConfig};
 use neat_sdf::{DensityConfig, ImplicitNetworkConfig, RaySamplerConfig, RenderingNetworkConfig};
 use neat_tensor::adam::AdamConfig;
+use neat_wireframe::confidence::ConfidenceConfig;
 use neat_wireframe::fast_back_end::FastBackEndConfig;
 use neat_wireframe::line_tracks::LineTracksConfig;
 use neat_wireframe::paper_back_end::PaperBackEndConfig;
@@ -224,6 +225,9 @@ pub struct DistillConfig {
     pub overlay: OverlayGround,
     /// Rays of the fast back end along each 2D segment.
     pub rays_per_segment: usize,
+    /// What the results say about how sure they are.
+    #[serde(default)]
+    pub confidence: ConfidenceConfig,
     /// The paper's back end.
     pub paper: PaperBackEndConfig,
     /// The fast back end.

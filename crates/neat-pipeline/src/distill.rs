@@ -8,13 +8,15 @@ use nalgebra::{Vector2, Vector3};
 use neat_core::{Camera, LineSegment3, Scene, Wireframe3d};
 use neat_field::attraction_region::AttractionRegions;
 use neat_sdf::RayBundle;
+use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::fast_back_end;
 use neat_wireframe::line_tracks;
 use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 use neat_wireframe::neat_lines;
 use neat_wireframe::paper_back_end::PaperBackEndError;
 use neat_wireframe::robust_segments::{self, RobustSegmentConfig, robust_segment};
-use neat_wireframe::{SegmentProposal, ViewObservation};
+use neat_wireframe::validity::WireframeFlaw;
+use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation};
 use serde_json::json;
 
 /// Rays per rendering call: bounds the memory.
@@ -28,6 +30,9 @@ pub enum DistillError {
     /// The paper's back end refused its input.
     #[error(transparent)]
     Paper(#[from] PaperBackEndError),
+    /// The wireframe has a point that is no point.
+    #[error("the wireframe is not valid")]
+    Invalid(#[from] WireframeFlaw),
 }
 
 /// A wireframe and how it came about.
@@ -35,8 +40,8 @@ pub enum DistillError {
 pub struct Distilled {
     /// In the world frame of the scene's cameras.
     pub wireframe: Wireframe3d,
-    /// Views that support each edge.
-    pub edge_support: Vec<usize>,
+    /// How sure every junction and edge is, and by which 2D segments.
+    pub confidence: Confidence,
     /// What each step kept and removed.
     pub report: serde_json::Value,
 }
@@ -55,9 +60,28 @@ pub fn distill(
 ) -> Result<Distilled, DistillError> {
     match config.distill.back_end {
         BackEnd::Paper => paper(scene, field, config, progress),
-        BackEnd::Fast | BackEnd::Auto => Ok(fast(scene, field, config, progress)),
-        BackEnd::Tracks => Ok(tracks(scene, field, config, progress)),
+        BackEnd::Fast | BackEnd::Auto => fast(scene, field, config, progress),
+        BackEnd::Tracks => tracks(scene, field, config, progress),
     }
+}
+
+/// A wireframe with what the observations say about it. `surface` tells where
+/// edges are hidden.
+fn assessed(
+    wireframe: Wireframe3d,
+    views: &[ViewObservation],
+    surface: Option<&dyn SignedDistance>,
+    scene_radius: f64,
+    config: &Config,
+    report: serde_json::Value,
+) -> Result<Distilled, DistillError> {
+    let config = &config.distill.confidence;
+    let confidence = assess(&wireframe, views, surface, scene_radius, config)?;
+    Ok(Distilled {
+        wireframe,
+        confidence,
+        report,
+    })
 }
 
 /// How well a wireframe in the scene's world agrees with the 2D segments and the
@@ -194,27 +218,27 @@ fn fast(
     field: &TrainedField,
     config: &Config,
     progress: &mut dyn FnMut(f64),
-) -> Distilled {
+) -> Result<Distilled, DistillError> {
     let views = ViewObservation::from_scene(scene, config.data.min_segment_score);
     let proposals = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f));
+    let surface = field.surface_grid();
     let result = fast_back_end::run(
         &views,
         &proposals,
         &field.junctions(),
-        &field.surface_grid(),
+        &surface,
         field.scene_radius,
         &config.distill.fast,
     );
-    progress(1.0);
-    Distilled {
-        edge_support: result.edges.iter().map(|e| e.support).collect(),
-        report: json!({
-            "back_end": "fast",
-            "proposals": proposals.len(),
-            "steps": result.report,
-        }),
-        wireframe: result.wireframe,
-    }
+    progress(0.9);
+    let report = json!({
+        "back_end": "fast",
+        "proposals": proposals.len(),
+        "steps": result.report,
+    });
+    let surface: Option<&dyn SignedDistance> = Some(&surface);
+    let radius = field.scene_radius;
+    assessed(result.wireframe, &views, surface, radius, config, report)
 }
 
 fn tracks(
@@ -222,7 +246,7 @@ fn tracks(
     field: &TrainedField,
     config: &Config,
     progress: &mut dyn FnMut(f64),
-) -> Distilled {
+) -> Result<Distilled, DistillError> {
     let views = ViewObservation::from_scene(scene, config.data.min_segment_score);
     let priors = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f));
     let surface = field.surface_grid();
@@ -233,16 +257,17 @@ fn tracks(
         field.scene_radius,
         &config.distill.tracks,
     );
-    progress(1.0);
-    Distilled {
-        edge_support: result.edges.iter().map(|edge| edge.views).collect(),
-        report: json!({
-            "back_end": "tracks",
-            "priors": priors.len(),
-            "steps": result.report,
-        }),
-        wireframe: result.wireframe,
-    }
+    progress(0.9);
+    let report = json!({
+        "back_end": "tracks",
+        "priors": priors.len(),
+        "steps": result.report,
+    });
+    // A learned surface of a photograph is too coarse to hide edges behind.
+    let hides = config.distill.tracks.occlusion_test;
+    let surface = hides.then_some(&surface as &dyn SignedDistance);
+    let radius = field.scene_radius;
+    assessed(result.wireframe, &views, surface, radius, config, report)
 }
 
 /// One robust 3D segment for every detected 2D segment that the field answers.
@@ -316,12 +341,11 @@ fn paper(
         progress(0.95 * (index + 1) as f64 / views.len() as f64);
     }
     let result = paper.run(&field.junctions(), &views, &rays_by_view, field)?;
-    progress(1.0);
-    Ok(Distilled {
-        wireframe: result.wireframe,
-        edge_support: result.visible_views,
-        report: json!({ "back_end": "paper", "steps": result.counts }),
-    })
+    let report = json!({ "back_end": "paper", "steps": result.counts });
+    let surface = field.surface_grid();
+    let surface: Option<&dyn SignedDistance> = Some(&surface);
+    let radius = field.scene_radius;
+    assessed(result.wireframe, &views, surface, radius, config, report)
 }
 
 /// Where the ray through the foot meets the tangent plane at the rendered point

@@ -6,6 +6,7 @@ use crate::trainer::TrainError;
 use neat_core::SceneError;
 use neat_core::synthetic::SyntheticError;
 use neat_eval::EvalError;
+use neat_report::ReportError;
 use neat_tensor::BackendError;
 use neat_tensor::checkpoint::CheckpointError;
 use neat_wireframe::export::ExportError;
@@ -46,6 +47,9 @@ pub enum PipelineError {
     /// A result could not be written.
     #[error(transparent)]
     Export(#[from] ExportError),
+    /// The report could not be made.
+    #[error(transparent)]
+    Report(#[from] ReportError),
     /// A result could not be measured.
     #[error(transparent)]
     Evaluation(#[from] EvalError),
@@ -83,7 +87,9 @@ impl PipelineError {
                     | TrainError::Parameters(_)
                     | TrainError::Checkpoint(_)
             ),
-            Self::Distill(_) | Self::Export(_) | Self::Interrupted { .. } => false,
+            Self::Distill(_) | Self::Export(_) | Self::Report(_) | Self::Interrupted { .. } => {
+                false
+            }
         }
     }
 }

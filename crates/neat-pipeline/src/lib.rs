@@ -27,5 +27,6 @@ pub mod reconstruct;
 pub mod render;
 pub mod run_dir;
 pub mod scene;
+pub mod step_log;
 pub mod trainer;
 pub mod training_data;

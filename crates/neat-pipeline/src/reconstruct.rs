@@ -1,5 +1,6 @@
 //! From a scene on disk to a run folder: training, distillation, and both.
 
+mod report;
 mod results;
 mod session;
 mod training;

@@ -16,12 +16,10 @@
 
 use crate::config::Config;
 use crate::manifest::Manifest;
-use crate::trainer::StepReport;
 use neat_core::{SceneError, file};
 use neat_tensor::checkpoint::{Checkpoint, CheckpointError};
-use serde::Deserialize;
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// So many checkpoints stay on disk: one to continue from, and one more in case
@@ -31,6 +29,8 @@ const KEPT_CHECKPOINTS: usize = 2;
 const CONFIG: &str = "config.toml";
 const MANIFEST: &str = "manifest.json";
 const METRICS: &str = "metrics.jsonl";
+const JUNCTIONS: &str = "junctions.jsonl";
+const REPORT: &str = "report.html";
 const CHECKPOINTS: &str = "checkpoints";
 const OVERLAYS: &str = "overlays";
 const DETECTIONS: &str = "detections";
@@ -162,7 +162,9 @@ impl RunDir {
     }
 
     fn remove_earlier_run(&self) -> Result<(), SceneError> {
-        let files = [CONFIG, MANIFEST, METRICS].iter().chain(&RESULT_FILES);
+        let files = [CONFIG, MANIFEST, METRICS, JUNCTIONS, REPORT]
+            .iter()
+            .chain(&RESULT_FILES);
         for name in files {
             ignore_missing(fs::remove_file(self.root.join(name)), &self.root.join(name))?;
         }
@@ -241,28 +243,19 @@ impl RunDir {
         serde_json::from_slice(&bytes).map_err(|error| malformed(&path, &error))
     }
 
-    /// Opens `metrics.jsonl` for the steps after `iteration`; lines of later
-    /// steps, which a run that continues from a checkpoint takes again, go.
-    ///
-    /// # Errors
-    /// If the file cannot be read or written.
-    pub fn metrics_log(&self, iteration: u64) -> Result<MetricsLog, RunDirError> {
-        let path = self.root.join(METRICS);
-        let earlier = match fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
-            Err(error) => return Err(read_error(&path, error).into()),
-        };
-        let kept: String = earlier
-            .split_inclusive('\n')
-            .filter(|line| iteration_of(line).is_some_and(|i| i <= iteration))
-            .collect();
-        file::write_atomically(&path, kept.as_bytes())?;
-        let file = OpenOptions::new()
-            .append(true)
-            .open(&path)
-            .map_err(|error| write_error(&path, error))?;
-        Ok(MetricsLog { path, file })
+    /// `metrics.jsonl`: losses and the like, see [`crate::step_log`].
+    pub fn metrics(&self) -> PathBuf {
+        self.root.join(METRICS)
+    }
+
+    /// `junctions.jsonl`: where the global junctions were during training.
+    pub fn junctions(&self) -> PathBuf {
+        self.root.join(JUNCTIONS)
+    }
+
+    /// `report.html`.
+    pub fn report(&self) -> PathBuf {
+        self.root.join(REPORT)
     }
 
     /// Writes the checkpoint of a step and removes all but the last two.
@@ -327,27 +320,6 @@ impl RunDir {
     }
 }
 
-/// `metrics.jsonl`, open at its end.
-#[derive(Debug)]
-pub struct MetricsLog {
-    path: PathBuf,
-    file: File,
-}
-
-impl MetricsLog {
-    /// Appends one line.
-    ///
-    /// # Errors
-    /// If the disk is full.
-    pub fn append(&mut self, report: &StepReport) -> Result<(), RunDirError> {
-        let mut line = serde_json::to_vec(report).map_err(|error| malformed(&self.path, &error))?;
-        line.push(b'\n');
-        self.file
-            .write_all(&line)
-            .map_err(|error| write_error(&self.path, error).into())
-    }
-}
-
 /// Reads a configuration file.
 ///
 /// # Errors
@@ -369,34 +341,21 @@ fn checkpoint_iteration(path: &Path) -> Option<u64> {
     digits.parse().ok()
 }
 
-/// The step that a line of `metrics.jsonl` is about; `None` for a line that an
-/// interrupt cut off.
-fn iteration_of(line: &str) -> Option<u64> {
-    #[derive(Deserialize)]
-    struct Line {
-        iteration: u64,
-    }
-    serde_json::from_str::<Line>(line)
-        .ok()
-        .filter(|_| line.ends_with('\n'))
-        .map(|line| line.iteration)
-}
-
-fn malformed(path: &Path, error: &dyn std::error::Error) -> RunDirError {
+pub(crate) fn malformed(path: &Path, error: &dyn std::error::Error) -> RunDirError {
     RunDirError::Malformed {
         path: path.into(),
         reason: error.to_string().trim_end().to_owned(),
     }
 }
 
-fn read_error(path: &Path, source: io::Error) -> SceneError {
+pub(crate) fn read_error(path: &Path, source: io::Error) -> SceneError {
     SceneError::Read {
         path: path.into(),
         source,
     }
 }
 
-fn write_error(path: &Path, source: io::Error) -> SceneError {
+pub(crate) fn write_error(path: &Path, source: io::Error) -> SceneError {
     SceneError::Write {
         path: path.into(),
         source,
@@ -458,16 +417,5 @@ mod tests {
         }
         let kept: Vec<u64> = run.checkpoints().unwrap().iter().map(|c| c.0).collect();
         assert_eq!(kept, [100_000_000, 200_000_000]);
-    }
-
-    #[test]
-    fn metrics_continue_after_the_checkpoint() {
-        let dir = tempfile::tempdir().unwrap();
-        let run = RunDir::create(dir.path(), Existing::Refuse).unwrap();
-        let path = dir.path().join(METRICS);
-        let before = "{\"iteration\":1}\n{\"iteration\":2}\n";
-        fs::write(&path, format!("{before}{{\"iteration\":3}}\n{{\"itera")).unwrap();
-        run.metrics_log(2).unwrap();
-        assert_eq!(fs::read_to_string(&path).unwrap(), before);
     }
 }

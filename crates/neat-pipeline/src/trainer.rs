@@ -6,7 +6,7 @@ use crate::config::{Config, TrainConfig};
 pub use crate::field::TrainedField;
 use crate::flops::StepRows;
 use crate::losses::{Losses, StepInput, StepLoss, step_loss};
-use crate::model::{NeatModel, host_vec};
+use crate::model::{NeatModel, host_points, host_vec};
 use crate::training_data::{Batch, TrainingData};
 use burn::module::Module;
 use burn::optim::GradientsParams;
@@ -520,6 +520,11 @@ impl Trainer {
             .metadata
             .extend(metadata.map(|(key, value)| (key.to_owned(), value)));
         checkpoint
+    }
+
+    /// Where the global junctions are now, in the world.
+    pub fn junctions(&self) -> Vec<[f32; 3]> {
+        host_points(self.model.perceiver.junctions().inner())
     }
 
     /// The field as it is now, for rendering and distillation.

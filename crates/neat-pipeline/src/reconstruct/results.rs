@@ -59,14 +59,13 @@ impl Session<'_> {
     ) -> Result<Wireframe3d, PipelineError> {
         let in_world = &distilled.wireframe;
         let original = in_world.map(|point| self.scene.original_from_world.apply(point));
-        let document = WireframeDocument {
+        let mut document = WireframeDocument {
             metadata: self.metadata(distilled, agreement),
-            edge_fields: BTreeMap::from([(
-                "supporting_views".to_owned(),
-                distilled.edge_support.iter().map(|n| *n as f64).collect(),
-            )]),
             ..WireframeDocument::from(&original)
         };
+        let names: Vec<String> = self.scene.views.iter().map(|v| v.name.clone()).collect();
+        let original_from_world = &self.scene.original_from_world;
+        (distilled.confidence).fill(&mut document, &names, original_from_world);
         let [json, obj, ply, png] =
             ["json", "obj", "ply", "png"].map(|extension| self.dir.wireframe(extension));
         write_json(&json, &document)?;
@@ -95,6 +94,7 @@ impl Session<'_> {
             write_png(path, &picture)
         })?;
         written.extend(overlays.into_iter().map(|(_, path)| path));
+        written.push(self.write_report(document, agreement)?);
 
         for path in written {
             self.written(path);

@@ -6,13 +6,17 @@ use crate::error::PipelineError;
 use crate::event::{Event, Stage};
 use crate::field::TrainedField;
 use crate::run_dir::Existing;
+use crate::step_log::{JunctionsLine, StepLog};
 use crate::trainer::Trainer;
+use nalgebra::Vector3;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// One line of `metrics.jsonl` per so many steps.
 const METRICS_INTERVAL: u64 = 10;
+/// The junctions are logged so many times over the training.
+const JUNCTION_SNAPSHOTS: f64 = 50.0;
 
 /// How much of the training is done: by steps or by time, whichever is ahead.
 struct Progress {
@@ -53,8 +57,10 @@ impl Session<'_> {
             before: self.earlier_training_time(),
             start: Instant::now(),
         };
-        let mut metrics = self.dir.metrics_log(trainer.iteration())?;
+        let mut metrics = StepLog::open(&self.dir.metrics(), trainer.iteration())?;
+        let mut junctions = StepLog::open(&self.dir.junctions(), trainer.iteration())?;
         let mut fraction = progress.fraction(trainer.iteration());
+        let mut snapshots = (fraction * JUNCTION_SNAPSHOTS).ceil();
         while fraction < 1.0 {
             if cancelled.load(Ordering::Relaxed) {
                 let checkpoint = self.save(&trainer, &progress)?;
@@ -72,6 +78,10 @@ impl Session<'_> {
             });
             if iteration == 1 || fraction >= 1.0 || iteration.is_multiple_of(METRICS_INTERVAL) {
                 metrics.append(&report)?;
+            }
+            if fraction * JUNCTION_SNAPSHOTS >= snapshots {
+                junctions.append(&self.junctions_line(&trainer))?;
+                snapshots = (fraction * JUNCTION_SNAPSHOTS).floor() + 1.0;
             }
             let interval = self.config.train.checkpoint_interval.max(1);
             if fraction >= 1.0 || iteration.is_multiple_of(interval) {
@@ -96,6 +106,19 @@ impl Session<'_> {
             }
             Existing::Refuse | Existing::Overwrite => Trainer::new(scene, config, seed, device)?,
         })
+    }
+
+    /// The global junctions, in the frame of the user's files.
+    fn junctions_line(&self, trainer: &Trainer) -> JunctionsLine {
+        let original = |point: [f32; 3]| {
+            let in_world = Vector3::from(point).map(f64::from);
+            let in_original = self.scene.original_from_world.apply(&in_world);
+            in_original.map(|x| x as f32).into()
+        };
+        JunctionsLine {
+            iteration: trainer.iteration(),
+            junctions: trainer.junctions().into_iter().map(original).collect(),
+        }
     }
 
     fn earlier_training_time(&self) -> Duration {

@@ -1,0 +1,117 @@
+//! `report.html`: the wireframe, its evidence, and how it came about, as a page.
+
+use super::session::Session;
+use crate::error::PipelineError;
+use crate::step_log::{JunctionsLine, read_log};
+use crate::trainer::StepReport;
+use neat_report::{Curve, FactGroup, JunctionSnapshot, PhotographConfig, Report};
+use neat_wireframe::export::WireframeDocument;
+use neat_wireframe::metrics::ImageEvidence;
+use std::path::PathBuf;
+
+impl Session<'_> {
+    /// Writes the page; returns its path.
+    pub fn write_report(
+        &self,
+        document: WireframeDocument,
+        agreement: Option<ImageEvidence>,
+    ) -> Result<PathBuf, PipelineError> {
+        let min_score = self.config.data.min_segment_score;
+        let photographs = PhotographConfig::default();
+        let mut report = Report::of_scene(&self.scene, document, min_score, &photographs)?;
+        let metrics: Vec<StepReport> = read_log(&self.dir.metrics())?;
+        report.curves = curves(&metrics);
+        report.junction_evolution = read_log::<JunctionsLine>(&self.dir.junctions())?
+            .into_iter()
+            .map(|line| JunctionSnapshot {
+                step: line.iteration,
+                junctions: line.junctions,
+            })
+            .collect();
+        // The configuration was written as TOML when the run began.
+        report.configuration = toml::to_string_pretty(&self.config).unwrap_or_default();
+        report.facts = self.facts(&report.document, agreement);
+        report.warnings.clone_from(&self.manifest.warnings);
+        let path = self.dir.report();
+        report.write(&path)?;
+        Ok(path)
+    }
+
+    fn facts(
+        &self,
+        document: &WireframeDocument,
+        agreement: Option<ImageEvidence>,
+    ) -> Vec<FactGroup> {
+        let manifest = &self.manifest;
+        let mut result = vec![
+            ("Junctions", document.junctions.len().to_string()),
+            ("Edges", document.edges.len().to_string()),
+        ];
+        if let Some(agreement) = agreement {
+            let explained = agreement.explained_length_share.map(|share| {
+                let percent = format!("{:.0} % of their length", 100.0 * share);
+                ("2D segments explained", percent)
+            });
+            let off = agreement.mean_reprojection_error_in_pixels;
+            let off = off.map(|pixels| ("Mean distance from them", format!("{pixels:.2} px")));
+            result.extend(explained.into_iter().chain(off));
+        }
+        let run = vec![
+            ("Scene", manifest.scene.display().to_string()),
+            ("Preset", manifest.preset.clone()),
+            ("Seed", manifest.seed.to_string()),
+            ("Steps", manifest.steps.to_string()),
+            ("Backend", manifest.backend.clone()),
+            ("Device", manifest.device.clone()),
+            ("Threads", manifest.threads.to_string()),
+            ("Began", manifest.started.clone()),
+            ("neat", manifest.neat.clone()),
+        ];
+        let seconds = (manifest.seconds.iter())
+            .map(|(stage, seconds)| (stage.to_string(), format!("{seconds:.1}")))
+            .collect();
+        let group = |heading: &str, facts: Vec<(&str, String)>| FactGroup {
+            heading: heading.to_owned(),
+            facts: (facts.into_iter())
+                .map(|(label, value)| (label.to_owned(), value))
+                .collect(),
+        };
+        vec![
+            group("Result", result),
+            group("Run", run),
+            FactGroup {
+                heading: "Seconds".to_owned(),
+                facts: seconds,
+            },
+        ]
+    }
+}
+
+/// The loss terms and figures that say how the training went; terms that are
+/// always 0 are left out.
+fn curves(metrics: &[StepReport]) -> Vec<Curve> {
+    type Figure = fn(&StepReport) -> f64;
+    let figures: [(&str, Figure); 9] = [
+        ("Loss", |step| step.losses.total),
+        ("Colour loss", |step| step.losses.rgb),
+        ("Segment loss", |step| step.losses.segment),
+        ("Junction loss", |step| step.losses.junction_3d),
+        ("Silhouette loss", |step| step.losses.mask),
+        ("Eikonal loss", |step| step.losses.eikonal),
+        ("Segment error in pixels", |step| {
+            step.segment_error_in_pixels
+        }),
+        ("Matched junctions", |step| step.targets as f64),
+        ("Density scale", |step| step.beta),
+    ];
+    figures
+        .into_iter()
+        .map(|(name, figure)| Curve {
+            name: name.to_owned(),
+            points: (metrics.iter())
+                .map(|step| (step.iteration, figure(step)))
+                .collect(),
+        })
+        .filter(|curve| curve.points.iter().any(|(_, value)| *value != 0.0))
+        .collect()
+}
