@@ -41,7 +41,7 @@ pub struct ProvenanceConfig {
 impl Default for ProvenanceConfig {
     fn default() -> Self {
         Self {
-            tolerance_in_pixels: 3.0,
+            tolerance_in_pixels: 4.0,
             max_angle_in_degrees: 5.0,
             max_tilt_in_pixels: 2.0,
             min_overlap: 0.5,
@@ -56,8 +56,11 @@ impl Default for ProvenanceConfig {
 #[serde(default, deny_unknown_fields)]
 pub struct CovarianceConfig {
     /// An end of a supporting segment shows the edge's junction if it lies this
-    /// near to its projection; farther ends lie anywhere on the edge.
+    /// near to its projection; farther ends lie anywhere on the edge. Generous,
+    /// because a narrow limit would cut off the noise that it is to measure.
     pub max_end_distance_in_pixels: f64,
+    /// The same limit as a share of the segment's length.
+    pub max_relative_end_distance: f64,
     /// Observations beyond this many standard deviations are errors, not noise.
     pub max_standard_deviations: f64,
     /// The noise of a detector is never taken for less than this.
@@ -79,7 +82,8 @@ pub struct CovarianceConfig {
 impl Default for CovarianceConfig {
     fn default() -> Self {
         Self {
-            max_end_distance_in_pixels: 4.0,
+            max_end_distance_in_pixels: 8.0,
+            max_relative_end_distance: 0.4,
             max_standard_deviations: 4.0,
             min_noise_in_pixels: 0.05,
             usual_noise_in_pixels: 0.7,

@@ -5,6 +5,7 @@
 //! projection it lies, or of the lines of the edges that it lies on. Only the
 //! first says something along an edge.
 
+use super::config::CovarianceConfig;
 use super::provenance::EdgeProvenance;
 use crate::ViewObservation;
 use crate::projection::project_in_front;
@@ -43,7 +44,7 @@ pub(super) fn detected_ends(
     junctions: &[Vector3<f64>],
     edges: &[[usize; 2]],
     provenance: &[EdgeProvenance],
-    max_end_distance_in_pixels: f64,
+    config: &CovarianceConfig,
 ) -> Vec<DetectedEnd> {
     // Ends of one vertex have the same coordinates: that is how 2D wireframes
     // reach this crate.
@@ -56,6 +57,8 @@ pub(super) fn detected_ends(
         for support in &found.supports {
             let camera = &observations[support.view].camera;
             let along = support.segment.end - support.segment.start;
+            let max_distance = (config.max_relative_end_distance * along.norm())
+                .min(config.max_end_distance_in_pixels);
             for (junction, end) in edge.iter().zip(support.segment.ends()) {
                 let gathered = ends
                     .entry(key(support.view, &end))
@@ -64,7 +67,7 @@ pub(super) fn detected_ends(
                 gathered.direction = along.normalize();
                 let distance = project_in_front(camera, &junctions[*junction])
                     .map_or(f64::INFINITY, |pixel| (pixel - end).norm());
-                if distance < gathered.distance.min(max_end_distance_in_pixels) {
+                if distance < gathered.distance.min(max_distance) {
                     gathered.distance = distance;
                     gathered.junction = Some(*junction);
                 }
@@ -117,6 +120,80 @@ impl Gathered {
             segments: 0,
             junction: None,
             distance: f64::INFINITY,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::confidence::ProvenanceConfig;
+    use crate::confidence::provenance::{IndexedView, provenance};
+    use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
+    use neat_core::{LineSegment2, LineSegment3, ScoredSegment2};
+
+    fn ends_of_cube(observations: &[ViewObservation]) -> Vec<DetectedEnd> {
+        let (junctions, edges) = cube();
+        let views: Vec<_> = observations.iter().map(IndexedView::new).collect();
+        let segments: Vec<_> = edges
+            .iter()
+            .map(|[a, b]| LineSegment3::new(junctions[*a], junctions[*b]))
+            .collect();
+        let found = provenance(&views, &segments, &ProvenanceConfig::default());
+        let config = CovarianceConfig::default();
+        detected_ends(observations, &junctions, &edges, &found, &config)
+    }
+
+    #[test]
+    fn a_vertex_counts_once_and_ends_of_one_segment_have_its_direction() {
+        let (junctions, edges) = cube();
+        let mut observations = views_of_edges(&cameras_on_sphere(2), &junctions, &edges);
+        // In the second view the segment of the first edge is alone.
+        observations[1].segments.truncate(1);
+        let ends = ends_of_cube(&observations);
+        assert_eq!(ends.len(), 8 + 2);
+        for end in &ends {
+            let Shown::Junction {
+                junction,
+                direction,
+            } = end.shows
+            else {
+                panic!("every end shows a junction: {end:?}");
+            };
+            let camera = &observations[end.view].camera;
+            assert!((camera.project(&junctions[junction]).pixel - end.pixel).norm() < 1e-9);
+            let [start, stop] = observations[1].segments[0].segment.ends();
+            match direction {
+                None => assert_eq!(end.view, 0),
+                Some(direction) => {
+                    assert_eq!(end.view, 1);
+                    assert!(direction.perp(&(stop - start)).abs() < 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn ends_of_fragments_show_lines_only() {
+        let (junctions, edges) = cube();
+        let mut observations = views_of_edges(&cameras_on_sphere(1), &junctions, &edges);
+        let whole = observations[0].segments[0];
+        let piece = LineSegment2::new(whole.segment.start, whole.segment.point_at(0.5));
+        observations[0].segments = vec![ScoredSegment2 {
+            segment: piece,
+            ..whole
+        }];
+        let ends = ends_of_cube(&observations);
+        assert_eq!(ends.len(), 2);
+        for end in ends {
+            match end.shows {
+                Shown::Junction { junction, .. } => {
+                    assert_eq!((junction, end.pixel), (edges[0][0], piece.start));
+                }
+                Shown::Lines(lines) => {
+                    assert_eq!((lines, end.pixel), (vec![edges[0]], piece.end));
+                }
+            }
         }
     }
 }

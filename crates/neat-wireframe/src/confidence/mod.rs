@@ -151,7 +151,7 @@ pub fn assess(
         &wireframe.junctions,
         &wireframe.edges,
         &found,
-        config.covariance.max_end_distance_in_pixels,
+        &config.covariance,
     );
     let estimate = covariance::estimate(
         observations,

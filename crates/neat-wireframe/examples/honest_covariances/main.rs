@@ -1,0 +1,96 @@
+//! How often the truth lies in the ellipsoids that the assessment claims, on
+//! synthetic solids with detections of known noise.
+//!
+//! ```text
+//! cargo run --release -p neat-wireframe --example honest_covariances
+//! ```
+//!
+//! Prints one line per noise, number of views, detector and back end: "adjusted"
+//! is the true graph, displaced and brought back by the bundle adjustment of the
+//! fast back end, "given" the displaced graph itself (0.003 per coordinate),
+//! "tracks" what the line-track back end finds.
+
+#![expect(clippy::print_stdout, reason = "an example shows its results")]
+
+#[path = "../../tests/confidence/noise.rs"]
+mod noise;
+#[path = "../../tests/confidence/scenario.rs"]
+mod scenario;
+
+use nalgebra::Vector3;
+use neat_core::Wireframe3d;
+use neat_core::synthetic::Solid;
+use neat_wireframe::confidence::{ConfidenceConfig, DetectionNoise, assess};
+use neat_wireframe::line_tracks::{LineTracksConfig, run};
+use scenario::{Coverage, Detector, Scene, adjusted, displaced, scene};
+
+const SEEDS: u64 = 2;
+/// A junction of the line tracks farther than this from all true ones is another
+/// mistake than noise.
+const MAX_ERROR: f64 = 0.03;
+
+fn main() {
+    println!(
+        "| noise | views | detector | wireframe | junctions | without | 50 % | 68 % | 95 % | median sigma | median error | estimated noise |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for detector in [Detector::Vertices, Detector::Segments] {
+        for views in [12, 40] {
+            for sigma in [0.3, 0.5, 1.0] {
+                let scenes: Vec<(u64, Scene)> = (0..SEEDS)
+                    .flat_map(|seed| Solid::ALL.map(|solid| (seed, solid)))
+                    .map(|(seed, solid)| (seed, scene(solid, detector, sigma, views, seed)))
+                    .collect();
+                for (name, wireframe) in WIREFRAMES {
+                    let (coverage, noise) = measure(&scenes, wireframe);
+                    let [half, two_thirds, most] = coverage.shares();
+                    let [claimed, error] = coverage.medians();
+                    println!(
+                        "| {sigma} | {views} | {detector:?} | {name} | {} | {} | {half:.2} | {two_thirds:.2} | {most:.3} | {claimed:.5} | {error:.5} | {:.2} {:.2} {:.2} |",
+                        coverage.junctions,
+                        coverage.undetermined,
+                        noise.vertex,
+                        noise.across,
+                        noise.along,
+                    );
+                }
+            }
+        }
+    }
+}
+
+type Make = fn(&Scene, u64) -> Wireframe3d;
+
+const WIREFRAMES: [(&str, Make); 3] = [
+    ("adjusted", |scene, seed| {
+        adjusted(&scene.observations, &scene.truth, seed)
+    }),
+    ("given", |scene, seed| displaced(&scene.truth, seed)),
+    ("tracks", tracks),
+];
+
+fn tracks(scene: &Scene, _: u64) -> Wireframe3d {
+    let config = LineTracksConfig::default();
+    run(&scene.observations, &[], None, 1.0, &config).wireframe
+}
+
+fn measure(scenes: &[(u64, Scene)], make: Make) -> (Coverage, DetectionNoise) {
+    let mut coverage = Coverage::default();
+    let mut last_noise = None;
+    for (seed, scene) in scenes {
+        let wireframe = make(scene, *seed);
+        let config = ConfidenceConfig::default();
+        let confidence = assess(&wireframe, &scene.observations, None, 1.0, &config);
+        let confidence = confidence.expect("back ends return valid wireframes");
+        let nearest = |index: usize| -> Option<Vector3<f64>> {
+            let junction = wireframe.junctions[index];
+            let distance = |x: &Vector3<f64>| (x - junction).norm();
+            let truth = scene.truth.junctions.iter();
+            let nearest = truth.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+            (distance(nearest) < MAX_ERROR).then_some(*nearest)
+        };
+        coverage.add(&wireframe, &confidence, nearest);
+        last_noise = Some(confidence.noise);
+    }
+    (coverage, last_noise.expect("there is at least one scene"))
+}
