@@ -14,15 +14,17 @@
 
 mod drawing;
 
+use nalgebra::Vector3;
 use neat_core::ground_truth::read_wireframe;
 use neat_core::{LoadOptions, load_scene};
-use neat_wireframe::ViewObservation;
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::line_tracks::{LineTracksConfig, run};
 use neat_wireframe::metrics::{
-    ImageEvidenceConfig, Matching, SegmentDistance, image_evidence, junction_distances,
-    precision_recall, segment_distances,
+    ImageEvidenceConfig, Matching, PointCloud, SegmentDistance, image_evidence,
+    junction_distances, precision_recall, segment_distances,
 };
+use neat_wireframe::{ViewObservation, Wireframe3d};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 type AnyError = Box<dyn std::error::Error>;
@@ -105,6 +107,7 @@ fn main() -> Result<(), AnyError> {
         "explained share of segments: {:?}",
         evidence.explained_share()
     );
+    print_graph(&result.wireframe, &points)?;
     println!(
         "scene radius {:.4}, unit of the files {:.4}",
         scene.sphere_radius, scene.original_from_world.scale
@@ -140,6 +143,39 @@ fn main() -> Result<(), AnyError> {
     if let Some(dir) = &arguments.overlays {
         drawing::draw_overlays(dir, &scene, &result.wireframe, &views_per_edge)?;
         drawing::draw_plans(dir, &result.wireframe)?;
+    }
+    Ok(())
+}
+
+/// What kind of graph it is, and how far its junctions are from points on the
+/// surfaces.
+fn print_graph(wireframe: &Wireframe3d, points: &[Vector3<f64>]) -> Result<(), AnyError> {
+    let mut degrees = vec![0; wireframe.junctions.len()];
+    for junction in wireframe.edges.iter().flatten() {
+        degrees[*junction] += 1;
+    }
+    let mut histogram: BTreeMap<usize, usize> = BTreeMap::new();
+    for degree in degrees {
+        *histogram.entry(degree).or_default() += 1;
+    }
+    let count = wireframe.junctions.len().max(1) as f64;
+    let free = histogram.get(&1).copied().unwrap_or(0);
+    println!(
+        "mean degree {:.2}, free ends {:.1} %, junctions by degree {histogram:?}",
+        2.0 * wireframe.edges.len() as f64 / count,
+        100.0 * free as f64 / count,
+    );
+    let cloud = PointCloud::new(points)?;
+    let mut distances: Vec<f64> = wireframe
+        .junctions
+        .iter()
+        .filter_map(|junction| cloud.distance(junction))
+        .collect();
+    distances.sort_by(f64::total_cmp);
+    for percent in [50, 90, 99] {
+        if let Some(distance) = distances.get(distances.len() * percent / 100) {
+            println!("{percent} % of the junctions within {distance:.5} of a point");
+        }
     }
     Ok(())
 }

@@ -3,7 +3,9 @@
 use super::clustering::ClusteringConfig;
 use super::consensus::ConsensusConfig;
 use super::edge_confirmation::EdgeConfirmationConfig;
+use super::edge_splitting::EdgeSplittingConfig;
 use super::epipolar_matching::EpipolarMatchingConfig;
+use super::free_ends::FreeEndsConfig;
 use super::graph_adjustment::GraphAdjustmentConfig;
 use super::hypothesis_scoring::HypothesisScoringConfig;
 use super::isolated_edges::IsolatedEdgesConfig;
@@ -11,7 +13,6 @@ use super::junction_graph::JunctionGraphConfig;
 use super::line_refinement::LineRefinementConfig;
 use super::neighbours::NeighboursConfig;
 use super::straight_junctions::StraightJunctionsConfig;
-use super::t_junctions::TJunctionsConfig;
 use super::track_merging::TrackMergingConfig;
 use crate::occlusion::OcclusionConfig;
 use serde::{Deserialize, Serialize};
@@ -50,8 +51,10 @@ pub struct LineTracksConfig {
     pub confirmation: EdgeConfirmationConfig,
     /// Which edges float alone.
     pub isolation: IsolatedEdgesConfig,
-    /// Which ends stop on other edges.
-    pub t_junctions: TJunctionsConfig,
+    /// Which free ends meet something.
+    pub free_ends: FreeEndsConfig,
+    /// Which junctions cut an edge.
+    pub splitting: EdgeSplittingConfig,
     /// Drop edges supported in too few of the views in which the surface leaves
     /// them visible; without a surface it says nothing.
     pub occlusion_test: bool,
@@ -77,7 +80,8 @@ impl Default for LineTracksConfig {
             adjustment: GraphAdjustmentConfig::default(),
             confirmation: EdgeConfirmationConfig::default(),
             isolation: IsolatedEdgesConfig::default(),
-            t_junctions: TJunctionsConfig::default(),
+            free_ends: FreeEndsConfig::default(),
+            splitting: EdgeSplittingConfig::default(),
             occlusion_test: false,
             occlusion: OcclusionConfig::default(),
         }

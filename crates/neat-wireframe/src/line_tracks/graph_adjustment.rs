@@ -1,6 +1,7 @@
 //! Bundle adjustment of the graph with known correspondences.
 
 use super::junction_graph::{GraphEdge, JunctionGraph};
+use super::projected_line::ProjectedLine;
 use super::track_merging::project_segment;
 use super::view_segments::{TrackView, segment_of};
 use crate::bundle_adjustment::{
@@ -78,6 +79,27 @@ fn observations(
             })
         })
         .collect()
+}
+
+/// Standard deviation of the distances of 2D segments from the edges that they
+/// support, were it not for outliers; never below a tenth of a pixel.
+pub(super) fn noise_in_pixels(views: &[TrackView], graph: &JunctionGraph) -> f64 {
+    /// Standard deviation of a normal distribution by its median absolute value.
+    const DEVIATION_BY_MEDIAN: f64 = 1.4826;
+    const LEAST: f64 = 0.1;
+    let mut distances: Vec<f64> = Vec::new();
+    for edge in &graph.edges {
+        let line = segment_of_edge(graph, edge);
+        for id in &edge.supports {
+            if let Some(projected) = ProjectedLine::new(&views[id.view].camera, &line) {
+                let ends = segment_of(views, *id).segment.ends();
+                distances.extend(ends.map(|end| projected.distance(&end).abs()));
+            }
+        }
+    }
+    distances.sort_by(f64::total_cmp);
+    let median = distances.get(distances.len() / 2).copied().unwrap_or(0.0);
+    (DEVIATION_BY_MEDIAN * median).max(LEAST)
 }
 
 /// The 3D segment of an edge.

@@ -42,10 +42,7 @@ pub(super) fn drop_isolated(
     graph: &mut JunctionGraph,
     config: &IsolatedEdgesConfig,
 ) {
-    let mut degree = vec![0; graph.junctions.len()];
-    for junction in graph.edges.iter().flat_map(|edge| edge.junctions) {
-        degree[junction] += 1;
-    }
+    let degree = graph.degrees();
     let lines: Vec<LineSegment3> = graph
         .edges
         .iter()

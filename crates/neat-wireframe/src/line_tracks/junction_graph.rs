@@ -71,6 +71,17 @@ pub(super) struct JunctionGraph {
     pub edges: Vec<GraphEdge>,
 }
 
+impl JunctionGraph {
+    /// Number of edges at each junction.
+    pub(super) fn degrees(&self) -> Vec<usize> {
+        let mut degrees = vec![0; self.junctions.len()];
+        for junction in self.edges.iter().flat_map(|edge| edge.junctions) {
+            degrees[junction] += 1;
+        }
+        degrees
+    }
+}
+
 /// The graph of the tracks, completed by edges that 2D segments without a track
 /// draw between its junctions in at least `min_views` views.
 ///

@@ -91,7 +91,7 @@ pub(super) fn refine_line(
 }
 
 /// Two unit vectors across a line; `None` for a line without direction.
-fn directions_across(line: &LineSegment3) -> Option<Matrix3x2<f64>> {
+pub(super) fn directions_across(line: &LineSegment3) -> Option<Matrix3x2<f64>> {
     let direction = (line.end - line.start).try_normalize(1e-12)?;
     let side = Vector3::ith(direction.iamin(), 1.0);
     let first = direction.cross(&side).normalize();
@@ -120,7 +120,7 @@ fn total_cost(
         .sum()
 }
 
-fn normal_equations(
+pub(super) fn normal_equations(
     views: &[TrackView],
     members: &[SegmentId],
     line: &LineSegment3,

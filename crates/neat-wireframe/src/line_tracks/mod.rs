@@ -17,12 +17,16 @@
 //! All steps work in a world whose scene ball is the unit ball around the
 //! origin; thresholds are pixels of the images.
 
+mod certain_line;
 mod clustering;
 mod config;
 mod consensus;
 mod edge_confirmation;
+mod edge_crossings;
+mod edge_splitting;
 mod end_joining;
 mod epipolar_matching;
+mod free_ends;
 mod graph_adjustment;
 mod hypothesis_scoring;
 mod isolated_edges;
@@ -33,7 +37,6 @@ mod projected_line;
 mod report;
 pub(crate) mod segment_index;
 mod straight_junctions;
-mod t_junctions;
 mod track_merging;
 mod view_segments;
 
@@ -44,7 +47,9 @@ pub use clustering::ClusteringConfig;
 pub use config::LineTracksConfig;
 pub use consensus::ConsensusConfig;
 pub use edge_confirmation::EdgeConfirmationConfig;
+pub use edge_splitting::EdgeSplittingConfig;
 pub use epipolar_matching::EpipolarMatchingConfig;
+pub use free_ends::FreeEndsConfig;
 pub use graph_adjustment::GraphAdjustmentConfig;
 pub use hypothesis_scoring::HypothesisScoringConfig;
 pub use isolated_edges::IsolatedEdgesConfig;
@@ -53,7 +58,6 @@ pub use line_refinement::LineRefinementConfig;
 pub use neighbours::NeighboursConfig;
 pub use report::{LineEvidence, LineTracksReport, LineTracksResult, SegmentSupport, StepTiming};
 pub use straight_junctions::StraightJunctionsConfig;
-pub use t_junctions::TJunctionsConfig;
 pub use track_merging::TrackMergingConfig;
 
 use crate::fast_back_end::UnitBallSurface;
@@ -62,14 +66,16 @@ use crate::{SegmentProposal, SignedDistance, ViewObservation, Wireframe3d};
 use clustering::{grow_tracks, view_count};
 use consensus::find_consensus;
 use edge_confirmation::confirm_edges;
-use graph_adjustment::adjust_graph;
+use edge_crossings::add_crossings;
+use edge_splitting::split_edges;
+use free_ends::join_free_ends;
+use graph_adjustment::{adjust_graph, noise_in_pixels};
 use hypothesis_scoring::{DepthPrior, score_hypotheses};
 use isolated_edges::drop_isolated;
 use junction_graph::{GraphEdge, JunctionGraph, junction_graph};
 use rayon::prelude::*;
 use std::time::Instant;
 use straight_junctions::dissolve_straight;
-use t_junctions::snap_free_ends;
 use track_merging::{gather_unclaimed, merge_duplicates};
 use view_segments::{SegmentId, TrackView, segment_of};
 
@@ -186,8 +192,36 @@ pub fn run(
     report.confirmed_edges = graph.edges.len();
     drop_isolated(&views, &mut graph, &config.isolation);
     report.accompanied_edges = graph.edges.len();
-    report.snapped_ends = snap_free_ends(&views, &mut graph, &config.t_junctions);
     clock.end_of("adjustment");
+
+    let noise = noise_in_pixels(&views, &graph);
+    let joined = join_free_ends(
+        &views,
+        &mut graph,
+        noise,
+        &config.refinement,
+        &config.free_ends,
+    );
+    report.joined_corners = joined.corners;
+    report.attached_ends = joined.attached;
+    report.ends_on_edges = joined.on_edges.len();
+    let crossings = add_crossings(
+        &views,
+        &mut graph,
+        noise,
+        &config.refinement,
+        &config.splitting,
+    );
+    report.crossings = crossings.len() / 2;
+    report.split_edges = split_edges(
+        &views,
+        &mut graph,
+        &[joined.on_edges, crossings].concat(),
+        noise,
+        &config.refinement,
+        &config.splitting,
+    );
+    clock.end_of("ends");
 
     let mut visible = None;
     if let (true, Some(surface)) = (config.occlusion_test, surface) {

@@ -64,8 +64,16 @@ pub struct LineTracksReport {
     pub confirmed_edges: usize,
     /// Edges that do not float alone.
     pub accompanied_edges: usize,
-    /// Free ends moved to the edges that they touch.
-    pub snapped_ends: usize,
+    /// Pairs of free ends that have become one junction.
+    pub joined_corners: usize,
+    /// Free ends that have become part of a junction.
+    pub attached_ends: usize,
+    /// Free ends moved to the inside of the edges that they meet.
+    pub ends_on_edges: usize,
+    /// Places where two edges cross.
+    pub crossings: usize,
+    /// Edges cut at junctions on their inside.
+    pub split_edges: usize,
     /// Edges left by the occlusion test.
     pub unoccluded_edges: usize,
     /// Junctions of the result.

@@ -1,0 +1,335 @@
+//! Cuts edges at the junctions that lie on their inside: bars of a window, steps
+//! at a wall.
+
+use super::certain_line::{CertainLine, mean_distance_in_pixels};
+use super::free_ends::{certain_lines, edges_of_segments};
+use super::junction_graph::{GraphEdge, JunctionGraph};
+use super::line_refinement::{LineRefinementConfig, shown_interval};
+use super::view_segments::{SegmentId, TrackView};
+use crate::projection::project_in_front;
+use nalgebra::Vector2;
+use neat_core::{LineSegment2, LineSegment3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Which junctions lie on the inside of an edge.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EdgeSplittingConfig {
+    /// Junctions on the inside of an edge cut it.
+    pub enabled: bool,
+    /// Such a junction lies this near to the edge in the images, as a multiple of
+    /// the noise of the 2D segments.
+    pub max_distance_in_noise: f64,
+    /// Sine of the angle between its own edges and the one that it cuts, at least.
+    pub min_sine: f64,
+    /// Edges that cross on the inside of both share a junction …
+    pub crossings: bool,
+    /// … if they pass each other this near in the images, as a multiple of the
+    /// noise …
+    pub max_crossing_miss_in_noise: f64,
+    /// … and all four pieces are at least this long.
+    pub min_crossing_length_in_pixels: f64,
+    /// Pieces of other cuts are at least this long; junctions on one edge that are nearer to
+    /// each other become one.
+    pub min_length_in_pixels: f64,
+}
+
+impl Default for EdgeSplittingConfig {
+    fn default() -> Self {
+        Self {
+            enabled: true,
+            max_distance_in_noise: 2.0,
+            min_sine: 0.4,
+            crossings: true,
+            max_crossing_miss_in_noise: 1.5,
+            min_crossing_length_in_pixels: 10.0,
+            min_length_in_pixels: 4.0,
+        }
+    }
+}
+
+/// A junction on the inside of an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Split {
+    /// The edge.
+    pub edge: usize,
+    /// The junction.
+    pub junction: usize,
+}
+
+/// Cuts edges at the junctions in `on_edges`, and at junctions of several edges
+/// that lie on their inside; returns how many it has cut. The edges are sorted
+/// afterwards.
+pub(super) fn split_edges(
+    views: &[TrackView],
+    graph: &mut JunctionGraph,
+    on_edges: &[Split],
+    noise_in_pixels: f64,
+    refinement: &LineRefinementConfig,
+    config: &EdgeSplittingConfig,
+) -> usize {
+    let lines = certain_lines(views, graph, refinement);
+    let mut splits = on_edges.to_vec();
+    if config.enabled {
+        let max_distance = config.max_distance_in_noise * noise_in_pixels;
+        splits.extend(touching(views, graph, &lines, max_distance, config));
+    }
+    splits.sort_unstable();
+    splits.dedup();
+
+    let mut same = SameJunctions::new(graph.junctions.len());
+    let mut pieces: Vec<GraphEdge> = Vec::new();
+    let mut cut = 0;
+    let mut rest = splits.as_slice();
+    for (index, edge) in graph.edges.iter().enumerate() {
+        let count = rest.iter().take_while(|split| split.edge == index).count();
+        let (of_edge, later) = rest.split_at(count);
+        rest = later;
+        let places = match &lines[index] {
+            Some(line) => inner_places(graph, line, of_edge, config, &mut same),
+            None => Vec::new(),
+        };
+        cut += usize::from(!places.is_empty());
+        pieces.extend(cut_edge(views, graph, edge, &places));
+    }
+    let mut edges: BTreeMap<[usize; 2], Vec<SegmentId>> = BTreeMap::new();
+    for piece in pieces {
+        let [a, b] = piece.junctions.map(|junction| same.first(junction));
+        if a != b {
+            edges
+                .entry([a.min(b), a.max(b)])
+                .or_default()
+                .extend(piece.supports);
+        }
+    }
+    graph.edges = edges
+        .into_iter()
+        .map(|(junctions, mut supports)| {
+            supports.sort_unstable();
+            supports.dedup();
+            GraphEdge {
+                junctions,
+                supports,
+            }
+        })
+        .collect();
+    cut
+}
+
+/// Junctions of several edges with the edges on whose inside they lie.
+fn touching(
+    views: &[TrackView],
+    graph: &JunctionGraph,
+    lines: &[Option<CertainLine>],
+    max_distance: f64,
+    config: &EdgeSplittingConfig,
+) -> Vec<Split> {
+    let edges_of = edges_of_segments(views, graph);
+    let mut edges_at: Vec<Vec<usize>> = vec![Vec::new(); graph.junctions.len()];
+    for (edge, of_graph) in graph.edges.iter().enumerate() {
+        for junction in of_graph.junctions {
+            edges_at[junction].push(edge);
+        }
+    }
+    let found: Vec<Vec<Split>> = (0..graph.junctions.len())
+        .into_par_iter()
+        .filter(|junction| edges_at[*junction].len() > 1)
+        .map(|junction| {
+            let place = graph.junctions[junction];
+            let own: Vec<&CertainLine> = edges_at[junction]
+                .iter()
+                .filter_map(|edge| lines[*edge].as_ref())
+                .collect();
+            let mut own_views: Vec<usize> = own.iter().flat_map(|l| l.views.clone()).collect();
+            own_views.sort_unstable();
+            own_views.dedup();
+            let mut near: Vec<usize> = Vec::new();
+            for view in &own_views {
+                if let Some(pixel) = project_in_front(&views[*view].camera, &place) {
+                    let beside = pixel + Vector2::new(1.0, 0.0);
+                    let segments = views[*view].index.near(&LineSegment2::new(pixel, beside));
+                    near.extend(
+                        segments
+                            .into_iter()
+                            .flat_map(|s| edges_of[*view][s].iter().copied()),
+                    );
+                }
+            }
+            near.sort_unstable();
+            near.dedup();
+            near.retain(|edge| {
+                let Some(line) = &lines[*edge] else {
+                    return false;
+                };
+                let across = |own: &&CertainLine| {
+                    own.direction.cross(&line.direction).norm() >= config.min_sine
+                };
+                is_inside(line, &place, config)
+                    && own.iter().all(across)
+                    && line.distance_in_pixels(views, &place) <= max_distance
+                    && mean_distance_in_pixels(views, &own_views, &line.line, &place)
+                        <= max_distance
+            });
+            near.into_iter()
+                .map(|edge| Split { edge, junction })
+                .collect()
+        })
+        .collect();
+    found.into_iter().flatten().collect()
+}
+
+/// Whether a place lies on the inside of a segment, both pieces being long enough.
+fn is_inside(
+    line: &CertainLine,
+    place: &nalgebra::Vector3<f64>,
+    config: &EdgeSplittingConfig,
+) -> bool {
+    let parameter = line.line.line_parameter(place);
+    parameter.min(1.0 - parameter) * line.length_in_pixels() >= config.min_length_in_pixels
+}
+
+/// The junctions that cut an edge, in its order; those that lie at one place
+/// become the same.
+fn inner_places(
+    graph: &JunctionGraph,
+    line: &CertainLine,
+    splits: &[Split],
+    config: &EdgeSplittingConfig,
+    same: &mut SameJunctions,
+) -> Vec<usize> {
+    let mut places: Vec<(f64, usize)> = splits
+        .iter()
+        .map(|split| split.junction)
+        .filter(|junction| is_inside(line, &graph.junctions[*junction], config))
+        .map(|junction| {
+            (
+                line.line.line_parameter(&graph.junctions[junction]),
+                junction,
+            )
+        })
+        .collect();
+    places.sort_by(|(s, a), (t, b)| s.total_cmp(t).then(a.cmp(b)));
+    places.dedup_by(|later, earlier| {
+        let near = (later.0 - earlier.0) * line.length_in_pixels() < config.min_length_in_pixels;
+        if near {
+            same.join(later.1, earlier.1);
+        }
+        near
+    });
+    places.into_iter().map(|(_, junction)| junction).collect()
+}
+
+/// The pieces between an edge's ends and the junctions on it, each with the 2D
+/// segments that show it.
+fn cut_edge(
+    views: &[TrackView],
+    graph: &JunctionGraph,
+    edge: &GraphEdge,
+    places: &[usize],
+) -> Vec<GraphEdge> {
+    if places.is_empty() {
+        return vec![edge.clone()];
+    }
+    let [first, last] = edge.junctions;
+    let stops: Vec<usize> = std::iter::once(first)
+        .chain(places.iter().copied())
+        .chain(std::iter::once(last))
+        .collect();
+    stops
+        .windows(2)
+        .map(|ends| {
+            let piece = LineSegment3::new(graph.junctions[ends[0]], graph.junctions[ends[1]]);
+            let shows = |id: &SegmentId| {
+                shown_interval(views, *id, &piece).is_some_and(|[low, high]| {
+                    high.min(1.0) - low.max(0.0) > 0.5 * (high - low).min(1.0)
+                })
+            };
+            GraphEdge {
+                junctions: [ends[0], ends[1]],
+                supports: edge.supports.iter().copied().filter(shows).collect(),
+            }
+        })
+        .collect()
+}
+
+/// Which junctions have become one.
+struct SameJunctions(Vec<usize>);
+
+impl SameJunctions {
+    fn new(count: usize) -> Self {
+        Self((0..count).collect())
+    }
+
+    /// The junction that stands for all of its group.
+    fn first(&self, mut junction: usize) -> usize {
+        while self.0[junction] != junction {
+            junction = self.0[junction];
+        }
+        junction
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let [a, b] = [self.first(a), self.first(b)];
+        self.0[a.max(b)] = a.min(b);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scenes::{cameras_on_sphere, views_of_edges};
+    use nalgebra::Vector3;
+
+    #[test]
+    fn an_edge_is_cut_where_others_end_on_it() {
+        // A post; a bar that ends on it at 0.1; a corner of two bars on it at -0.2.
+        let junctions = vec![
+            Vector3::new(0.0, -0.4, 0.0),
+            Vector3::new(0.0, 0.4, 0.0),
+            Vector3::new(0.0, 0.1, 0.0),
+            Vector3::new(0.5, 0.1, 0.0),
+            Vector3::new(0.0, -0.2, 0.0),
+            Vector3::new(0.3, -0.2, 0.0),
+            Vector3::new(0.0, -0.2, 0.4),
+        ];
+        let pairs = [[0, 1], [2, 3], [4, 5], [4, 6]];
+        let views: Vec<TrackView> = views_of_edges(&cameras_on_sphere(10), &junctions, &pairs)
+            .iter()
+            .map(|observation| TrackView::new(observation, 1.0, 1.0))
+            .collect();
+        let edges: Vec<GraphEdge> = pairs
+            .iter()
+            .enumerate()
+            .map(|(segment, pair)| GraphEdge {
+                junctions: *pair,
+                supports: (0..10).map(|view| SegmentId { view, segment }).collect(),
+            })
+            .collect();
+        let mut graph = JunctionGraph { junctions, edges };
+        let split = |graph: &mut JunctionGraph, on_edges: &[Split], enabled| {
+            let config = EdgeSplittingConfig {
+                enabled,
+                ..Default::default()
+            };
+            let refinement = LineRefinementConfig::default();
+            split_edges(&views, graph, on_edges, 0.5, &refinement, &config)
+        };
+        let mut untouched = graph.clone();
+        assert_eq!(split(&mut untouched, &[], false), 0);
+        assert_eq!(untouched, graph);
+
+        let bar = Split {
+            edge: 0,
+            junction: 2,
+        };
+        assert_eq!(split(&mut graph, &[bar], true), 1);
+        let pairs: Vec<_> = graph.edges.iter().map(|edge| edge.junctions).collect();
+        assert_eq!(pairs, [[0, 4], [1, 2], [2, 3], [2, 4], [4, 5], [4, 6]]);
+        assert!(graph.edges.iter().all(|edge| edge.supports.len() == 10));
+        let again = graph.clone();
+        assert_eq!(split(&mut graph, &[], true), 0);
+        assert_eq!(graph, again);
+    }
+}
