@@ -76,6 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         },
         resolution: 64,
         closed: true,
+        max_slope: Some(1.0),
     };
     let mesh = marching_cubes(&Ball, &grid, &mut |_| ())?;
     mesh.write_ply(&out.join("ball.ply"))?;

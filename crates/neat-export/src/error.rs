@@ -43,9 +43,11 @@ pub enum ExportError {
         /// The option that needs it.
         option: &'static str,
     },
-    /// Coordinates beyond what the format can hold.
-    #[error("{path}: the wireframe extends too far for {format}: use a format with 64-bit numbers")]
-    TooLarge {
+    /// An extent that the numbers of a format cannot hold.
+    #[error(
+        "{path}: the extent of the wireframe is beyond the numbers of {format}: use a format of text, such as obj"
+    )]
+    OutOfRange {
         /// The file.
         path: PathBuf,
         /// Name of the format.

@@ -1,6 +1,5 @@
 //! A document to a file.
 
-use crate::isolated::isolated_junctions;
 use crate::orthographic::Drawing;
 use crate::{ExportError, ExportOptions, Format};
 use crate::{colmap, dxf, geojson, gltf, npz, picture, step, svg};
@@ -45,59 +44,38 @@ pub fn export(
         edges: document.edges.len(),
         left_out: Vec::new(),
     };
-    let too_large = || ExportError::TooLarge {
+    let out_of_range = || ExportError::OutOfRange {
         path: path.into(),
         format: format.name(),
     };
     let drawing = || {
-        Drawing::new(&document.junctions, options.direction, options.width).ok_or_else(too_large)
+        Drawing::new(&document.junctions, options.direction, options.width).ok_or_else(out_of_range)
     };
-    let bytes = match format {
-        Format::Json => {
-            write_json(path, &document)?;
-            return Ok(written);
-        }
-        Format::Obj => {
-            write_obj(path, &document.wireframe())?;
-            return Ok(written);
-        }
-        Format::Ply => {
-            write_ply(path, &document.wireframe())?;
-            return Ok(written);
-        }
-        Format::Npz => {
-            npz::write(path, &document)?;
-            return Ok(written);
-        }
-        Format::Png => {
-            file::write_png(path, &picture::draw(&document, &drawing()?))?;
-            return Ok(written);
-        }
-        Format::Colmap => {
-            written.files = colmap::write(path, &document)?;
-            return Ok(written);
-        }
+    let write = |bytes: &[u8]| file::write_atomically(path, bytes);
+    match format {
+        Format::Json => write_json(path, &document)?,
+        Format::Obj => write_obj(path, &document.wireframe())?,
+        Format::Ply => write_ply(path, &document.wireframe())?,
+        Format::Gltf => write(&gltf::text(&document).ok_or_else(out_of_range)?)?,
+        Format::Glb => write(&gltf::binary(&document).ok_or_else(out_of_range)?)?,
+        Format::Dxf => write(dxf::text(&document).as_bytes())?,
         Format::Step => {
             let step = step::text(&document, options.unit);
-            if step.edges_without_length > 0 {
-                let count = step.edges_without_length;
-                let sentence = format!("STEP has no edges without length: {count} left out");
+            let lacking = [
+                (step.edges_without_length, "edges without length"),
+                (step.lonely_junctions, "junctions without edges"),
+            ];
+            for (count, what) in lacking.into_iter().filter(|(count, _)| *count > 0) {
+                let sentence = format!("a STEP wireframe has no {what}: {count} left out");
                 written.left_out.push(sentence);
             }
-            let isolated = isolated_junctions(&document).len();
-            if isolated > 0 {
-                let sentence =
-                    format!("a STEP wireframe has no vertices without edges: {isolated} left out");
-                written.left_out.push(sentence);
-            }
-            step.text.into_bytes()
+            write(step.text.as_bytes())?;
         }
-        Format::Gltf => gltf::text(&document).ok_or_else(too_large)?,
-        Format::Glb => gltf::binary(&document).ok_or_else(too_large)?,
-        Format::Dxf => dxf::text(&document).into_bytes(),
-        Format::Svg => svg::text(&document, &drawing()?).into_bytes(),
-        Format::GeoJson => geojson::text(&document).into_bytes(),
-    };
-    file::write_atomically(path, &bytes)?;
+        Format::Svg => write(svg::text(&document, &drawing()?).as_bytes())?,
+        Format::Png => file::write_png(path, &picture::draw(&document, &drawing()?))?,
+        Format::GeoJson => write(geojson::text(&document).as_bytes())?,
+        Format::Npz => npz::write(path, &document)?,
+        Format::Colmap => written.files = colmap::write(path, &document)?,
+    }
     Ok(written)
 }

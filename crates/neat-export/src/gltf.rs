@@ -13,6 +13,7 @@ use base64::prelude::BASE64_STANDARD;
 use nalgebra::Vector3;
 use neat_wireframe::export::WireframeDocument;
 use serde_json::{Value, json};
+use std::ops::Range;
 
 const UNSIGNED_INT: u32 = 5125;
 const FLOAT: u32 = 5126;
@@ -20,9 +21,11 @@ const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 const POINTS: u32 = 0;
 const LINES: u32 = 1;
+/// The extents that 32-bit numbers hold: smaller ones would lose digits.
+const EXTENTS: Range<f64> = 1e-30..1e38;
 
-/// A `.gltf` file with the data inside; `None` if the wireframe extends too far for
-/// 32-bit numbers.
+/// A `.gltf` file with the data inside; `None` if 32-bit numbers cannot hold the extent
+/// of the wireframe.
 pub fn text(document: &WireframeDocument) -> Option<Vec<u8>> {
     let mut asset = Asset::new(document)?;
     if !asset.data.is_empty() {
@@ -76,15 +79,15 @@ impl Asset {
         if document.junctions.is_empty() {
             return Some(asset);
         }
-        let center = center(&document.junctions);
+        let (center, extent) = center_and_extent(&document.junctions);
+        if extent > 0.0 && !EXTENTS.contains(&extent) {
+            return None;
+        }
         let positions: Vec<Vector3<f32>> = document
             .junctions
             .iter()
             .map(|p| (p - center).map(|x| x as f32))
             .collect();
-        if !positions.iter().flatten().all(|x| x.is_finite()) {
-            return None;
-        }
         asset.json["scenes"][0]["nodes"] = json!([0]);
         asset.json["nodes"] = json!([{
             "name": "wireframe",
@@ -201,11 +204,11 @@ fn push(json: &mut Value, array: &str, item: Value) -> usize {
     }
 }
 
-/// The middle of the bounding box of at least one point.
-fn center(points: &[Vector3<f64>]) -> Vector3<f64> {
+/// The middle and the longest side of the bounding box of at least one point.
+fn center_and_extent(points: &[Vector3<f64>]) -> (Vector3<f64>, f64) {
     let low = points.iter().fold(points[0], |low, p| low.inf(p));
     let high = points.iter().fold(points[0], |high, p| high.sup(p));
-    low / 2.0 + high / 2.0
+    (low / 2.0 + high / 2.0, (high - low).max())
 }
 
 /// IEC 61966-2-1: factors of materials are linear, colours of screens are not.

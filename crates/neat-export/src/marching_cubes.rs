@@ -11,6 +11,8 @@ use neat_wireframe::SignedDistance;
 
 /// Points per query of the signed distance.
 const BATCH: usize = 1 << 16;
+/// Points along a side of the blocks that one distance may answer for.
+const BLOCK: usize = 8;
 /// No cut.
 const NONE: u32 = u32::MAX;
 
@@ -65,6 +67,11 @@ pub struct Grid {
     /// Whether the part of the inside that lies in the region is closed by the
     /// region's border. If not, the surface ends where it leaves the region.
     pub closed: bool,
+    /// How much the distance changes at most over a unit of length, where that is
+    /// known: 1 for an exact distance, somewhat more for a trained one. Blocks of 8³
+    /// points that are too far away for the surface then cost one evaluation. With
+    /// `None` every point is evaluated.
+    pub max_slope: Option<f64>,
 }
 
 impl Grid {
@@ -77,6 +84,15 @@ impl Grid {
                 option: "the resolution",
                 value: self.resolution.to_string(),
                 expected: "2 to 2048 cubes",
+            });
+        }
+        if let Some(slope) = self.max_slope
+            && !(slope.is_finite() && slope > 0.0)
+        {
+            return Err(ExportError::BadOption {
+                option: "the largest slope",
+                value: slope.to_string(),
+                expected: "a positive number",
             });
         }
         let [min, max] = self.region.bounds();
@@ -110,13 +126,14 @@ pub fn marching_cubes(
     let lattice = Lattice::new(grid);
     let cases = cube_cases();
     let mut mesh = TriangleMesh::default();
-    let mut lower = lattice.layer(0, surface)?;
-    for z in 0..lattice.counts[2] {
-        if z == 0 {
-            lattice.cut_inside(&mut lower, &mut mesh);
-            continue;
+    let mut far = lattice.far_blocks(0, surface)?;
+    let mut lower = lattice.layer(0, surface, &far)?;
+    lattice.cut_inside(&mut lower, &mut mesh);
+    for z in 1..lattice.counts[2] {
+        if z % BLOCK == 0 {
+            far = lattice.far_blocks(z, surface)?;
         }
-        let mut upper = lattice.layer(z, surface)?;
+        let mut upper = lattice.layer(z, surface, &far)?;
         lattice.cut_between(&mut lower, &upper, &mut mesh);
         lattice.cut_inside(&mut upper, &mut mesh);
         lattice.add_triangles([&lower, &upper], &cases, &mut mesh);
@@ -138,6 +155,21 @@ struct Lattice<'a> {
     spacing: f64,
     /// Number of points along each axis.
     counts: [usize; 3],
+}
+
+/// The distances at points, all of them numbers.
+fn finite(surface: &dyn SignedDistance, points: &[Vector3<f64>]) -> Result<Vec<f64>, ExportError> {
+    if points.is_empty() {
+        return Ok(Vec::new());
+    }
+    let distances = surface.sdf(points);
+    match distances.iter().position(|distance| !distance.is_finite()) {
+        Some(bad) => Err(ExportError::BadDistance {
+            point: points[bad].into(),
+            value: distances[bad],
+        }),
+        None => Ok(distances),
+    }
 }
 
 /// The points of one z.
@@ -169,12 +201,46 @@ impl<'a> Lattice<'a> {
         self.origin + Vector3::from(index).map(|i| i as f64) * self.spacing
     }
 
-    fn layer(&self, z: usize, surface: &dyn SignedDistance) -> Result<Layer, ExportError> {
+    /// For every block of 8³ points that begins at layer `z`: the distance in its
+    /// centre, if the surface is farther away than all its points, else NaN.
+    fn far_blocks(&self, z: usize, surface: &dyn SignedDistance) -> Result<Vec<f64>, ExportError> {
+        let [columns, rows] = [self.counts[0], self.counts[1]].map(|n| n.div_ceil(BLOCK));
+        let mut far = vec![f64::NAN; columns * rows];
+        let Some(slope) = self.grid.max_slope else {
+            return Ok(far);
+        };
+        let to_center = Vector3::repeat((BLOCK - 1) as f64 / 2.0 * self.spacing);
+        let mut blocks = Vec::new();
+        let mut centers = Vec::new();
+        for block in 0..far.len() {
+            let corner = [block % columns * BLOCK, block / columns * BLOCK, z];
+            let center = self.point(corner) + to_center;
+            if self.grid.region.signed_distance(&center) < 0.0 {
+                blocks.push(block);
+                centers.push(center);
+            }
+        }
+        // One step more than the corners, so that no edge to a neighbour is cut.
+        let reach = slope * (to_center.norm() + self.spacing);
+        for (block, distance) in blocks.into_iter().zip(finite(surface, &centers)?) {
+            if distance.abs() > reach {
+                far[block] = distance;
+            }
+        }
+        Ok(far)
+    }
+
+    fn layer(
+        &self,
+        z: usize,
+        surface: &dyn SignedDistance,
+        far: &[f64],
+    ) -> Result<Layer, ExportError> {
         let [columns, rows, _] = self.counts;
         let mut values = Vec::with_capacity(columns * rows);
         while values.len() < columns * rows {
             let batch = BATCH.min(columns * rows - values.len());
-            self.add_values(z, batch, surface, &mut values)?;
+            self.add_values(z, batch, surface, far, &mut values)?;
         }
         let cuts = [0, 1, 2].map(|_| vec![NONE; values.len()]);
         Ok(Layer { z, values, cuts })
@@ -186,37 +252,35 @@ impl<'a> Lattice<'a> {
         z: usize,
         batch: usize,
         surface: &dyn SignedDistance,
+        far: &[f64],
         values: &mut Vec<f64>,
     ) -> Result<(), ExportError> {
         let columns = self.counts[0];
+        let block_columns = columns.div_ceil(BLOCK);
         let mut indices = Vec::new();
         let mut points = Vec::new();
         for index in values.len()..values.len() + batch {
-            let point = self.point([index % columns, index / columns, z]);
+            let [x, y] = [index % columns, index / columns];
+            let point = self.point([x, y, z]);
             let of_region = self.grid.region.signed_distance(&point);
-            if of_region < 0.0 {
-                indices.push(index);
-                points.push(point);
-            }
-            values.push(if self.grid.closed {
+            let border = if self.grid.closed {
                 of_region
             } else {
                 f64::NAN
-            });
-        }
-        if points.is_empty() {
-            return Ok(());
-        }
-        let distances = surface.sdf(&points);
-        for ((index, point), distance) in indices.into_iter().zip(points).zip(distances) {
-            if !distance.is_finite() {
-                return Err(ExportError::BadDistance {
-                    point: point.into(),
-                    value: distance,
-                });
+            };
+            let of_block = far[y / BLOCK * block_columns + x / BLOCK];
+            // The intersection of two solids; `max` ignores a border that is NaN.
+            if of_region < 0.0 && of_block.is_nan() {
+                indices.push(index);
+                points.push(point);
+                values.push(border);
+            } else if of_region < 0.0 {
+                values.push(of_block.max(border));
+            } else {
+                values.push(border);
             }
-            // The intersection of two solids. NaN, where the region does not close the
-            // surface, is ignored by `max`.
+        }
+        for (index, distance) in indices.into_iter().zip(finite(surface, &points)?) {
             values[index] = distance.max(values[index]);
         }
         Ok(())

@@ -16,6 +16,8 @@ pub struct Step {
     pub text: String,
     /// Number of edges that are left out: a line needs a direction.
     pub edges_without_length: usize,
+    /// Number of junctions that no edge in the file joins.
+    pub lonely_junctions: usize,
 }
 
 /// The text of a STEP file.
@@ -43,6 +45,7 @@ pub fn text(document: &WireframeDocument, unit: LengthUnit) -> Step {
         })
         .collect();
     let mut sets = Vec::new();
+    let mut lonely = vec![true; vertices.len()];
     for &[a, b] in &document.edges {
         let [start, end] = [a, b].map(|junction| document.junctions[junction]);
         let Some(direction) = direction(&start, &end) else {
@@ -55,6 +58,7 @@ pub fn text(document: &WireframeDocument, unit: LengthUnit) -> Step {
         let (from, to) = (&vertices[a], &vertices[b]);
         let edge = step.add(&format!("EDGE_CURVE('',{from},{to},{line},.T.)"));
         sets.push(step.add(&format!("CONNECTED_EDGE_SET('',({edge}))")));
+        (lonely[a], lonely[b]) = (false, false);
     }
     let representation = if sets.is_empty() {
         format!("SHAPE_REPRESENTATION('',({placement}),{geometry})")
@@ -72,6 +76,7 @@ pub fn text(document: &WireframeDocument, unit: LengthUnit) -> Step {
     Step {
         text: step.file(),
         edges_without_length: document.edges.len() - sets.len(),
+        lonely_junctions: lonely.iter().filter(|lonely| **lonely).count(),
     }
 }
 

@@ -7,6 +7,7 @@ use neat_export::{ExportError, TriangleMesh};
 use neat_wireframe::SignedDistance;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
@@ -31,6 +32,7 @@ fn grid(radius: f64, resolution: usize) -> Grid {
         },
         resolution,
         closed: true,
+        max_slope: None,
     }
 }
 
@@ -206,6 +208,7 @@ fn the_region_closes_what_leaves_it_or_leaves_it_open() {
         region: ball,
         resolution: 60,
         closed: true,
+        max_slope: None,
     };
     let half_space = |p: &Vector3<f64>| p.x - 1000.0;
     let closed = mesh(half_space, &grid);
@@ -232,6 +235,7 @@ fn empty_and_full_regions_and_boxes_of_any_shape() {
         },
         resolution: 64,
         closed: true,
+        max_slope: None,
     };
     let full = mesh(|_| -1.0, &flat);
     assert_watertight(&full);
@@ -262,6 +266,44 @@ fn progress_rises_to_one_and_queries_are_bounded() {
 }
 
 #[test]
+fn far_blocks_cost_one_evaluation_and_change_nothing() {
+    let evaluated = Cell::new(0);
+    let torus = |p: &Vector3<f64>| {
+        evaluated.set(evaluated.get() + 1);
+        (p.xy().norm() - 0.6).hypot(p.z) - 0.25
+    };
+    let mut counts = Vec::new();
+    for closed in [true, false] {
+        let mut meshes = Vec::new();
+        for max_slope in [None, Some(1.0), Some(2.0)] {
+            let grid = Grid {
+                closed,
+                max_slope,
+                ..grid(0.7, 100)
+            };
+            meshes.push(mesh(torus, &grid));
+            counts.push(evaluated.take());
+        }
+        assert_eq!(meshes[0], meshes[1]);
+        assert_eq!(meshes[0], meshes[2]);
+    }
+    let [all, few, more] = counts[..3] else {
+        panic!("three grids")
+    };
+    assert!(few < more && more < all && few < all / 2, "{counts:?}");
+
+    // Even a slope that is wrong makes no holes.
+    let steep = mesh(
+        |p| 9.0 * (p.norm() - 0.5),
+        &Grid {
+            max_slope: Some(1.0),
+            ..grid(1.0, 50)
+        },
+    );
+    assert_watertight(&steep);
+}
+
+#[test]
 fn bad_numbers_are_errors() {
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let field = Formula(|p: &Vector3<f64>| if p.x > 0.3 { value } else { p.y });
@@ -287,6 +329,14 @@ fn bad_numbers_are_errors() {
         grid(f64::INFINITY, 8),
         Grid {
             region: nowhere,
+            ..grid(1.0, 8)
+        },
+        Grid {
+            max_slope: Some(0.0),
+            ..grid(1.0, 8)
+        },
+        Grid {
+            max_slope: Some(f64::NAN),
             ..grid(1.0, 8)
         },
     ];
