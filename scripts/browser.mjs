@@ -23,10 +23,10 @@ export const findBrowser = () => BROWSERS.find((path) => path && existsSync(path
 
 /** A running browser with one page. */
 export class Browser {
-  static async start(path, extraArguments = []) {
+  static async start(path) {
     const browser = new Browser();
     browser.profile = mkdtempSync(join(tmpdir(), "check-report-"));
-    browser.process = spawn(path, [...ARGUMENTS, ...extraArguments, `--user-data-dir=${browser.profile}`, "about:blank"], {
+    browser.process = spawn(path, [...ARGUMENTS, `--user-data-dir=${browser.profile}`, "about:blank"], {
       stdio: ["ignore", "ignore", "ignore", "pipe", "pipe"],
     });
     [, , , browser.input, browser.output] = browser.process.stdio;

@@ -13,8 +13,11 @@ function readData() {
   for (const ends of data.edges) for (const end of ends) data.degrees[end]++;
   data.lengths = data.edges.map(([a, b]) => norm(subtract(data.junctions[a], data.junctions[b])));
   for (const view of data.views) Object.assign(view, viewAxes(view), { position: toModel(view.center) });
-  data.frustumSize = frustumSize(data.views);
-  for (const view of data.views) view.frustum = frustum(view, data.frustumSize);
+  const size = frustumSize(data.views);
+  for (const view of data.views) view.frustum = frustum(view, size);
+  /** Everything that is drawn is nearer to the origin than this. */
+  data.extent = data.points.concat(data.views.map((view) => view.position))
+    .reduce((most, point) => Math.max(most, norm(point)), 1) + 1;
   data.up = upDirection(data);
   data.supportCounts = supportCounts(data);
   data.measures = edgeMeasures(data);

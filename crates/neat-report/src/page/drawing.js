@@ -42,7 +42,7 @@ function drawScene(viewer) {
   const rims = new Strokes(0);
   const edges = new Strokes(1e-4);
   const dots = new Strokes(2e-4);
-  const marked = new Strokes(4e-4);
+  const marked = new Strokes(4e-4, 0.3);
   const colors = theme();
   const onPhotograph = through !== null;
   const ink = onPhotograph ? PAPER : colors.ink;

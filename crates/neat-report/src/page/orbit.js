@@ -68,7 +68,7 @@ class Orbit {
     const focal = this.focal(width, height);
     const near = distance * 0.01;
     const pinhole = { fx: focal, fy: focal, cx: width / 2, cy: height / 2, skew: 0 };
-    const projection = pinholeProjection(pinhole, width, height, near, distance + 60);
+    const projection = pinholeProjection(pinhole, width, height, near, distance + norm(this.pose.target) + this.data.extent);
     const matrix = multiply(projection, cameraFromWorld(right, down, forward, center));
     return { matrix, width, height, near, distance, fog: [distance - 0.9, distance + 1.5, 0.62] };
   }

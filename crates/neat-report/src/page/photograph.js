@@ -116,8 +116,9 @@ function fitBox([x0, y0, x1, y1], width, height, margin) {
 /** Looking through a camera of the report: the image stays flat, so that turning
  * moves it. */
 class ThroughCamera {
-  constructor(view, changed) {
+  constructor(view, extent, changed) {
     this.camera = view;
+    this.far = norm(view.position) + extent;
     this.changed = changed;
     this.magnification = 1;
     this.shift = [0, 0];
@@ -138,7 +139,7 @@ class ThroughCamera {
       fx: fx * zoom, fy: fy * zoom, skew: skew * zoom,
       cx: cx * zoom + offset[0], cy: cy * zoom + offset[1],
     };
-    const projection = pinholeProjection(pinhole, width, height, 1e-3, 200);
+    const projection = pinholeProjection(pinhole, width, height, 1e-3, this.far);
     const matrix = multiply(projection, cameraFromWorld(right, down, forward, position));
     return { matrix, width, height, near: 1e-3, distance: 0, fog: [0, 1, 0] };
   }

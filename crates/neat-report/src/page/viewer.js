@@ -198,7 +198,7 @@ class Viewer {
   lookThrough(index) {
     this.orbit.stop();
     this.stage.classList.toggle("through-camera", index !== null);
-    this.navigator = index === null ? this.orbit : new ThroughCamera(this.data.views[index], () => this.redraw());
+    this.navigator = index === null ? this.orbit : new ThroughCamera(this.data.views[index], this.data.extent, () => this.redraw());
     this.change({ through: index, hover: null });
   }
 
