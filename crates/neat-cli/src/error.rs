@@ -52,6 +52,17 @@ pub enum CliError {
     /// The operating system does not tell of Ctrl-C.
     #[error("Ctrl-C cannot be caught")]
     Interrupt(#[source] std::io::Error),
+    /// A wireframe could not be exported.
+    #[error(transparent)]
+    Export(#[from] neat_export::ExportError),
+    /// No browser could be started.
+    #[error("no browser can be started ({reason}): open {report} yourself")]
+    Browser {
+        /// What was to be opened.
+        report: String,
+        /// What the system said.
+        reason: String,
+    },
     /// Nobody takes the output.
     #[error("the output cannot be written")]
     Output(#[from] std::io::Error),
@@ -97,6 +108,7 @@ impl CliError {
             Self::Override(_)
             | Self::UnknownView { .. }
             | Self::Usage(_)
+            | Self::Export(_)
             | Self::Threads(_)
             | Self::NotReady => BAD_INPUT,
             // `neat info SCENE | head` is no failure.

@@ -8,11 +8,13 @@ mod detect;
 mod distill;
 mod doctor;
 mod eval;
+mod export;
 mod info;
 mod reconstruct;
 mod render;
 mod synth;
 mod train;
+mod view;
 
 use crate::error::CliError;
 use clap::Subcommand;
@@ -23,6 +25,8 @@ pub enum Command {
     Reconstruct(reconstruct::ReconstructArgs),
     Train(train::TrainArgs),
     Distill(distill::DistillArgs),
+    View(view::ViewArgs),
+    Export(export::ExportArgs),
     Eval(eval::EvalArgs),
     Render(render::RenderArgs),
     Synth(synth::SynthArgs),
@@ -42,6 +46,8 @@ impl Command {
             Self::Reconstruct(args) => args.run(quiet),
             Self::Train(args) => args.run(quiet),
             Self::Distill(args) => args.run(quiet),
+            Self::View(args) => args.run(),
+            Self::Export(args) => args.run(quiet),
             Self::Eval(args) => args.run(),
             Self::Render(args) => args.run(quiet),
             Self::Synth(args) => args.run(),
