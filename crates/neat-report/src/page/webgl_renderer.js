@@ -92,7 +92,7 @@ class WebglRenderer {
       this.gl = canvas.getContext("webgl", options);
     }
     if (!this.gl) throw new Error("no WebGL");
-    this.batches = [];
+    this.layers = new Map();
     this.prepare();
   }
 
@@ -126,17 +126,17 @@ class WebglRenderer {
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
 
-  /** Takes what is to be drawn, a list of Strokes. */
-  load(batches) {
+  /** Takes what a layer is to show, a list of Strokes. */
+  load(layer, batches) {
     const { gl } = this;
-    for (const { buffer } of this.batches) gl.deleteBuffer(buffer);
-    this.batches = batches.filter((strokes) => strokes.count > 0).map((strokes) => {
+    for (const { buffer } of this.layers.get(layer) ?? []) gl.deleteBuffer(buffer);
+    this.layers.set(layer, batches.filter((strokes) => strokes.count > 0).map((strokes) => {
       const buffer = gl.createBuffer();
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       gl.bufferData(gl.ARRAY_BUFFER, strokeVertices(strokes), gl.DYNAMIC_DRAW);
       const { count, bias, haze, clearance } = strokes;
       return { buffer, count, bias, haze, clearance };
-    });
+    }));
   }
 
   /** Draws for a view, see Orbit.view. */
@@ -160,7 +160,7 @@ class WebglRenderer {
     for (const fringe of [0, 1]) {
       gl.uniform1f(uniforms.fringe, fringe);
       gl.depthMask(!fringe);
-      for (const batch of this.batches) this.drawBatch(batch, view);
+      for (const batch of [...this.layers.values()].flat()) this.drawBatch(batch, view);
     }
   }
 
