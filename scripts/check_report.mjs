@@ -10,20 +10,13 @@
 // and Chromium (or CHROMIUM=path), nothing else.
 
 import assert from "node:assert/strict";
-import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
-import { join, resolve } from "node:path";
-import { pathToFileURL } from "node:url";
+import { resolve } from "node:path";
+import { fileURLToPath, pathToFileURL } from "node:url";
 import { Browser, findBrowser } from "./browser.mjs";
+import { Screenshots } from "./screenshots.mjs";
 
-const REFERENCES = resolve(import.meta.dirname ?? new URL(".", import.meta.url).pathname, "../crates/neat-report/tests/screenshots");
 const DESKTOP = { width: 1280, height: 800 };
 const PHONE = { width: 390, height: 844, touch: true };
-// Rasterisers differ, and for the page fonts, too: the mean colours of cells of about
-// so many pixels hide that. Most cells of the 3D view are empty, and none holds text.
-const CELL_PIXELS = 20;
-const PAGE_TOLERANCE = { mean: 4, cell: 45, share: 0.02 };
-const LINES_TOLERANCE = { mean: 1, cell: 16, share: 0.01 };
-
 const options = process.argv.slice(2);
 const flag = (name) => options.includes(name) && options.splice(options.indexOf(name), 1).length > 0;
 const update = flag("--update");
@@ -32,6 +25,8 @@ if (options.length !== 1) {
   console.error("usage: check_report.mjs FOLDER [--screenshots DIR] [--update]");
   process.exit(2);
 }
+const references = fileURLToPath(new URL("../crates/neat-report/tests/screenshots", import.meta.url));
+const screenshots = new Screenshots({ references, kept, update });
 const [sample, hostile, empty] = ["sample", "hostile", "empty"].map(
   (name) => pathToFileURL(resolve(options[0], `${name}.html`)).href);
 
@@ -104,7 +99,7 @@ async function checkDesktop(browser) {
   assert.ok(await drawnPixels(browser) > 3000, "the wireframe is not drawn");
   assert.match(await browser.evaluate("neat.viewer.renderer.kind"), /WebGL/);
   await checkOverflow(browser);
-  await compare(browser, "desktop-light");
+  await screenshots.take(browser, "desktop-light");
 
   const [segment, x, y] = await lonelySegment(browser);
   await browser.click(x, y);
@@ -268,7 +263,7 @@ async function checkThroughCamera(browser) {
   assert.notEqual(await browser.evaluate("neat.viewer.through"), view);
   await browser.evaluate("neat.viewer.lookThrough(neat.data.views.findIndex((view) => view.photograph))");
   await browser.settle();
-  await compare(browser, "through-camera");
+  await screenshots.take(browser, "through-camera");
   await browser.evaluate("neat.viewer.canvas.focus()");
   await browser.press("Escape");
   assert.equal(await browser.evaluate("neat.viewer.through"), null);
@@ -279,14 +274,14 @@ async function checkDark(browser) {
   await open(browser, sample, { ...DESKTOP, dark: true });
   await browser.evaluate("neat.viewer.select({ kind: 'segment', index: 3 })");
   await browser.settle();
-  await compare(browser, "desktop-dark-picked");
+  await screenshots.take(browser, "desktop-dark-picked");
   finish(browser, "the dark page");
 }
 
 async function checkPhone(browser) {
   await open(browser, sample, PHONE);
   await checkOverflow(browser);
-  await compare(browser, "phone");
+  await screenshots.take(browser, "phone");
   const [segment, x, y] = await lonelySegment(browser);
   const touch = (type, touchPoints) => browser.send("Input.dispatchTouchEvent", { type, touchPoints });
   await touch("touchStart", [{ x, y }]);
@@ -356,80 +351,9 @@ async function checkFallback(browser, missing, kind) {
   assert.equal(await text(browser, "#inspector h2"), `Segment ${segment}`);
   // The pictures of all kinds are compared with the same reference.
   await browser.evaluate("neat.viewer.select(null)");
-  await compare(browser, `desktop-light-${kind.replaceAll(" ", "-")}`, "desktop-light");
+  await screenshots.take(browser, `desktop-light-${kind.replaceAll(" ", "-")}`, "desktop-light");
   await browser.send("Page.removeScriptToEvaluateOnNewDocument", { identifier });
   finish(browser, `drawn by ${kind}`);
-}
-
-const screenshots = [];
-
-/** Takes a screenshot; all are compared at the end. */
-async function compare(browser, name, reference = name) {
-  // The pointer must not lie on anything.
-  await browser.mouse("mouseMoved", 2, 2);
-  await browser.settle();
-  screenshots.push({ name, reference, png: await browser.screenshot(), tolerance: PAGE_TOLERANCE });
-  // The lines alone; WebGL keeps them only until the end of this task.
-  const lines = await browser.evaluate("(neat.viewer.draw(), neat.viewer.canvas.toDataURL())");
-  screenshots.push({
-    name: `${name}-lines`, reference: `${reference}-lines`, png: lines.split(",")[1], tolerance: LINES_TOLERANCE,
-  });
-}
-
-async function compareScreenshots(browser) {
-  await browser.open("about:blank");
-  const inPage = (png, body) => browser.evaluate(`(async () => {
-    const bytes = Uint8Array.from(atob("${png}"), (c) => c.charCodeAt(0));
-    const blob = new Blob([bytes], { type: "image/png" });
-    const canvas = document.createElement("canvas");
-    const draw = async (options) => {
-      const image = await createImageBitmap(blob, options);
-      [canvas.width, canvas.height] = [image.width, image.height];
-      const context = canvas.getContext("2d");
-      context.fillStyle = "white";
-      context.fillRect(0, 0, image.width, image.height);
-      context.drawImage(image, 0, 0);
-      return context.getImageData(0, 0, image.width, image.height);
-    };
-    ${body}
-  })()`);
-  /** The mean colours of the cells, as many as are given or else as fit. */
-  const cells = (png, grid = null) => inPage(png, `
-    const { data, width, height } = await draw();
-    const [columns, rows] = ${JSON.stringify(grid)} ?? [width, height].map((x) => Math.round(x / ${CELL_PIXELS}));
-    const sums = new Array(3 * columns * rows).fill(0);
-    const counts = new Array(columns * rows).fill(0);
-    for (let y = 0; y < height; y++) {
-      for (let x = 0; x < width; x++) {
-        const cell = Math.floor((y * rows) / height) * columns + Math.floor((x * columns) / width);
-        counts[cell]++;
-        for (let c = 0; c < 3; c++) sums[3 * cell + c] += data[4 * (y * width + x) + c];
-      }
-    }
-    return { grid: [columns, rows], means: sums.map((sum, i) => sum / counts[Math.floor(i / 3)]) };`);
-  mkdirSync(REFERENCES, { recursive: true });
-  for (const { name, reference, png, tolerance } of screenshots) {
-    if (kept) {
-      mkdirSync(kept, { recursive: true });
-      writeFileSync(join(kept, `${name}.png`), Buffer.from(png, "base64"));
-    }
-    const path = join(REFERENCES, `${reference}.png`);
-    if (update && name === reference) {
-      const half = await inPage(png, `
-        const { width } = await draw();
-        await draw({ resizeWidth: Math.round(width / 2), resizeQuality: "high" });
-        return canvas.toDataURL().split(",")[1];`);
-      writeFileSync(path, Buffer.from(half, "base64"));
-    }
-    const found = await cells(png);
-    const expected = await cells(readFileSync(path).toString("base64"), found.grid);
-    const differences = found.means.map((value, i) => Math.abs(value - expected.means[i]));
-    const mean = differences.reduce((sum, d) => sum + d, 0) / differences.length;
-    const bad = differences.filter((d) => d > tolerance.cell).length / differences.length;
-    console.log(`${name}: mean difference ${mean.toFixed(2)} of 255, ${(100 * bad).toFixed(2)} % of the cells far off`);
-    assert.ok(mean < tolerance.mean && bad < tolerance.share,
-      `${name} looks unlike ${path}: look at it with --screenshots DIR; if it is right, store it with --update`);
-  }
 }
 
 const path = findBrowser();
@@ -450,7 +374,7 @@ try {
   await checkEmpty(browser);
   await checkFallback(browser, ["webgl2"], "WebGL 1");
   await checkFallback(browser, ["webgl2", "webgl"], "canvas");
-  await compareScreenshots(browser);
+  await screenshots.compare(browser);
 } finally {
   await browser.stop();
 }

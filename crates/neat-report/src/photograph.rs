@@ -66,7 +66,9 @@ impl Photograph {
     }
 }
 
-/// The photographs of a scene, one entry for each view: [`spread`] views have one.
+/// The photographs of a scene, one entry for each view: up to
+/// [`PhotographConfig::max_photographs`] views whose cameras are far from each other
+/// have one.
 ///
 /// # Errors
 /// If an image cannot be encoded; the message names the view.

@@ -4,11 +4,11 @@ class CanvasRenderer {
   constructor(canvas) {
     this.canvas = canvas;
     this.kind = "canvas";
-    this.batches = [];
+    this.layers = new Map();
   }
 
-  load(batches) {
-    this.batches = batches;
+  load(layer, batches) {
+    this.layers.set(layer, batches);
   }
 
   draw(view) {
@@ -16,7 +16,7 @@ class CanvasRenderer {
     const context = sharpContext(this.canvas, width, height);
     context.lineCap = "round";
     const strokes = [];
-    for (const { numbers, count, bias, haze, clearance } of this.batches) {
+    for (const { numbers, count, bias, haze, clearance } of [...this.layers.values()].flat()) {
       for (let i = 0; i < 10 * count; i += 10) {
         const stroke = numbers.slice(i, i + 10);
         const ends = projectSegment(matrix, stroke.slice(0, 3), stroke.slice(3, 6), width, height, Math.max(near, 1.5 * clearance * distance));

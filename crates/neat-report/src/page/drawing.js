@@ -1,4 +1,5 @@
-// What is drawn in 3D: strokes of the edges, the junctions and the cameras.
+// What is drawn in 3D: strokes of the edges, the junctions and the cameras. What the
+// pointer changes is apart, so that little is made anew when it moves.
 
 /** Lines and dots (lines without length), for a renderer. */
 class Strokes {
@@ -35,57 +36,77 @@ function thinness(edges, [width, height]) {
 const RIM = [18, 22, 28];
 const PAPER = [255, 255, 255];
 
-/** Everything, in the order of drawing. */
+/** Colours and widths of the moment. */
+function pens(viewer) {
+  const { data, through, state } = viewer;
+  const thin = thinness(data.edges.length, viewer.size());
+  const onPhotograph = through !== null;
+  const colors = theme();
+  return {
+    colors, thin, onPhotograph,
+    ink: onPhotograph ? PAPER : colors.ink,
+    edgeWidth: (onPhotograph ? 2.4 : 3) * thin,
+    dotWidth: (onPhotograph ? 5 : 6.5) * thin,
+    edgeColor: (edge) => edgeColor(state.measure, edge, onPhotograph),
+  };
+}
+
+/** Everything but what is marked, in the order of drawing. */
 function drawScene(viewer) {
-  const { data, state, through } = viewer;
+  const { data, state } = viewer;
+  const pen = pens(viewer);
   const cameras = new Strokes(0, 0.5, 0.3);
   const rims = new Strokes(0);
   const edges = new Strokes(1e-4);
   const dots = new Strokes(2e-4);
-  const marked = new Strokes(4e-4, 0.3);
-  const colors = theme();
-  const onPhotograph = through !== null;
-  const ink = onPhotograph ? PAPER : colors.ink;
-  const thin = thinness(data.edges.length, viewer.size());
   const snapshot = data.evolution[state.snapshot];
-  const chosen = (kind, index) => (item) => item?.kind === kind && item.index === index;
-  const is = (item, kind, index) => chosen(kind, index)(item);
 
-  if (state.showCameras && !onPhotograph) {
+  if (state.showCameras && !pen.onPhotograph) {
     const supporting = supportingViews(data, state.selection);
     data.views.forEach((view, index) => {
-      const picked = is(state.selection, "view", index);
-      const hot = picked || is(state.hover, "view", index);
-      const color = picked || supporting.has(index) ? colors.accent : hot ? colors.ink : colors.muted;
-      drawFrustum(cameras, view, color, hot ? 2 : supporting.has(index) ? 1.4 : 1);
+      if (supporting.has(index)) drawFrustum(cameras, view, pen.colors.accent, 1.4);
+      else drawFrustum(cameras, view, pen.colors.muted, 1);
     });
   }
   data.edges.forEach(([a, b], index) => {
     if (!viewer.visible[index]) return;
-    const [start, end] = [data.points[a], data.points[b]];
-    const picked = is(state.selection, "segment", index);
-    const hot = is(state.hover, "segment", index);
-    let color = edgeColor(state.measure, index, onPhotograph);
-    if (snapshot && !picked) color = mixPoints(color, colors.stage, 0.72);
-    const width = (onPhotograph ? 2.4 : 3) * thin;
-    if (onPhotograph) rims.line(start, end, RIM, (picked ? width + 3 : width) + 1.4);
-    if (picked) marked.line(start, end, colors.accent, width + 3);
-    else (hot ? marked : edges).line(start, end, color, hot ? width + 2.4 : width);
+    const color = pen.edgeColor(index);
+    const shown = snapshot ? mixPoints(color, pen.colors.stage, 0.72) : color;
+    edges.line(data.points[a], data.points[b], shown, pen.edgeWidth);
+    if (pen.onPhotograph) rims.line(data.points[a], data.points[b], RIM, pen.edgeWidth + 1.4);
   });
   if (snapshot) {
-    for (const point of snapshot.points) dots.dot(point, colors.evolution, 6.5 * thin);
+    for (const point of snapshot.points) dots.dot(point, pen.colors.evolution, 6.5 * pen.thin);
+  } else if (state.showJunctions) {
+    data.points.forEach((point, index) => {
+      if (!viewer.junctionVisible[index]) return;
+      dots.dot(point, pen.ink, pen.dotWidth);
+      if (pen.onPhotograph) rims.dot(point, RIM, pen.dotWidth + 2);
+    });
   }
-  data.points.forEach((point, index) => {
-    const picked = is(state.selection, "junction", index);
-    const hot = is(state.hover, "junction", index);
-    if (picked || hot) marked.dot(point, picked ? colors.accent : ink, picked ? 13 : 11);
-    else if (state.showJunctions && !snapshot && viewer.junctionVisible[index]) {
-      const width = (onPhotograph ? 5 : 6.5) * thin;
-      if (onPhotograph) rims.dot(point, RIM, width + 2);
-      dots.dot(point, ink, width);
+  return [cameras, rims, edges, dots];
+}
+
+/** What is chosen and what is under the pointer, over the rest. */
+function drawMarked(viewer) {
+  const { data, state } = viewer;
+  const pen = pens(viewer);
+  const rim = new Strokes(3e-4, 0.3);
+  const marked = new Strokes(4e-4, 0.3);
+  const mark = ({ kind, index }, accent) => {
+    if (kind === "view") drawFrustum(marked, data.views[index], accent ?? pen.ink, 2);
+    if (kind === "junction") marked.dot(data.points[index], accent ?? pen.ink, accent ? 13 : 11);
+    if (kind === "segment") {
+      const [start, end] = data.edges[index].map((junction) => data.points[junction]);
+      const width = pen.edgeWidth + (accent ? 3 : 2.4);
+      if (pen.onPhotograph) rim.line(start, end, RIM, width + 1.4);
+      marked.line(start, end, accent ?? pen.edgeColor(index), width);
     }
-  });
-  return [cameras, rims, edges, dots, marked];
+  };
+  const same = state.hover?.kind === state.selection?.kind && state.hover?.index === state.selection?.index;
+  if (state.hover && !same) mark(state.hover, null);
+  if (state.selection) mark(state.selection, pen.colors.accent);
+  return [rim, marked];
 }
 
 function drawFrustum(strokes, { position, frustum: corners }, color, width) {

@@ -29,4 +29,11 @@ function start() {
   };
 }
 
-start();
+try {
+  start();
+} catch (error) {
+  const notice = byId("notice");
+  notice.textContent = `This browser cannot show the report: ${error.message}`;
+  notice.hidden = false;
+  throw error;
+}

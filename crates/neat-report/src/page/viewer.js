@@ -23,6 +23,9 @@ class Viewer {
       snapshot: null,
     };
     this.frame = 0;
+    /** Whether the strokes must be made anew: all, or those of what is marked. */
+    this.stale = true;
+    this.markedStale = true;
     this.orbit = new Orbit(data, () => this.redraw());
     this.navigator = this.orbit;
     this.filter();
@@ -35,7 +38,7 @@ class Viewer {
   chooseRenderer() {
     this.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     this.canvas.addEventListener("webglcontextrestored", () => {
-      this.renderer.batches = [];
+      this.renderer.layers.clear();
       this.renderer.prepare();
       this.change({});
     });
@@ -74,9 +77,11 @@ class Viewer {
   change(changes) {
     Object.assign(this.state, changes);
     if ("minProbability" in changes || "minViews" in changes) this.filter();
-    this.stale = true;
+    const keys = Object.keys(changes);
+    this.stale ||= !(keys.length === 1 && keys[0] === "hover");
+    this.markedStale = true;
     this.redraw();
-    for (const listener of this.listeners) listener(Object.keys(changes));
+    for (const listener of this.listeners) listener(keys);
   }
 
   /** Which edges and junctions pass the filter. */
@@ -104,8 +109,9 @@ class Viewer {
   draw() {
     const [width, height] = this.size();
     if (!width || !height) return;
-    if (this.stale !== false) this.renderer.load(drawScene(this));
-    this.stale = false;
+    if (this.stale) this.renderer.load("scene", drawScene(this));
+    if (this.stale || this.markedStale) this.renderer.load("marked", drawMarked(this));
+    this.stale = this.markedStale = false;
     this.renderer.draw(this.navigator.view(width, height));
     this.drawAxes();
     this.drawBackground(width, height);

@@ -1,5 +1,6 @@
-// Thick, smooth lines by WebGL 2, or WebGL 1 with instances: every stroke is one
-// rectangle on the screen whose pixels know how far from the line they are.
+// Thick, smooth lines by WebGL 2 or 1: every stroke is one rectangle on the screen whose
+// pixels know how far from the line they are. Its six vertices are written out: drawing
+// instances of one rectangle is many times slower where there is no graphics processor.
 
 const VERTEX_SHADER = `
 precision highp float;
@@ -59,28 +60,39 @@ void main() {
   gl_FragColor = vec4(shade, 1.0) * coverage * opacity;
 }`;
 
-const STROKE_ATTRIBUTES = [["start", 3, 0], ["end", 3, 12], ["color", 3, 24], ["width", 1, 36]];
-const STROKE_BYTES = 40;
+/** Attributes of a vertex with their numbers of floats, in the order of the buffer. */
+const ATTRIBUTES = [["corner", 2], ["start", 3], ["end", 3], ["color", 3], ["width", 1]];
+const VERTEX_FLOATS = 12;
+/** Two triangles. */
+const CORNERS = [[0, -1], [1, -1], [0, 1], [0, 1], [1, -1], [1, 1]];
+
+/** The vertices of strokes, see Strokes. */
+function strokeVertices({ numbers, count }) {
+  const vertices = new Float32Array(count * CORNERS.length * VERTEX_FLOATS);
+  let offset = 0;
+  for (let i = 0; i < 10 * count; i += 10) {
+    for (const corner of CORNERS) {
+      vertices.set(corner, offset);
+      for (let k = 0; k < 10; k++) vertices[offset + 2 + k] = numbers[i + k];
+      offset += VERTEX_FLOATS;
+    }
+  }
+  return vertices;
+}
 
 class WebglRenderer {
-  /** Throws where there is no WebGL with instances. */
+  /** Throws where there is no WebGL. */
   constructor(canvas) {
     const options = { alpha: true, antialias: false, premultipliedAlpha: true };
     this.canvas = canvas;
-    this.gl = canvas.getContext("webgl2", options);
     this.kind = "WebGL 2";
-    if (this.gl) {
-      this.setDivisor = (location, divisor) => this.gl.vertexAttribDivisor(location, divisor);
-      this.drawInstances = (count) => this.gl.drawArraysInstanced(this.gl.TRIANGLE_STRIP, 0, 4, count);
-    } else {
-      this.gl = canvas.getContext("webgl", options);
-      const instances = this.gl?.getExtension("ANGLE_instanced_arrays");
-      if (!instances) throw new Error("no WebGL with instanced drawing");
+    this.gl = canvas.getContext("webgl2", options);
+    if (!this.gl) {
       this.kind = "WebGL 1";
-      this.setDivisor = (location, divisor) => instances.vertexAttribDivisorANGLE(location, divisor);
-      this.drawInstances = (count) => instances.drawArraysInstancedANGLE(this.gl.TRIANGLE_STRIP, 0, 4, count);
+      this.gl = canvas.getContext("webgl", options);
     }
-    this.batches = [];
+    if (!this.gl) throw new Error("no WebGL");
+    this.layers = new Map();
     this.prepare();
   }
 
@@ -99,33 +111,32 @@ class WebglRenderer {
       throw new Error(`the shaders do not work here: ${gl.getProgramInfoLog(program)}`);
     }
     gl.useProgram(program);
-    this.program = program;
     this.uniforms = {};
     for (const name of ["clipFromModel", "size", "ratio", "near", "bias", "fog", "clearance", "background", "fringe"]) {
       this.uniforms[name] = gl.getUniformLocation(program, name);
     }
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([0, -1, 1, -1, 0, 1, 1, 1]), gl.STATIC_DRAW);
-    const corner = gl.getAttribLocation(program, "corner");
-    gl.enableVertexAttribArray(corner);
-    gl.vertexAttribPointer(corner, 2, gl.FLOAT, false, 0, 0);
+    this.attributes = ATTRIBUTES.map(([name, size]) => {
+      const location = gl.getAttribLocation(program, name);
+      gl.enableVertexAttribArray(location);
+      return { location, size };
+    });
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
 
-  /** Takes what is to be drawn, a list of Strokes. */
-  load(batches) {
+  /** Takes what a layer is to show, a list of Strokes. */
+  load(layer, batches) {
     const { gl } = this;
-    for (const { buffer } of this.batches) gl.deleteBuffer(buffer);
-    this.batches = batches.filter((strokes) => strokes.count > 0).map((strokes) => {
+    for (const { buffer } of this.layers.get(layer) ?? []) gl.deleteBuffer(buffer);
+    this.layers.set(layer, batches.filter((strokes) => strokes.count > 0).map((strokes) => {
       const buffer = gl.createBuffer();
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-      gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(strokes.numbers), gl.DYNAMIC_DRAW);
+      gl.bufferData(gl.ARRAY_BUFFER, strokeVertices(strokes), gl.DYNAMIC_DRAW);
       const { count, bias, haze, clearance } = strokes;
       return { buffer, count, bias, haze, clearance };
-    });
+    }));
   }
 
   /** Draws for a view, see Orbit.view. */
@@ -149,22 +160,21 @@ class WebglRenderer {
     for (const fringe of [0, 1]) {
       gl.uniform1f(uniforms.fringe, fringe);
       gl.depthMask(!fringe);
-      for (const batch of this.batches) this.drawBatch(batch, view);
+      for (const batch of [...this.layers.values()].flat()) this.drawBatch(batch, view);
     }
   }
 
   drawBatch({ buffer, count, bias, haze, clearance }, { fog: [begins, ends, strength], distance }) {
-    const { gl, program } = this;
+    const { gl } = this;
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    for (const [name, size, offset] of STROKE_ATTRIBUTES) {
-      const location = gl.getAttribLocation(program, name);
-      gl.enableVertexAttribArray(location);
-      gl.vertexAttribPointer(location, size, gl.FLOAT, false, STROKE_BYTES, offset);
-      this.setDivisor(location, 1);
+    let offset = 0;
+    for (const { location, size } of this.attributes) {
+      gl.vertexAttribPointer(location, size, gl.FLOAT, false, 4 * VERTEX_FLOATS, 4 * offset);
+      offset += size;
     }
     gl.uniform1f(this.uniforms.bias, bias);
     gl.uniform3f(this.uniforms.fog, begins, ends, strength * haze);
     gl.uniform2f(this.uniforms.clearance, clearance * distance - 1e-6, 2 * clearance * distance);
-    this.drawInstances(count);
+    gl.drawArrays(gl.TRIANGLES, 0, CORNERS.length * count);
   }
 }
