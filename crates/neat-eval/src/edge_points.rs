@@ -102,10 +102,16 @@ pub fn sample_truth(truth: &GroundTruth, sampling: EdgeSampling) -> Vec<Vector3<
 fn point_count(sampling: EdgeSampling, length: impl Fn() -> f64) -> usize {
     match sampling {
         // A cast saturates: a length that is no number has no point.
-        EdgeSampling::Spacing(spacing) => (length() / spacing).floor() as usize,
+        EdgeSampling::Spacing(spacing) => whole_spacings(length(), spacing) as usize,
         EdgeSampling::Count(count) => count,
         EdgeSampling::GivenPoints => 0,
     }
+}
+
+/// Python's `length // spacing`: of the exact numbers, so that 1 holds 0.005, which
+/// is a little more than that in binary, 199 times and not 200.
+fn whole_spacings(length: f64, spacing: f64) -> f64 {
+    ((length - length % spacing) / spacing).round()
 }
 
 /// `count` parameters from 0 to 1; 0 alone for one.
@@ -140,6 +146,16 @@ mod tests {
         assert_eq!(sample(1.0), [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]);
         assert_eq!(sample(0.3), [0.0]);
         assert!(sample(0.2).is_empty());
+    }
+
+    #[test]
+    fn spacings_are_counted_as_python_does() {
+        // As printed by Python 3.11.
+        for (length, spacings) in [(1.0, 199.0), (0.6, 119.0), (0.01, 2.0), (0.0049, 0.0)] {
+            assert_eq!(whole_spacings(length, 0.005), spacings, "{length}");
+        }
+        assert_eq!(whole_spacings(f64::NAN, 0.005) as usize, 0);
+        assert_eq!(whole_spacings(f64::INFINITY, 0.005) as usize, 0);
     }
 
     #[test]
