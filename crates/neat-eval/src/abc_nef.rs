@@ -130,8 +130,8 @@ impl EdgePoints {
     /// Measures `predicted` against `truth`, both in the unit cube.
     ///
     /// # Errors
-    /// If an edge model is not valid, or the truth has no edge that is long enough
-    /// for a point.
+    /// If an edge model is not valid or far larger than the unit cube, or the truth
+    /// has no edge that is long enough for a point.
     pub fn evaluate(
         &self,
         predicted: &EdgeModel,
@@ -147,14 +147,14 @@ impl EdgePoints {
             }
             other => other,
         };
-        let true_points = sample_truth(truth, true_sampling);
+        let true_points = sample_truth(truth, true_sampling)?;
         if true_points.is_empty() {
             return Err(EvalError::EmptyTruth {
                 protocol: "abc-nef",
                 missing: "edge that is long enough to be sampled",
             });
         }
-        let mut points = sample_prediction(predicted, self.prediction);
+        let mut points = sample_prediction(predicted, self.prediction)?;
         if let Some(voxels) = self.voxels {
             points = voxels.averages(&points);
         }

@@ -1,7 +1,7 @@
 //! WED, the wireframe edit distance of building wireframes.
 //!
-//! Source: S23DR challenge 2024; Liu et al., *PC2WF* (ICLR 2021) §4.1, with the
-//! costs of `hoho/wed.py` of s23dr/hoho2025. Lower is better.
+//! Source: S23DR challenge 2024; Liu et al., *PC2WF* (ICLR 2021), with the costs
+//! of `hoho/wed.py` of s23dr/hoho2025. Lower is better.
 //!
 //! Vertices are paired one to one with the smallest sum of distances. Moving a
 //! vertex costs its distance, an additional one a quarter and a missing one half
