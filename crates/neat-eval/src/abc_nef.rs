@@ -130,8 +130,8 @@ impl EdgePoints {
     /// Measures `predicted` against `truth`, both in the unit cube.
     ///
     /// # Errors
-    /// If an edge model is not valid, or the truth has no edge that is long enough
-    /// for a point.
+    /// If an edge model is not valid or far larger than the unit cube, or the truth
+    /// has no edge that is long enough for a point.
     pub fn evaluate(
         &self,
         predicted: &EdgeModel,
@@ -147,14 +147,14 @@ impl EdgePoints {
             }
             other => other,
         };
-        let true_points = sample_truth(truth, true_sampling);
+        let true_points = sample_truth(truth, true_sampling)?;
         if true_points.is_empty() {
             return Err(EvalError::EmptyTruth {
                 protocol: "abc-nef",
                 missing: "edge that is long enough to be sampled",
             });
         }
-        let mut points = sample_prediction(predicted, self.prediction);
+        let mut points = sample_prediction(predicted, self.prediction)?;
         if let Some(voxels) = self.voxels {
             points = voxels.averages(&points);
         }
@@ -266,10 +266,10 @@ mod tests {
         let predicted = EdgeModel::from(at(0.107));
         let evaluate = |protocol: EdgePoints| protocol.evaluate(&predicted, &truth).unwrap();
         let emap = evaluate(EdgePoints::emap());
-        assert_eq!((emap.predicted_points, emap.true_points), (129, 200));
-        assert_eq!(evaluate(EdgePoints::curve_gaussian()).predicted_points, 200);
+        assert_eq!((emap.predicted_points, emap.true_points), (129, 199));
+        assert_eq!(evaluate(EdgePoints::curve_gaussian()).predicted_points, 199);
         let edges = evaluate(EdgePoints::edge_gaussians());
-        assert_eq!(edges.predicted_points, 200);
+        assert_eq!(edges.predicted_points, 199);
         assert!((edges.accuracy.unwrap() - 0.007).abs() < 1e-12);
         let precision: Vec<f64> = edges.thresholds.iter().map(|t| t.precision).collect();
         assert_eq!(precision, [0.0, 1.0, 1.0]);
@@ -281,7 +281,7 @@ mod tests {
             truth_spacing_scale: 0.5,
             ..EdgePoints::emap()
         };
-        assert_eq!(evaluate(halved).true_points, 400);
+        assert_eq!(evaluate(halved).true_points, 399);
     }
 
     #[test]

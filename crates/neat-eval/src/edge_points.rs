@@ -1,5 +1,6 @@
 //! Edges as points: the sampling and the down-sampling of the ABC-NEF protocols.
 
+use crate::EvalError;
 use crate::edge_model::EdgeModel;
 use nalgebra::Vector3;
 use neat_core::ground_truth::GroundTruth;
@@ -54,64 +55,120 @@ impl VoxelGrid {
     }
 }
 
+/// More points than these are a mistake in the unit of the edges.
+const MAX_POINTS: usize = 1 << 24;
+
 /// Points of a prediction: curves first, then segments, as published.
-pub fn sample_prediction(model: &EdgeModel, sampling: EdgeSampling) -> Vec<Vector3<f64>> {
-    let mut points = Vec::new();
+///
+/// # Errors
+/// If the edges are so long that there would be more than 2²⁴ points.
+pub fn sample_prediction(
+    model: &EdgeModel,
+    sampling: EdgeSampling,
+) -> Result<Vec<Vector3<f64>>, EvalError> {
+    let mut points = SampledPoints::new("result", sampling);
     for curve in &model.curves {
-        if sampling == EdgeSampling::GivenPoints {
-            points.extend(curve.control_points);
-        } else {
-            let count = point_count(sampling, || curve.length());
-            points.extend(parameters(count).map(|t| curve.point_at(t)));
-        }
+        points.add(
+            &curve.control_points,
+            || curve.length(),
+            |t| curve.point_at(t),
+        )?;
     }
     for segment in model.wireframe.segments() {
-        if sampling == EdgeSampling::GivenPoints {
-            points.extend(segment.ends());
-        } else {
-            let count = point_count(sampling, || segment.length());
-            points.extend(parameters(count).map(|t| segment.point_at(t)));
-        }
+        points.add(
+            &segment.ends(),
+            || segment.length(),
+            |t| segment.point_at(t),
+        )?;
     }
-    points
+    Ok(points.points)
 }
 
 /// Points of a truth: segments, then curves piece by piece.
 ///
 /// A piece begins to be sampled at its second end, as published, which matters
 /// only where a single point fits.
-pub fn sample_truth(truth: &GroundTruth, sampling: EdgeSampling) -> Vec<Vector3<f64>> {
+///
+/// # Errors
+/// As [`sample_prediction`].
+pub fn sample_truth(
+    truth: &GroundTruth,
+    sampling: EdgeSampling,
+) -> Result<Vec<Vector3<f64>>, EvalError> {
     let segments = truth.wireframe.segments();
     let segments = segments.iter().map(|segment| segment.ends().to_vec());
     let curves = truth.curves.iter().map(|curve| curve.points.clone());
-    let mut points = Vec::new();
+    let mut points = SampledPoints::new("truth", sampling);
     for polyline in segments.chain(curves) {
         if sampling == EdgeSampling::GivenPoints {
-            points.extend(polyline);
+            points.points.extend(polyline);
             continue;
         }
         for piece in polyline.windows(2) {
             let (start, end) = (piece[0], piece[1]);
-            let count = point_count(sampling, || (end - start).norm());
-            points.extend(parameters(count).map(|t| start * t + end * (1.0 - t)));
+            points.add(
+                piece,
+                || (end - start).norm(),
+                |t| start * t + end * (1.0 - t),
+            )?;
         }
     }
-    points
+    Ok(points.points)
 }
 
-fn point_count(sampling: EdgeSampling, length: impl Fn() -> f64) -> usize {
-    match sampling {
-        // A cast saturates: a length that is no number has no point.
-        EdgeSampling::Spacing(spacing) => (length() / spacing).floor() as usize,
-        EdgeSampling::Count(count) => count,
-        EdgeSampling::GivenPoints => 0,
+/// Points that are sampled edge by edge.
+struct SampledPoints {
+    what: &'static str,
+    sampling: EdgeSampling,
+    points: Vec<Vector3<f64>>,
+}
+
+impl SampledPoints {
+    fn new(what: &'static str, sampling: EdgeSampling) -> Self {
+        Self {
+            what,
+            sampling,
+            points: Vec::new(),
+        }
+    }
+
+    fn add(
+        &mut self,
+        given: &[Vector3<f64>],
+        length: impl Fn() -> f64,
+        point_at: impl Fn(f64) -> Vector3<f64>,
+    ) -> Result<(), EvalError> {
+        let count = match self.sampling {
+            EdgeSampling::GivenPoints => {
+                self.points.extend(given);
+                return Ok(());
+            }
+            EdgeSampling::Count(count) => count,
+            EdgeSampling::Spacing(spacing) => {
+                let count = whole_spacings(length(), spacing);
+                // An infinite length has NaN spacings, which no range contains.
+                let room = MAX_POINTS.saturating_sub(self.points.len()) as f64;
+                if !(0.0..=room).contains(&count) {
+                    return Err(EvalError::TooManySamples {
+                        what: self.what,
+                        spacing,
+                    });
+                }
+                count as usize
+            }
+        };
+        // Both ends included; the first parameter alone for one.
+        let intervals = count.saturating_sub(1).max(1) as f64;
+        let parameters = (0..count).map(|i| i as f64 / intervals);
+        self.points.extend(parameters.map(point_at));
+        Ok(())
     }
 }
 
-/// `count` parameters from 0 to 1; 0 alone for one.
-fn parameters(count: usize) -> impl Iterator<Item = f64> {
-    let intervals = count.saturating_sub(1).max(1) as f64;
-    (0..count).map(move |i| i as f64 / intervals)
+/// Python's `length // spacing`: of the exact numbers, so that 1 holds 0.005, which
+/// is a little more than that in binary, 199 times and not 200.
+fn whole_spacings(length: f64, spacing: f64) -> f64 {
+    ((length - length % spacing) / spacing).round()
 }
 
 #[cfg(test)]
@@ -135,11 +192,28 @@ mod tests {
     fn the_number_of_points_follows_the_length() {
         let sample = |length: f64| {
             let model = EdgeModel::from(segment(length));
-            x(&sample_prediction(&model, EdgeSampling::Spacing(0.25)))
+            x(&sample_prediction(&model, EdgeSampling::Spacing(0.25)).unwrap())
         };
         assert_eq!(sample(1.0), [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0]);
         assert_eq!(sample(0.3), [0.0]);
         assert!(sample(0.2).is_empty());
+    }
+
+    #[test]
+    fn edges_in_another_unit_do_not_fill_the_memory() {
+        for length in [1e6, 1e300] {
+            let model = EdgeModel::from(segment(length));
+            let error = sample_prediction(&model, EdgeSampling::Spacing(0.005)).unwrap_err();
+            assert!(error.to_string().contains("unit cube"), "{error}");
+        }
+    }
+
+    #[test]
+    fn spacings_are_counted_as_python_does() {
+        // As printed by Python 3.11.
+        for (length, spacings) in [(1.0, 199.0), (0.6, 119.0), (0.01, 2.0), (0.0049, 0.0)] {
+            assert_eq!(whole_spacings(length, 0.005), spacings, "{length}");
+        }
     }
 
     #[test]
@@ -153,10 +227,10 @@ mod tests {
                     .to_vec(),
             }],
         };
-        let sampled = sample_truth(&truth, EdgeSampling::Spacing(0.25));
+        let sampled = sample_truth(&truth, EdgeSampling::Spacing(0.25)).unwrap();
         // 0.3 holds one spacing; 0.5 two; 0.1 none; 0.5 again.
         assert_eq!(x(&sampled), [0.3, 0.5, 0.0, 1.1, 0.6]);
-        let given = sample_truth(&truth, EdgeSampling::GivenPoints);
+        let given = sample_truth(&truth, EdgeSampling::GivenPoints).unwrap();
         assert_eq!(x(&given), [0.0, 0.3, 0.0, 0.5, 0.6, 1.1]);
     }
 

@@ -1,7 +1,7 @@
 //! WED, the wireframe edit distance of building wireframes.
 //!
-//! Source: S23DR challenge 2024; Liu et al., *PC2WF* (ICLR 2021) §4.1, with the
-//! costs of `hoho/wed.py` of s23dr/hoho2025. Lower is better.
+//! Source: S23DR challenge 2024; Liu et al., *PC2WF* (ICLR 2021), with the costs
+//! of `hoho/wed.py` of s23dr/hoho2025. Lower is better.
 //!
 //! Vertices are paired one to one with the smallest sum of distances. Moving a
 //! vertex costs its distance, an additional one a quarter and a missing one half
@@ -16,6 +16,7 @@
 //! when they join the same vertices.
 
 use crate::EvalError;
+use crate::total::total;
 use nalgebra::Vector3;
 use neat_core::Wireframe3d;
 use neat_wireframe::metrics::{MetricsError, junction_distances};
@@ -122,19 +123,21 @@ impl EditDistance {
         let additional = vertices.len() - pairs.len();
         let scores = EditScores {
             wed: 0.0,
-            translation: pairs.iter().map(|pair| pair.distance).sum(),
+            translation: total(pairs.iter().map(|pair| pair.distance)),
             vertex_insertion: self.insertion * diameter * missing as f64,
             vertex_deletion: self.deletion * diameter * additional as f64,
             edge_insertion: self.edge
-                * true_edges
-                    .difference(&predicted_edges)
-                    .map(true_edge_length)
-                    .sum::<f64>(),
+                * total(
+                    true_edges
+                        .difference(&predicted_edges)
+                        .map(true_edge_length),
+                ),
             edge_deletion: self.edge
-                * predicted_edges
-                    .difference(&true_edges)
-                    .map(predicted_length)
-                    .sum::<f64>(),
+                * total(
+                    predicted_edges
+                        .difference(&true_edges)
+                        .map(predicted_length),
+                ),
         };
         let sum = scores.translation
             + scores.vertex_insertion

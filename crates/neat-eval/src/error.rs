@@ -22,6 +22,16 @@ pub enum EvalError {
         /// What it lacks.
         missing: &'static str,
     },
+    /// Edges so long that their points would fill the memory.
+    #[error(
+        "the edges of the {what} are too long for points every {spacing}: bring result and truth into the unit cube, as the protocol has them"
+    )]
+    TooManySamples {
+        /// The result or the truth.
+        what: &'static str,
+        /// Distance of the points.
+        spacing: f64,
+    },
     /// A file whose ending says nothing about its format.
     #[error(
         "{path}: no reader for this ending; give .json, .obj, .ply, .npz, .npy, or the .txt of Line3D++"

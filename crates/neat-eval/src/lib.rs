@@ -64,6 +64,7 @@ mod report;
 mod structure_score;
 mod table;
 mod thinning;
+mod total;
 
 pub use abc_nef::{EdgePointScores, EdgePoints, PointPrecisionRecall};
 pub use counts::WireframeCounts;

@@ -10,6 +10,7 @@
 //! for Tanks and Temples; sample a mesh densely for Hypersim.
 
 use crate::EvalError;
+use crate::total::total;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use neat_wireframe::metrics::{MetricsError, PointCloud};
@@ -108,13 +109,13 @@ impl LimapLength {
             let hit = counts.clone().filter(|count| *count > 0).count();
             LengthRecall {
                 threshold,
-                length_recall: lines.iter().zip(counts).map(length).sum(),
+                length_recall: total(lines.iter().zip(counts).map(length)),
                 precision_percent: 100.0 * hit as f64 / lines.len().max(1) as f64,
             }
         };
         Ok(LengthScores {
             lines: lines.len(),
-            total_length: lines.iter().map(LineSegment3::length).sum(),
+            total_length: total(lines.iter().map(LineSegment3::length)),
             thresholds: self
                 .thresholds
                 .iter()

@@ -92,7 +92,9 @@ impl Protocol {
             Self::LimapHypersim => {
                 "length recall and percentage of right lines at 1, 5 and 10 mm from surface points in metres"
             }
-            Self::LimapTnt => "the same at 1 mm to 1 m",
+            Self::LimapTnt => {
+                "length recall and percentage of right lines at 1 mm to 1 m from surface points in metres"
+            }
             Self::Hss => {
                 "hybrid structure score of buildings: F1 of vertices and IoU of edges at 0.5 m"
             }

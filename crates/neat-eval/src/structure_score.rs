@@ -98,7 +98,8 @@ impl StructureScore {
         // Both sides estimate the intersection.
         let intersection = (of_predicted.shared + of_truth.shared) / 2.0;
         let union = of_predicted.whole + of_truth.whole - intersection;
-        if union > 0.0 {
+        // Coordinates near the largest numbers have no volume that is one.
+        if union > 0.0 && union.is_finite() {
             (intersection / union).clamp(0.0, 1.0)
         } else {
             0.0

@@ -9,7 +9,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
 use neat_export::marching_cubes::{Grid, Region, marching_cubes};
-use neat_export::{EdgeFilter, ExportError, ExportOptions, Format, LengthUnit, ViewDirection, export};
+use neat_export::{
+    EdgeFilter, ExportError, ExportOptions, Format, LengthUnit, ViewDirection, export,
+};
 use neat_pipeline::event::{Event, Stage};
 use neat_pipeline::reconstruct::open_run;
 use neat_wireframe::export::read_json;
@@ -180,11 +182,15 @@ impl ExportArgs {
             });
         })?;
         let mesh = mesh.map(|point| opened.scene.original_from_world.apply(point));
-        let out = self.out.unwrap_or_else(|| opened.dir.root().join("mesh.ply"));
+        let out = self
+            .out
+            .unwrap_or_else(|| opened.dir.root().join("mesh.ply"));
         mesh.write_ply(&out)?;
         drop(progress);
         if mesh.triangles.is_empty() {
-            output::note("warning: the mesh is empty: the learned distance has no zero in the scene sphere");
+            output::note(
+                "warning: the mesh is empty: the learned distance has no zero in the scene sphere",
+            );
         }
         let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
         output::print(&format!(

@@ -11,7 +11,7 @@
 //! | `.txt` | a 3D line per line, with its 2D residuals | Line3D++ |
 //!
 //! Formats without junctions give a graph in which ends that are exactly equal
-//! are one junction.
+//! are one junction. `curves` of a `gt_wireframe.json` are part of a truth only.
 
 mod line3dpp;
 mod numpy;

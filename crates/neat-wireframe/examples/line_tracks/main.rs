@@ -20,8 +20,8 @@ use neat_core::{LoadOptions, load_scene};
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::line_tracks::{LineTracksConfig, run};
 use neat_wireframe::metrics::{
-    ImageEvidenceConfig, Matching, PointCloud, SegmentDistance, image_evidence,
-    junction_distances, precision_recall, segment_distances,
+    ImageEvidenceConfig, Matching, PointCloud, SegmentDistance, image_evidence, junction_distances,
+    precision_recall, segment_distances,
 };
 use neat_wireframe::{ViewObservation, Wireframe3d};
 use std::collections::BTreeMap;
