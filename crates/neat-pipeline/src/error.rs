@@ -1,6 +1,7 @@
 //! What can go wrong in a run as a whole.
 
 use crate::distill::DistillError;
+use crate::overrides::OverrideError;
 use crate::run_dir::RunDirError;
 use crate::trainer::TrainError;
 use neat_core::SceneError;
@@ -38,6 +39,9 @@ pub enum PipelineError {
         "the scene is not fit for a run:\n{0}\n`neat doctor` explains it; --no-doctor runs it nevertheless"
     )]
     NotReady(String),
+    /// A change of the configuration does not apply.
+    #[error(transparent)]
+    Override(OverrideError),
     /// The optimisation failed.
     #[error(transparent)]
     Train(#[from] TrainError),
@@ -79,6 +83,7 @@ impl PipelineError {
             | Self::Synthetic(_)
             | Self::Evaluation(_)
             | Self::Detector(_)
+            | Self::Override(_)
             | Self::NotReady(_) => true,
             Self::Train(error) => matches!(
                 error,

@@ -2,6 +2,7 @@
 //!
 //! Everything here reports through events and results; nothing draws.
 
+pub mod ablate;
 mod awake;
 pub mod background;
 pub mod benchmark;

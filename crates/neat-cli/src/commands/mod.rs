@@ -1,5 +1,6 @@
 //! One file per subcommand.
 
+mod ablate;
 mod bench;
 mod compare_backends;
 mod convert;
@@ -37,6 +38,7 @@ pub enum Command {
     Demo(demo::DemoArgs),
     CompareBackends(compare_backends::CompareBackendsArgs),
     Bench(bench::BenchArgs),
+    Ablate(ablate::AblateArgs),
 }
 
 impl Command {
@@ -58,6 +60,7 @@ impl Command {
             Self::Demo(args) => args.run(quiet),
             Self::CompareBackends(args) => args.run(quiet),
             Self::Bench(args) => args.run(quiet),
+            Self::Ablate(args) => args.run(quiet),
         }
     }
 }

@@ -40,7 +40,7 @@ impl ViewArgs {
         if self.print_path {
             return output::print(&report.display().to_string());
         }
-        opener::open_browser(&report).map_err(|error| CliError::Browser {
+        open::that_detached(&report).map_err(|error| CliError::Browser {
             report: report.display().to_string(),
             reason: error.to_string(),
         })

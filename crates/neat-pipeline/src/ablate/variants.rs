@@ -1,0 +1,281 @@
+//! What an ablation leaves out or changes, one thing at a time.
+
+use crate::config::BackEnd;
+
+/// One row of an ablation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variant {
+    /// The table that it belongs to.
+    pub table: &'static str,
+    /// What is different, in words.
+    pub name: &'static str,
+    /// Folder name.
+    pub slug: &'static str,
+    /// Changes to the configuration, as `--set` takes them.
+    pub overrides: &'static [&'static str],
+    /// Whether the field must be trained anew; otherwise it is distilled from the
+    /// field of the unchanged run.
+    pub trains: bool,
+}
+
+/// The unchanged run, which the others are held against.
+pub const BASE: Variant = Variant {
+    table: "",
+    name: "as configured",
+    slug: "base",
+    overrides: &[],
+    trains: true,
+};
+
+const fn training(
+    table: &'static str,
+    name: &'static str,
+    slug: &'static str,
+    overrides: &'static [&'static str],
+) -> Variant {
+    Variant {
+        table,
+        name,
+        slug,
+        overrides,
+        trains: true,
+    }
+}
+
+const fn step_off(
+    name: &'static str,
+    slug: &'static str,
+    overrides: &'static [&'static str],
+) -> Variant {
+    Variant {
+        table: "back end",
+        name,
+        slug,
+        overrides,
+        trains: false,
+    }
+}
+
+const TABLE_2: &str = "paper, table 2";
+const TABLE_3: &str = "paper, table 3";
+const TABLE_4: &str = "paper, table 4";
+const SUPERVISION: &str = "supervision";
+
+/// The published clustering, as a value of `train.candidates.clustering`.
+const DBSCAN: &str = "train.candidates.clustering={ dbscan = { eps = 0.01, min_samples = 2 } }";
+
+/// Changes that need a training of their own.
+const TRAINING: [Variant; 9] = [
+    training(
+        TABLE_2,
+        "no viewing direction, no clustering",
+        "no-direction-no-clustering",
+        &[
+            "model.attraction.view_direction=false",
+            "train.candidates.clustering=none",
+        ],
+    ),
+    training(
+        TABLE_2,
+        "viewing direction, no clustering",
+        "direction-no-clustering",
+        &[
+            "model.attraction.view_direction=true",
+            "train.candidates.clustering=none",
+        ],
+    ),
+    training(
+        TABLE_2,
+        "viewing direction and clustering",
+        "direction-clustering",
+        &["model.attraction.view_direction=true", DBSCAN],
+    ),
+    training(
+        TABLE_3,
+        "attraction distance 1",
+        "attraction-1",
+        &["data.attraction_distance=1.0"],
+    ),
+    training(
+        TABLE_3,
+        "attraction distance 5",
+        "attraction-5",
+        &["data.attraction_distance=5.0"],
+    ),
+    training(
+        TABLE_3,
+        "attraction distance 10",
+        "attraction-10",
+        &["data.attraction_distance=10.0"],
+    ),
+    training(
+        TABLE_3,
+        "attraction distance 20",
+        "attraction-20",
+        &["data.attraction_distance=20.0"],
+    ),
+    training(
+        SUPERVISION,
+        "no segment loss",
+        "no-segment-loss",
+        &["train.loss.segment=0.0"],
+    ),
+    training(
+        SUPERVISION,
+        "no junction loss",
+        "no-junction-loss",
+        &["train.loss.junction_3d=0.0", "train.loss.junction_2d=0.0"],
+    ),
+];
+
+/// Table 4 of the paper, and its visibility check.
+const PAPER_STEPS: [Variant; 3] = [
+    Variant {
+        table: TABLE_4,
+        name: "paper's back end",
+        slug: "paper",
+        overrides: &["distill.back_end=paper"],
+        trains: false,
+    },
+    Variant {
+        table: TABLE_4,
+        name: "paper's back end, junctions not refined by the surface",
+        slug: "paper-no-refinement",
+        overrides: &[
+            "distill.back_end=paper",
+            "distill.paper.junction_refinement.enabled=false",
+        ],
+        trains: false,
+    },
+    Variant {
+        table: TABLE_4,
+        name: "paper's back end, without visibility check",
+        slug: "paper-no-visibility",
+        overrides: &[
+            "distill.back_end=paper",
+            "distill.paper.visibility.min_views=0",
+        ],
+        trains: false,
+    },
+];
+
+/// The steps of the fast back end, each switched off.
+const FAST_STEPS: [Variant; 10] = [
+    step_off(
+        "no modes of segment ends",
+        "fast-no-modes",
+        &["distill.fast.use_junction_modes=false"],
+    ),
+    step_off(
+        "no perceived junctions",
+        "fast-no-perceived",
+        &["distill.fast.use_perceived_junctions=false"],
+    ),
+    step_off(
+        "no re-triangulation",
+        "fast-no-retriangulation",
+        &["distill.fast.retriangulation=false"],
+    ),
+    step_off(
+        "no splitting of close junctions",
+        "fast-no-junction-splitting",
+        &["distill.fast.junction_splitting=false"],
+    ),
+    step_off(
+        "no edge completion",
+        "fast-no-completion",
+        &["distill.fast.edge_completion=false"],
+    ),
+    step_off(
+        "detections count for several edges",
+        "fast-no-exclusive-support",
+        &["distill.fast.exclusive_support=false"],
+    ),
+    step_off(
+        "no bundle adjustment",
+        "fast-no-adjustment",
+        &["distill.fast.bundle_adjustment=false"],
+    ),
+    step_off(
+        "no occlusion test",
+        "fast-no-occlusion",
+        &["distill.fast.occlusion_test=false"],
+    ),
+    step_off(
+        "no clean-up",
+        "fast-no-cleanup",
+        &["distill.fast.cleanup=false"],
+    ),
+    step_off(
+        "no splitting of edges",
+        "fast-no-edge-splitting",
+        &["distill.fast.edge_splitting=false"],
+    ),
+];
+
+/// The back end of line tracks with and without what the field knows.
+const TRACK_STEPS: [Variant; 1] = [step_off(
+    "occlusion by the learned surface",
+    "tracks-occlusion",
+    &["distill.tracks.occlusion_test=true"],
+)];
+
+/// All variants that make sense for a run with this back end, the base first.
+pub fn variants(back_end: BackEnd) -> Vec<Variant> {
+    let steps: &[Variant] = match back_end {
+        BackEnd::Fast | BackEnd::Auto => &FAST_STEPS,
+        BackEnd::Tracks => &TRACK_STEPS,
+        BackEnd::Paper => &[],
+    };
+    [BASE]
+        .iter()
+        .chain(&TRAINING)
+        .chain(&PAPER_STEPS)
+        .chain(steps)
+        .copied()
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::overrides::apply_overrides;
+    use crate::preset::Preset;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn every_variant_applies_to_every_preset_and_most_change_something() {
+        let all = [BackEnd::Fast, BackEnd::Tracks, BackEnd::Paper];
+        for preset in Preset::ALL {
+            let config = preset.config();
+            for variant in all.into_iter().flat_map(variants) {
+                let overrides = variant.overrides.map_to_strings();
+                let changed = apply_overrides(&config, &overrides)
+                    .unwrap_or_else(|error| panic!("{preset}, {}: {error}", variant.slug));
+                let trains_alike = changed.model == config.model
+                    && changed.train == config.train
+                    && changed.data == config.data;
+                assert!(variant.trains || trains_alike, "{}", variant.slug);
+            }
+        }
+    }
+
+    #[test]
+    fn folders_are_not_shared() {
+        for back_end in [BackEnd::Fast, BackEnd::Tracks, BackEnd::Paper] {
+            let variants = variants(back_end);
+            let slugs: BTreeSet<_> = variants.iter().map(|v| v.slug).collect();
+            assert_eq!(slugs.len(), variants.len());
+        }
+    }
+
+    trait Strings {
+        fn map_to_strings(&self) -> Vec<String>;
+    }
+
+    impl Strings for &[&str] {
+        fn map_to_strings(&self) -> Vec<String> {
+            self.iter().map(|text| (*text).to_owned()).collect()
+        }
+    }
+}
