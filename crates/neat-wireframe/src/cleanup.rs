@@ -2,11 +2,13 @@
 //! isolated.
 
 use crate::edge_support::SupportedEdge;
+use crate::point_grid::GrowingPointGrid;
+use crate::point_index::PointIndex;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Settings of [`clean_up`]; lengths in world units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,14 +72,16 @@ impl Merging {
         let mut order: Vec<usize> = (0..junctions.len()).collect();
         order.sort_by_key(|junction| Reverse(support[*junction]));
         let mut kept: Vec<usize> = Vec::new();
+        let mut kept_positions = GrowingPointGrid::new(distance);
         let mut representative: Vec<usize> = (0..junctions.len()).collect();
         for junction in order {
-            let near = kept
-                .iter()
-                .find(|other| (junctions[**other] - junctions[junction]).norm() < distance);
-            match near {
-                Some(other) => representative[junction] = *other,
-                None => kept.push(junction),
+            let position = junctions[junction];
+            match kept_positions.first_near(&position, |apart| apart < distance) {
+                Some(other) => representative[junction] = kept[other],
+                None => {
+                    kept.push(junction);
+                    kept_positions.push(position);
+                }
             }
         }
         Self {
@@ -121,13 +125,20 @@ fn resolve_collinear(
     config: &CleanupConfig,
 ) {
     let segment = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
+    let index = PointIndex::new(candidates.iter().map(|c| junctions[*c]).collect());
+    let mut neighbours = vec![BTreeSet::new(); junctions.len()];
+    for [a, b] in edges.keys() {
+        neighbours[*a].insert(*b);
+        neighbours[*b].insert(*a);
+    }
     let mut longest_first: Vec<[usize; 2]> = edges.keys().copied().collect();
     longest_first.sort_by(|p, q| f64::total_cmp(&segment(*q).length(), &segment(*p).length()));
 
     for pair in longest_first {
         let [a, b] = pair;
         let long = segment(pair);
-        for &c in candidates {
+        for c in near_segment(&long, &index, config.collinear_distance) {
+            let c = candidates[c];
             let Some(long_support) = edges.get(&pair).map(|edge| edge.support) else {
                 break;
             };
@@ -141,18 +152,40 @@ fn resolve_collinear(
                 .map(|part| part.support)
                 .max()
                 .unwrap_or(0);
-            let something_else_hangs_here = edges
-                .keys()
-                .any(|other| other.contains(&c) && !parts.contains(other));
-            if long_support >= part_support || !something_else_hangs_here {
-                for part in &parts {
-                    edges.remove(part);
-                }
-            } else {
-                edges.remove(&pair);
+            let something_else_hangs_here = neighbours[c].iter().any(|d| *d != a && *d != b);
+            let removed: &[[usize; 2]] =
+                if long_support >= part_support || !something_else_hangs_here {
+                    &parts
+                } else {
+                    &[pair]
+                };
+            for [p, q] in removed {
+                edges.remove(&[*p, *q]);
+                neighbours[*p].remove(q);
+                neighbours[*q].remove(p);
             }
         }
     }
+}
+
+/// The points at most `distance` away from a segment, and some farther ones, by
+/// ascending index.
+fn near_segment(segment: &LineSegment3, index: &PointIndex<3>, distance: f64) -> Vec<usize> {
+    // A ball around the whole of a long segment would hold much of the scene.
+    let pieces = (segment.length() / (8.0 * distance))
+        .ceil()
+        .clamp(1.0, 1000.0);
+    let radius = (0.5 * segment.length() / pieces).hypot(distance);
+    let mut near: Vec<usize> = (0..pieces as usize)
+        .flat_map(|piece| {
+            let middle = segment.point_at((piece as f64 + 0.5) / pieces);
+            index.within(&middle, radius * (1.0 + 1e-9))
+        })
+        .map(|neighbour| neighbour.index)
+        .collect();
+    near.sort_unstable();
+    near.dedup();
+    near
 }
 
 fn lies_inside(edge: &LineSegment3, point: &Vector3<f64>, config: &CleanupConfig) -> bool {

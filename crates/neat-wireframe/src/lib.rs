@@ -27,12 +27,16 @@ pub mod robust_segments;
 pub mod segment_ends;
 pub mod segment_matching;
 pub mod signed_distance;
+pub mod step_report;
 pub mod triangulation;
 pub mod validity;
 pub mod visibility;
 
+mod block_cholesky;
 mod evidence;
+mod point_grid;
 mod point_index;
+mod segment_grid;
 
 pub use neat_core::Wireframe3d;
 pub use observation::ViewObservation;

@@ -5,6 +5,12 @@ use nalgebra::Vector3;
 use neat_core::{Camera, LineSegment3};
 use serde::{Deserialize, Serialize};
 
+/// Sight lines are followed in this many rounds of interleaved samples.
+const ROUNDS: usize = 8;
+/// The surface is asked for about this many points at once, and for all points
+/// of at least one edge.
+const POINTS_PER_BATCH: usize = 1 << 16;
+
 /// Settings of [`visible_views`] and of the test that uses it. Lengths are in
 /// the unit of a scene whose ball has radius 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,7 +77,8 @@ impl OcclusionConfig {
 /// The number of views in which each edge is visible: most of its points project
 /// into the image and have a free sight line to the camera.
 ///
-/// The surface answers one batch of points per edge.
+/// The surface answers batches of points of many edges. Of every sight line a
+/// few samples come first; what they decide is asked no further.
 ///
 /// # Panics
 /// If an edge names a junction that does not exist.
@@ -82,86 +89,136 @@ pub fn visible_views(
     surface: &dyn SignedDistance,
     config: &OcclusionConfig,
 ) -> Vec<usize> {
+    let lines_per_edge = (views.len() * config.points_per_edge).max(1);
+    let samples_per_round = config.samples_per_sight_line.div_ceil(ROUNDS).max(1);
+    let edges_at_once = (POINTS_PER_BATCH / (lines_per_edge * samples_per_round)).max(1);
+    let mut batch = Batch::new(config);
     edges
-        .iter()
-        .map(|[a, b]| {
-            let edge = LineSegment3::new(junctions[*a], junctions[*b]);
-            visible_views_of_edge(views, &edge, surface, config)
+        .chunks(edges_at_once)
+        .flat_map(|edges| {
+            let edges = edges
+                .iter()
+                .map(|[a, b]| LineSegment3::new(junctions[*a], junctions[*b]));
+            batch.visible_views(edges, views, surface)
         })
         .collect()
 }
 
-fn visible_views_of_edge(
-    views: &[ViewObservation],
-    edge: &LineSegment3,
-    surface: &dyn SignedDistance,
-    config: &OcclusionConfig,
-) -> usize {
-    let points = linspace(
-        config.end_margin,
-        1.0 - config.end_margin,
-        config.points_per_edge,
-    );
-    let mut samples = Vec::new();
-    // Per view and point, where its samples end; `None` for a point outside the
-    // image.
-    let mut sight_lines = Vec::with_capacity(views.len() * config.points_per_edge);
-    for view in views {
-        for t in &points {
-            let point = edge.point_at(*t);
-            let in_image = is_in_image(&view.camera, &point);
-            if in_image {
-                append_sight_line(&mut samples, &point, &view.camera, config);
-            }
-            sight_lines.push(in_image.then_some(samples.len()));
-        }
-    }
-    let sdf = surface.sdf(&samples);
-
-    let mut begin = 0;
-    let visible: Vec<bool> = sight_lines
-        .into_iter()
-        .map(|line| {
-            line.is_some_and(|end| {
-                // A surface that answers too few points hides the rest.
-                let free = sdf
-                    .get(begin..end)
-                    .is_some_and(|line| line.iter().all(|distance| *distance > config.min_sdf));
-                begin = end;
-                free
-            })
-        })
-        .collect();
-    visible
-        .chunks(config.points_per_edge.max(1))
-        .filter(|points| {
-            let count = points.iter().filter(|visible| **visible).count();
-            count as f64 >= config.min_visible_share * points.len() as f64
-        })
-        .count()
+/// The sight lines of some edges, with the memory of the queries.
+struct Batch<'a> {
+    config: &'a OcclusionConfig,
+    /// Where on an edge the points lie.
+    places: Vec<f64>,
+    /// Distances of the samples from their point.
+    distances: Vec<f64>,
+    /// The sight lines on which nothing was hit so far.
+    lines: Vec<SightLine>,
+    samples: Vec<Vector3<f64>>,
 }
 
-/// Appends the samples of the line from `point` to the camera that can hide it.
-fn append_sight_line(
-    samples: &mut Vec<Vector3<f64>>,
-    point: &Vector3<f64>,
-    camera: &Camera,
-    config: &OcclusionConfig,
-) {
-    let to_camera = camera.center_in_world - point;
-    let camera_distance = to_camera.norm();
-    let direction = to_camera / camera_distance;
-    samples.extend(
-        linspace(
-            config.start_distance,
-            config.end_distance,
-            config.samples_per_sight_line,
-        )
-        .into_iter()
-        .filter(|distance| *distance < camera_distance)
-        .map(|distance| point + direction * distance)
-        .filter(|sample| sample.norm() < config.ball_radius),
-    );
+/// The line from a point of an edge to a camera.
+struct SightLine {
+    /// Which pair of edge and view it belongs to.
+    pair: usize,
+    point: Vector3<f64>,
+    direction: Vector3<f64>,
+    camera_distance: f64,
+    /// Where its samples of this round end.
+    end: usize,
+}
+
+impl<'a> Batch<'a> {
+    fn new(config: &'a OcclusionConfig) -> Self {
+        let margin = config.end_margin;
+        Self {
+            config,
+            places: linspace(margin, 1.0 - margin, config.points_per_edge),
+            distances: linspace(
+                config.start_distance,
+                config.end_distance,
+                config.samples_per_sight_line,
+            ),
+            lines: Vec::new(),
+            samples: Vec::new(),
+        }
+    }
+
+    fn visible_views(
+        &mut self,
+        edges: impl Iterator<Item = LineSegment3>,
+        views: &[ViewObservation],
+        surface: &dyn SignedDistance,
+    ) -> Vec<usize> {
+        // Points seen so far, of every edge in every view.
+        let mut seen = Vec::new();
+        self.lines.clear();
+        let mut count = 0;
+        for edge in edges {
+            for view in views {
+                let points = self.places.iter().map(|t| edge.point_at(*t));
+                let before = self.lines.len();
+                let in_image = points.filter(|point| is_in_image(&view.camera, point));
+                self.lines.extend(in_image.map(|point| {
+                    let to_camera = view.camera.center_in_world - point;
+                    let camera_distance = to_camera.norm();
+                    SightLine {
+                        pair: seen.len(),
+                        point,
+                        direction: to_camera / camera_distance,
+                        camera_distance,
+                        end: 0,
+                    }
+                }));
+                seen.push(self.lines.len() - before);
+            }
+            count += 1;
+        }
+        for round in 0..ROUNDS {
+            self.follow(round, surface, &mut seen);
+        }
+        if views.is_empty() {
+            return vec![0; count];
+        }
+        seen.chunks(views.len())
+            .map(|seen| seen.iter().filter(|seen| self.is_enough(**seen)).count())
+            .collect()
+    }
+
+    /// Asks for every `ROUNDS`-th sample of each line, and drops the lines that
+    /// are hit and those of views in which too few points are left.
+    fn follow(&mut self, round: usize, surface: &dyn SignedDistance, seen: &mut [usize]) {
+        let config = self.config;
+        let enough = config.min_visible_share * self.places.len() as f64;
+        self.lines.retain(|line| seen[line.pair] as f64 >= enough);
+        self.samples.clear();
+        for line in &mut self.lines {
+            let distances = self.distances.iter().skip(round).step_by(ROUNDS);
+            self.samples.extend(
+                distances
+                    .filter(|distance| **distance < line.camera_distance)
+                    .map(|distance| line.point + line.direction * *distance)
+                    .filter(|sample| sample.norm() < config.ball_radius),
+            );
+            line.end = self.samples.len();
+        }
+        let sdf = surface.sdf(&self.samples);
+        let mut begin = 0;
+        self.lines.retain(|line| {
+            // A surface that answers too few points hides the rest.
+            let free = sdf
+                .get(begin..line.end)
+                .is_some_and(|line| line.iter().all(|distance| *distance > config.min_sdf));
+            begin = line.end;
+            if !free {
+                seen[line.pair] -= 1;
+            }
+            free
+        });
+    }
+
+    fn is_enough(&self, seen: usize) -> bool {
+        seen as f64 >= self.config.min_visible_share * self.places.len() as f64
+    }
 }
 
 fn is_in_image(camera: &Camera, point: &Vector3<f64>) -> bool {
