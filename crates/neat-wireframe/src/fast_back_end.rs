@@ -18,6 +18,7 @@ use crate::edge_support::{EdgeSupportConfig, SupportedEdge};
 use crate::evidence::Evidence;
 use crate::junction_modes::{JunctionModesConfig, junction_modes, supported_junctions};
 use crate::occlusion::{OcclusionConfig, visible_views};
+use crate::regularities::{RegularitiesConfig, adjust_with_regularities};
 use crate::segment_ends::{SegmentEndConfig, segment_ends};
 use crate::step_report::{GraphSize, Step, StepReport};
 use crate::triangulation::{TriangulationConfig, retriangulate};
@@ -60,6 +61,8 @@ pub struct FastBackEndConfig {
     pub occlusion: OcclusionConfig,
     /// Constants of the clean-up.
     pub merging: CleanupConfig,
+    /// Parallel and orthogonal edges, off by default.
+    pub regularities: RegularitiesConfig,
 }
 
 impl Default for FastBackEndConfig {
@@ -80,6 +83,7 @@ impl Default for FastBackEndConfig {
             adjustment: BundleAdjustmentConfig::default(),
             occlusion: OcclusionConfig::default(),
             merging: CleanupConfig::default(),
+            regularities: RegularitiesConfig::default(),
         }
     }
 }
@@ -350,6 +354,17 @@ impl BackEnd<'_> {
             let association = config.adjustment.final_association_in_pixels;
             junctions = self.adjust(&junctions, &edges, association);
             record.push_edges(Step::FinalAdjustment, junctions.len(), &edges, &edges);
+        }
+        if config.regularities.parallel {
+            junctions = adjust_with_regularities(
+                self.views,
+                &junctions,
+                &pairs_of(&edges),
+                config.adjustment.final_association_in_pixels,
+                &config.adjustment,
+                &config.regularities,
+            );
+            record.push_edges(Step::Regularities, junctions.len(), &edges, &edges);
         }
         (junctions, edges)
     }

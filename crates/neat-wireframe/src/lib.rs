@@ -23,6 +23,7 @@ pub mod occlusion;
 pub mod paper_back_end;
 pub mod projection;
 pub mod proposal;
+pub mod regularities;
 pub mod robust_segments;
 pub mod segment_ends;
 pub mod segment_matching;

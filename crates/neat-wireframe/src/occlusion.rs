@@ -28,6 +28,12 @@ pub struct OcclusionConfig {
     pub end_distance: f64,
     /// A signed distance at or below this hides the point.
     pub min_sdf: f64,
+    /// The first sample is at most this share of the edge's length away: small
+    /// parts of a large scene are thinner than `start_distance`.
+    pub max_relative_start_distance: f64,
+    /// The depth below the surface that hides a point is at most this share of
+    /// the edge's length.
+    pub max_relative_depth: f64,
     /// Points outside this ball around the origin hide nothing: the surface
     /// means nothing there.
     pub ball_radius: f64,
@@ -51,6 +57,8 @@ impl Default for OcclusionConfig {
             start_distance: 0.05,
             end_distance: 1.2,
             min_sdf: -0.015,
+            max_relative_start_distance: 0.25,
+            max_relative_depth: 0.05,
             ball_radius: 1.0,
             min_visible_share: 0.6,
             min_support_ratio: 0.3,
@@ -109,8 +117,8 @@ struct Batch<'a> {
     config: &'a OcclusionConfig,
     /// Where on an edge the points lie.
     places: Vec<f64>,
-    /// Distances of the samples from their point.
-    distances: Vec<f64>,
+    /// How far along its samples each one lies, in [0, 1].
+    fractions: Vec<f64>,
     /// The sight lines on which nothing was hit so far.
     lines: Vec<SightLine>,
     samples: Vec<Vector3<f64>>,
@@ -123,6 +131,10 @@ struct SightLine {
     point: Vector3<f64>,
     direction: Vector3<f64>,
     camera_distance: f64,
+    /// Distance of the first sample.
+    start_distance: f64,
+    /// A signed distance at or below this hides the point.
+    min_sdf: f64,
     /// Where its samples of this round end.
     end: usize,
 }
@@ -133,11 +145,7 @@ impl<'a> Batch<'a> {
         Self {
             config,
             places: linspace(margin, 1.0 - margin, config.points_per_edge),
-            distances: linspace(
-                config.start_distance,
-                config.end_distance,
-                config.samples_per_sight_line,
-            ),
+            fractions: linspace(0.0, 1.0, config.samples_per_sight_line),
             lines: Vec::new(),
             samples: Vec::new(),
         }
@@ -154,6 +162,11 @@ impl<'a> Batch<'a> {
         self.lines.clear();
         let mut count = 0;
         for edge in edges {
+            let length = edge.length();
+            let config = self.config;
+            let start_distance =
+                (config.max_relative_start_distance * length).min(config.start_distance);
+            let min_sdf = (-config.max_relative_depth * length).max(config.min_sdf);
             for view in views {
                 let points = self.places.iter().map(|t| edge.point_at(*t));
                 let before = self.lines.len();
@@ -166,6 +179,8 @@ impl<'a> Batch<'a> {
                         point,
                         direction: to_camera / camera_distance,
                         camera_distance,
+                        start_distance,
+                        min_sdf,
                         end: 0,
                     }
                 }));
@@ -192,11 +207,13 @@ impl<'a> Batch<'a> {
         self.lines.retain(|line| seen[line.pair] as f64 >= enough);
         self.samples.clear();
         for line in &mut self.lines {
-            let distances = self.distances.iter().skip(round).step_by(ROUNDS);
+            let span = config.end_distance - line.start_distance;
+            let fractions = self.fractions.iter().skip(round).step_by(ROUNDS);
             self.samples.extend(
-                distances
-                    .filter(|distance| **distance < line.camera_distance)
-                    .map(|distance| line.point + line.direction * *distance)
+                fractions
+                    .map(|fraction| line.start_distance + span * fraction)
+                    .filter(|distance| *distance < line.camera_distance)
+                    .map(|distance| line.point + line.direction * distance)
                     .filter(|sample| sample.norm() < config.ball_radius),
             );
             line.end = self.samples.len();
@@ -207,7 +224,7 @@ impl<'a> Batch<'a> {
             // A surface that answers too few points hides the rest.
             let free = sdf
                 .get(begin..line.end)
-                .is_some_and(|line| line.iter().all(|distance| *distance > config.min_sdf));
+                .is_some_and(|sdf| sdf.iter().all(|distance| *distance > line.min_sdf));
             begin = line.end;
             if !free {
                 seen[line.pair] -= 1;
@@ -239,7 +256,7 @@ fn linspace(first: f64, last: f64, count: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scenes::{camera_looking_at_origin, cube};
+    use crate::test_scenes::{Noise, camera_looking_at_origin, cube};
 
     /// A box of half side 0.5.
     struct Cube;
@@ -301,6 +318,75 @@ mod tests {
         assert_eq!(count(&view), 1);
         view.camera.intrinsics.cx = -400.0;
         assert_eq!(count(&view), 0);
+    }
+
+    /// The definition: every sample of every sight line is asked for.
+    fn visible_views_by_scan(
+        views: &[ViewObservation],
+        edge: &LineSegment3,
+        config: &OcclusionConfig,
+    ) -> usize {
+        let length = edge.length();
+        let start = (config.max_relative_start_distance * length).min(config.start_distance);
+        let min_sdf = (-config.max_relative_depth * length).max(config.min_sdf);
+        let margin = config.end_margin;
+        let places = linspace(margin, 1.0 - margin, config.points_per_edge);
+        let is_visible = |view: &ViewObservation, point: Vector3<f64>| {
+            let to_camera = view.camera.center_in_world - point;
+            let samples = linspace(start, config.end_distance, config.samples_per_sight_line);
+            is_in_image(&view.camera, &point)
+                && samples
+                    .iter()
+                    .filter(|distance| **distance < to_camera.norm())
+                    .map(|distance| point + to_camera.normalize() * *distance)
+                    .filter(|sample| sample.norm() < config.ball_radius)
+                    .all(|sample| Cube.sdf(&[sample])[0] > min_sdf)
+        };
+        views
+            .iter()
+            .filter(|view| {
+                let visible = places
+                    .iter()
+                    .filter(|t| is_visible(view, edge.point_at(**t)));
+                visible.count() as f64 >= config.min_visible_share * places.len() as f64
+            })
+            .count()
+    }
+
+    #[test]
+    fn rounds_and_batches_change_nothing() {
+        let mut noise = Noise(19);
+        let junctions: Vec<_> = (0..400).map(|_| 0.8 * noise.vector()).collect();
+        let edges: Vec<[usize; 2]> = (0..200).map(|i| [2 * i, 2 * i + 1]).collect();
+        let mut views: Vec<_> = (0..7)
+            .map(|_| {
+                let [x, y, z] = (2.0 * noise.vector().normalize()).into();
+                view_from(x, y, z)
+            })
+            .collect();
+        views[0].camera.intrinsics.cx = 60.0;
+        for config in [
+            OcclusionConfig::default(),
+            OcclusionConfig {
+                points_per_edge: 3,
+                samples_per_sight_line: 5,
+                min_visible_share: 1.0,
+                ..Default::default()
+            },
+        ] {
+            let counts = visible_views(&views, &junctions, &edges, &Cube, &config);
+            let scanned: Vec<_> = edges
+                .iter()
+                .map(|[a, b]| LineSegment3::new(junctions[*a], junctions[*b]))
+                .map(|edge| visible_views_by_scan(&views, &edge, &config))
+                .collect();
+            assert_eq!(counts, scanned);
+            assert!(counts.contains(&0) && counts.iter().any(|count| *count > 3));
+        }
+        assert_eq!(
+            visible_views(&[], &junctions, &edges, &Cube, &OcclusionConfig::default()),
+            vec![0; edges.len()]
+        );
     }
 
     #[test]

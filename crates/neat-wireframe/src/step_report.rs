@@ -26,6 +26,8 @@ pub enum Step {
     CleanUp,
     /// The bundle adjustment of the final graph.
     FinalAdjustment,
+    /// Edges are pulled towards directions that many share.
+    Regularities,
 }
 
 /// What one step did.

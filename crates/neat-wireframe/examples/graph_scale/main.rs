@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! cargo run --release -p neat-wireframe --example graph_scale -- \
-//!     [JUNCTIONS VIEWS]... [--config FILE.json]
+//!     [JUNCTIONS VIEWS]... [--config FILE.json] [--yaw DEGREES] [--noise PIXELS] [--seed N]
 //! ```
 //!
 //! Proposals are the truth with the noise of a trained field; see `field.rs`.
@@ -31,14 +31,17 @@ const PER_BLOCK: usize = 8;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut config = FastBackEndConfig::default();
+    let mut scene = BlockScene::default();
     let mut numbers: Vec<usize> = Vec::new();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
-        if argument == "--config" {
-            let file = arguments.next().ok_or("--config lacks its file")?;
-            config = serde_json::from_str(&std::fs::read_to_string(file)?)?;
-        } else {
-            numbers.push(argument.parse()?);
+        let mut value = || arguments.next().ok_or("the last option lacks its value");
+        match argument.as_str() {
+            "--config" => config = serde_json::from_str(&std::fs::read_to_string(value()?)?)?,
+            "--yaw" => scene.max_yaw_in_degrees = value()?.parse()?,
+            "--noise" => scene.noise_in_pixels = value()?.parse()?,
+            "--seed" => scene.seed = value()?.parse()?,
+            number => numbers.push(number.parse()?),
         }
     }
     let mut sizes: Vec<[usize; 2]> = numbers.as_chunks().0.to_vec();
@@ -50,7 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     let runs = sizes
         .into_iter()
-        .map(|[junctions, views]| Runs::new(junctions, views, &config))
+        .map(|[junctions, views]| Runs::new(junctions, views, &scene, &config))
         .collect::<Result<Vec<_>, _>>()?;
     print_times(&runs);
     print_scores(&runs);
@@ -80,12 +83,13 @@ impl Runs {
     fn new(
         junctions: usize,
         views: usize,
+        scene: &BlockScene,
         config: &FastBackEndConfig,
     ) -> Result<Self, SyntheticError> {
         let scene = BlockScene {
             blocks: junctions.div_ceil(PER_BLOCK),
             views,
-            ..BlockScene::default()
+            ..scene.clone()
         };
         let data = scene.generate()?;
         let observations = observations(&data);
