@@ -11,6 +11,7 @@ use crate::ViewObservation;
 use crate::block_cholesky::Elimination;
 use crate::normal_equations::NormalEquations;
 use crate::projection::{project_in_front, project_with_jacobian};
+use crate::pulls::Pulls;
 use crate::segment_grid::SegmentGrid;
 use crate::segment_matching::match_segment;
 use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
@@ -124,33 +125,13 @@ pub(crate) fn adjust_observed(
     junctions: &[Vector3<f64>],
     config: &BundleAdjustmentConfig,
 ) -> Vec<Vector3<f64>> {
-    adjust_with_directions(edges, &[], junctions, config)
+    adjust_with_pulls(edges, &Pulls::default(), junctions, config)
 }
 
-/// An edge that is expected to have a direction.
-pub(crate) struct EdgeDirection {
-    /// Indices of its junctions.
-    pub junctions: [usize; 2],
-    /// A unit vector.
-    pub direction: Vector3<f64>,
-    /// Factor of the part of the edge across the direction: the residual then
-    /// counts like one in pixels.
-    pub weight: f64,
-}
-
-impl EdgeDirection {
-    /// The part of the edge across the direction.
-    fn across(&self, junctions: &[Vector3<f64>]) -> Vector3<f64> {
-        let [a, b] = self.junctions.map(|junction| junctions[junction]);
-        let offset = b - a;
-        offset - self.direction * self.direction.dot(&offset)
-    }
-}
-
-/// [`adjust_observed`], with directions that edges are pulled towards.
-pub(crate) fn adjust_with_directions(
+/// [`adjust_observed`], with places that the graph is pulled towards.
+pub(crate) fn adjust_with_pulls(
     edges: &[ObservedEdge],
-    directions: &[EdgeDirection],
+    pulls: &Pulls,
     junctions: &[Vector3<f64>],
     config: &BundleAdjustmentConfig,
 ) -> Vec<Vector3<f64>> {
@@ -159,16 +140,16 @@ pub(crate) fn adjust_with_directions(
         return junctions;
     }
     let pairs = edges.iter().map(|edge| edge.junctions);
-    let pairs = pairs.chain(directions.iter().map(|edge| edge.junctions));
+    let pairs = pairs.chain(pulls.directions.iter().map(|edge| edge.junctions));
     let elimination = Elimination::new(junctions.len(), pairs);
     let total_cost = |junctions: &[Vector3<f64>]| {
-        total_cost(edges, junctions, config) + directions_cost(directions, junctions, config)
+        total_cost(edges, junctions, config) + pulls.cost(junctions, config)
     };
     let mut cost = total_cost(&junctions);
     let mut damping = config.initial_damping;
     for _ in 0..config.max_iterations {
         let mut equations = linearise(edges, &junctions, config);
-        add_directions(&mut equations, directions, &junctions, config);
+        pulls.add_to(&mut equations, &junctions, config);
         let mut accepted = None;
         for _ in 0..config.max_attempts {
             if let Some(step) = equations.solve_in_order(damping, &elimination) {
@@ -207,45 +188,6 @@ fn total_cost(
         .collect();
     // Summed in the order of the edges, whatever the threads did.
     costs.iter().sum()
-}
-
-/// The cost of directions that are not kept.
-fn directions_cost(
-    directions: &[EdgeDirection],
-    junctions: &[Vector3<f64>],
-    config: &BundleAdjustmentConfig,
-) -> f64 {
-    directions
-        .iter()
-        .map(|edge| {
-            let residual = edge.weight * edge.across(junctions).norm();
-            (residual / config.cauchy_scale_in_pixels).powi(2).ln_1p()
-        })
-        .sum()
-}
-
-/// Adds what directions that are not kept contribute.
-fn add_directions(
-    equations: &mut NormalEquations,
-    directions: &[EdgeDirection],
-    junctions: &[Vector3<f64>],
-    config: &BundleAdjustmentConfig,
-) {
-    for edge in directions {
-        let across = edge.across(junctions);
-        let squared_weight = edge.weight * edge.weight;
-        let squared_residual = squared_weight * across.norm_squared();
-        let weight =
-            squared_weight / (1.0 + squared_residual / config.cauchy_scale_in_pixels.powi(2));
-        // Projects away the direction, and is its own square.
-        let by_end = weight * (Matrix3::identity() - edge.direction * edge.direction.transpose());
-        let [a, b] = edge.junctions;
-        equations.diagonal[a] += by_end;
-        equations.diagonal[b] += by_end;
-        equations.off_diagonal.push((edge.junctions, -by_end));
-        equations.gradient[a] -= weight * across;
-        equations.gradient[b] += weight * across;
-    }
 }
 
 /// What the detections tell of every junction while the others stay: the
@@ -614,31 +556,6 @@ mod tests {
                     (numeric - expected).abs() < 1e-3 + 1e-5 * expected.abs(),
                     "{numeric} {expected}"
                 );
-            }
-        }
-    }
-
-    #[test]
-    fn gradient_of_the_directions_agrees_with_finite_differences() {
-        let start = noisy_cube(3).start;
-        let config = BundleAdjustmentConfig::default();
-        let directions = [EdgeDirection {
-            junctions: [2, 3],
-            direction: Vector3::new(0.6, 0.0, 0.8),
-            weight: 1.7,
-        }];
-        let mut equations = NormalEquations::new(start.len());
-        add_directions(&mut equations, &directions, &start, &config);
-        let step = 1e-6;
-        for (junction, analytic) in equations.gradient.iter().enumerate() {
-            for axis in 0..3 {
-                let cost_at = |offset: f64| {
-                    let mut moved = start.clone();
-                    moved[junction][axis] += offset;
-                    directions_cost(&directions, &moved, &config)
-                };
-                let numeric = (cost_at(step) - cost_at(-step)) / (2.0 * step);
-                assert!((numeric - 2.0 * analytic[axis]).abs() < 1e-8);
             }
         }
     }

@@ -61,7 +61,7 @@ pub struct FastBackEndConfig {
     pub occlusion: OcclusionConfig,
     /// Constants of the clean-up.
     pub merging: CleanupConfig,
-    /// Parallel and orthogonal edges, off by default.
+    /// Parallel and orthogonal edges, flat faces and straight lines, off by default.
     pub regularities: RegularitiesConfig,
 }
 
@@ -355,7 +355,7 @@ impl BackEnd<'_> {
             junctions = self.adjust(&junctions, &edges, association);
             record.push_edges(Step::FinalAdjustment, junctions.len(), &edges, &edges);
         }
-        if config.regularities.parallel {
+        if config.regularities.is_on() {
             junctions = adjust_with_regularities(
                 self.views,
                 &junctions,

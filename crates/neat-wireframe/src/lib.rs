@@ -33,10 +33,12 @@ pub mod triangulation;
 pub mod validity;
 pub mod visibility;
 
+mod alignments;
 mod block_cholesky;
 mod evidence;
 mod point_grid;
 mod point_index;
+mod pulls;
 mod segment_grid;
 
 pub use neat_core::Wireframe3d;

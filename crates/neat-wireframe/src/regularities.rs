@@ -1,5 +1,5 @@
 //! Regularities of man-made things as soft constraints: edges of one direction,
-//! and directions at right angles.
+//! directions at right angles, flat faces, and edges that continue each other.
 //!
 //! Directions that many edges share are found in the data, with the tolerance
 //! that the uncertainty of each edge allows. A bundle adjustment then pulls the
@@ -8,10 +8,12 @@
 //! equations keep the sparsity of the graph.
 
 use crate::ViewObservation;
+use crate::alignments::{collinear_pulls, coplanar_pulls};
 use crate::bundle_adjustment::{
-    BundleAdjustmentConfig, EdgeDirection, adjust_with_directions, associate_edges, information,
+    BundleAdjustmentConfig, adjust_with_pulls, associate_edges, information,
 };
 use crate::point_grid::PointGrid;
+use crate::pulls::{EdgeDirection, Pulls};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -32,16 +34,26 @@ pub struct RegularitiesConfig {
     pub parallel: bool,
     /// Make directions orthogonal that nearly are; needs `parallel`.
     pub orthogonal: bool,
-    /// Edges farther from a direction never belong to it.
+    /// Pull the junctions of a face into its plane.
+    pub coplanar: bool,
+    /// Pull edges that continue each other onto one line.
+    pub collinear: bool,
+    /// Edges farther from a direction never belong to it, nor do corners whose
+    /// planes differ by more to one face.
     pub max_angle_in_degrees: f64,
-    /// Nor do those farther from it than this multiple of the standard deviation
-    /// of their own direction, one pixel of noise assumed.
+    /// Junctions farther from a plane or a line never belong to it, in world
+    /// units.
+    pub max_distance: f64,
+    /// Nor does what is farther off than this multiple of its own standard
+    /// deviation, one pixel of noise assumed.
     pub max_sigmas: f64,
     /// A direction needs this many edges.
     pub min_edges: usize,
     /// How exactly edges are expected to keep their direction: the scale of the
     /// residuals.
     pub sigma_in_degrees: f64,
+    /// The same for junctions and their plane or line, in world units.
+    pub sigma_distance: f64,
     /// Times that directions are found and edges are adjusted.
     pub rounds: usize,
 }
@@ -51,12 +63,23 @@ impl Default for RegularitiesConfig {
         Self {
             parallel: false,
             orthogonal: false,
+            coplanar: false,
+            collinear: false,
             max_angle_in_degrees: 1.0,
+            max_distance: 0.003,
             max_sigmas: 3.0,
             min_edges: 8,
             sigma_in_degrees: 0.1,
+            sigma_distance: 2e-4,
             rounds: 2,
         }
+    }
+}
+
+impl RegularitiesConfig {
+    /// Whether any regularity is looked for.
+    pub fn is_on(&self) -> bool {
+        self.parallel || self.coplanar || self.collinear
     }
 }
 
@@ -76,11 +99,22 @@ pub fn adjust_with_regularities(
     let mut junctions = junctions.to_vec();
     for _ in 0..config.rounds {
         let information = information(&observed, &junctions, adjustment);
-        let directions = common_directions(&junctions, &pairs, &information, config);
-        if directions.is_empty() {
+        let mut pulls = Pulls {
+            directions: common_directions(&junctions, &pairs, &information, config),
+            junctions: Vec::new(),
+        };
+        if config.coplanar {
+            let faces = coplanar_pulls(&junctions, &pairs, &information, config);
+            pulls.junctions.extend(faces);
+        }
+        if config.collinear {
+            let lines = collinear_pulls(&junctions, &pairs, &information, config);
+            pulls.junctions.extend(lines);
+        }
+        if pulls.is_empty() {
             break;
         }
-        junctions = adjust_with_directions(&observed, &directions, &junctions, adjustment);
+        junctions = adjust_with_pulls(&observed, &pulls, &junctions, adjustment);
     }
     junctions
 }
@@ -269,6 +303,8 @@ mod tests {
         RegularitiesConfig {
             parallel: true,
             orthogonal: true,
+            coplanar: true,
+            collinear: true,
             ..Default::default()
         }
     }

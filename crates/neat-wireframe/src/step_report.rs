@@ -26,7 +26,7 @@ pub enum Step {
     CleanUp,
     /// The bundle adjustment of the final graph.
     FinalAdjustment,
-    /// Edges are pulled towards directions that many share.
+    /// Edges and junctions are pulled towards regularities of the graph.
     Regularities,
 }
 
