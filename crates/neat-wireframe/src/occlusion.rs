@@ -38,6 +38,7 @@ pub struct OcclusionConfig {
     /// means nothing there.
     pub ball_radius: f64,
     /// Share of its points that must be visible for an edge to count as visible.
+    /// Nearly all: only a view that shows both ends can support an edge.
     pub min_visible_share: f64,
     /// An edge needs support in at least this share of the views in which it is
     /// visible.
@@ -60,7 +61,7 @@ impl Default for OcclusionConfig {
             max_relative_start_distance: 0.25,
             max_relative_depth: 0.05,
             ball_radius: 1.0,
-            min_visible_share: 0.6,
+            min_visible_share: 0.85,
             min_support_ratio: 0.3,
             min_denominator: 20.0,
             min_denominator_share: 0.2,

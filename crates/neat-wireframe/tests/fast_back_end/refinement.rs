@@ -39,6 +39,33 @@ fn refinement_reduces_the_junction_error_threefold() {
 }
 
 #[test]
+fn regularities_are_a_step_of_their_own_and_gain() {
+    let scene = BlockScene {
+        blocks: 8,
+        views: 20,
+        max_yaw_in_degrees: 0.0,
+        ..BlockScene::default()
+    };
+    let data = scene.generate().unwrap();
+    let (views, proposals) = (observations(&data), proposals(&data, 0));
+    let surface = BlockSurface(&data.blocks);
+    let median_error = |config: &FastBackEndConfig| {
+        let result = run(&views, &proposals, &[], &surface, 1.0, config);
+        let last = result.report.steps.last().unwrap().step;
+        let score = Score::new(&result.wireframe, &data.truth, &data.truth, 0.01);
+        (last, score.median_junction_error)
+    };
+    let mut config = FastBackEndConfig::default();
+    let (last, plain) = median_error(&config);
+    assert_eq!(last, Step::FinalAdjustment);
+    config.regularities.parallel = true;
+    config.regularities.coplanar = true;
+    let (last, regular) = median_error(&config);
+    assert_eq!(last, Step::Regularities);
+    assert!(regular < 0.9 * plain, "{plain} {regular}");
+}
+
+#[test]
 fn the_report_accounts_for_every_junction_and_edge() {
     let scene = BlockScene {
         blocks: 4,
