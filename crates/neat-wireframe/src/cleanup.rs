@@ -222,6 +222,7 @@ fn drop_isolated(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_scenes::Noise;
 
     fn edge(a: usize, b: usize, support: usize) -> SupportedEdge {
         SupportedEdge {
@@ -280,5 +281,68 @@ mod tests {
             (vec![junctions[0], junctions[1]], vec![([0, 1], 5)])
         );
         assert_eq!(cleaned(&[], &[]), (Vec::new(), Vec::new()));
+    }
+
+    /// The definition: every junction that stays is tried on every edge.
+    fn resolve_by_scan(
+        edges: &mut EdgesByPair,
+        junctions: &[Vector3<f64>],
+        candidates: &[usize],
+        config: &CleanupConfig,
+    ) {
+        let segment = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
+        let mut longest_first: Vec<[usize; 2]> = edges.keys().copied().collect();
+        longest_first.sort_by(|p, q| f64::total_cmp(&segment(*q).length(), &segment(*p).length()));
+        for pair in longest_first {
+            let [a, b] = pair;
+            for &c in candidates {
+                let Some(long_support) = edges.get(&pair).map(|edge| edge.support) else {
+                    break;
+                };
+                if c == a || c == b || !lies_inside(&segment(pair), &junctions[c], config) {
+                    continue;
+                }
+                let parts = [[a.min(c), a.max(c)], [b.min(c), b.max(c)]];
+                let support = |part| edges.get(part).map(|edge: &SupportedEdge| edge.support);
+                let part_support = parts.iter().filter_map(support).max().unwrap_or(0);
+                let something_else_hangs_here = edges
+                    .keys()
+                    .any(|other| other.contains(&c) && !parts.contains(other));
+                if long_support >= part_support || !something_else_hangs_here {
+                    for part in &parts {
+                        edges.remove(part);
+                    }
+                } else {
+                    edges.remove(&pair);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn collinear_edges_are_those_of_a_scan() {
+        let mut noise = Noise(13);
+        // Near a few lines, so that many junctions lie inside many edges.
+        let junctions: Vec<_> = (0..150)
+            .map(|i| {
+                let along = noise.uniform();
+                let line = f64::from(i % 5) * 0.2;
+                Vector3::new(along, line, 0.5 * along * line) + 0.01 * noise.vector()
+            })
+            .collect();
+        let mut pick = || ((noise.uniform() + 1.0) * 75.0) as usize;
+        let edges: EdgesByPair = (0..400)
+            .map(|i| (pick(), pick(), i % 17))
+            .filter(|(a, b, _)| a != b)
+            .map(|(a, b, support)| edge(a.min(b), a.max(b), support))
+            .map(|edge| (edge.junctions, edge))
+            .collect();
+        let candidates: Vec<usize> = (0..150).rev().filter(|i| i % 7 != 0).collect();
+        let config = CleanupConfig::default();
+        let (mut fast, mut scanned) = (edges.clone(), edges.clone());
+        resolve_collinear(&mut fast, &junctions, &candidates, &config);
+        resolve_by_scan(&mut scanned, &junctions, &candidates, &config);
+        assert_eq!(fast, scanned);
+        assert!(fast.len() + 30 < edges.len());
     }
 }

@@ -8,6 +8,7 @@
 //! configuration gives the same scene, for any number of threads.
 //! [`BlockScene`] makes scenes of thousands of junctions, without images.
 
+mod block_scene;
 mod block_visibility;
 mod blocks;
 mod detection;
@@ -21,7 +22,8 @@ mod solid;
 mod viewpoints;
 mod visible_edges;
 
-pub use blocks::{BlockData, BlockScene, BlockSource, BlockView, Blocks};
+pub use block_scene::{BlockData, BlockScene, BlockSource, BlockView};
+pub use blocks::Blocks;
 pub use frustum::Frustum;
 pub use planar_face::PlanarFace;
 pub use rendering::render;
