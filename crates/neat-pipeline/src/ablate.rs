@@ -135,9 +135,7 @@ fn run_variant(
     let config = changed(&options.config, variant)?;
     let finished = RunDir::open(&out)
         .and_then(|dir| dir.manifest())
-        .is_ok_and(|manifest| {
-            manifest.status == Status::Finished && manifest.seed == options.seed
-        });
+        .is_ok_and(|manifest| manifest.status == Status::Finished && manifest.seed == options.seed);
     if !finished {
         let options = RunOptions {
             out: out.clone(),
@@ -227,7 +225,10 @@ fn row(
         segment_recall: segments.map(|scores| scores.recall),
         junction_accuracy: surface.and_then(|scores| scores.junction_accuracy),
         segment_accuracy: surface.and_then(|scores| scores.segment_accuracy),
-        psnr: variant.trains.then(|| mean_psnr(&run.scene, &run.field)).flatten(),
+        psnr: variant
+            .trains
+            .then(|| mean_psnr(&run.scene, &run.field))
+            .flatten(),
         mask_ratio: (variant.trains)
             .then(|| masked_out(&run.scene, config))
             .flatten(),
@@ -243,8 +244,7 @@ fn mean_psnr(scene: &Scene, field: &TrainedField) -> Option<f64> {
             let view = &scene.views[index];
             let longer = view.camera.width.max(view.camera.height);
             let step = (longer / RENDERED_SIZE).max(1);
-            let rendered =
-                render_view(field, &view.camera, scene.pixel_center, step, &mut |_| ());
+            let rendered = render_view(field, &view.camera, scene.pixel_center, step, &mut |_| ());
             psnr(&rendered.color, &every_nth_pixel(&view.image, step), None)
         })
         .collect();
@@ -379,9 +379,14 @@ mod tests {
         let text = to_markdown(&[row()]);
         assert_eq!(
             text.lines().next(),
-            Some("| table | variant | distil s | junctions | segments | J precision | mask ratio |")
+            Some(
+                "| table | variant | distil s | junctions | segments | J precision | mask ratio |"
+            )
         );
-        assert!(text.ends_with("| 0.50 | 12 | 18 | 1.000 | 0.900 |\n"), "{text}");
+        assert!(
+            text.ends_with("| 0.50 | 12 | 18 | 1.000 | 0.900 |\n"),
+            "{text}"
+        );
     }
 
     #[test]

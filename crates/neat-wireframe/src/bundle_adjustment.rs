@@ -8,8 +8,11 @@
 //! derivatives.
 
 use crate::ViewObservation;
+use crate::block_cholesky::Elimination;
 use crate::normal_equations::NormalEquations;
 use crate::projection::{project_in_front, project_with_jacobian};
+use crate::pulls::Pulls;
+use crate::segment_grid::SegmentGrid;
 use crate::segment_matching::match_segment;
 use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
 use neat_core::{Camera, LineSegment2};
@@ -18,6 +21,9 @@ use serde::{Deserialize, Serialize};
 
 /// Projected edges shorter than this are treated as this long.
 const MIN_PROJECTED_LENGTH: f64 = 1e-6;
+/// Where detections need not even cover this share of an edge, so many places on
+/// it would have to be looked at that all detections are looked at instead.
+const MIN_OVERLAP_FOR_INDEX: f64 = 0.05;
 
 /// Settings of [`bundle_adjust`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -88,13 +94,27 @@ pub fn bundle_adjust(
     association_in_pixels: f64,
     config: &BundleAdjustmentConfig,
 ) -> Vec<Vector3<f64>> {
-    let observed: Vec<ObservedEdge> = edges
+    let observed = associate_edges(views, junctions, edges, association_in_pixels, config);
+    adjust_observed(&observed, junctions, config)
+}
+
+/// The edges that at least one view observes, with their detections.
+pub(crate) fn associate_edges(
+    views: &[ViewObservation],
+    junctions: &[Vector3<f64>],
+    edges: &[[usize; 2]],
+    association_in_pixels: f64,
+    config: &BundleAdjustmentConfig,
+) -> Vec<ObservedEdge> {
+    let views: Vec<IndexedView> = views.par_iter().map(IndexedView::new).collect();
+    edges
         .par_iter()
         .filter(|[a, b]| a != b && *a < junctions.len() && *b < junctions.len())
-        .map(|edge| ObservedEdge::associate(*edge, views, junctions, association_in_pixels, config))
+        .map(|edge| {
+            ObservedEdge::associate(*edge, &views, junctions, association_in_pixels, config)
+        })
         .filter(|edge| !edge.observations.is_empty())
-        .collect();
-    adjust_observed(&observed, junctions, config)
+        .collect()
 }
 
 /// Levenberg–Marquardt on all junctions, with the correspondences as they are.
@@ -105,19 +125,36 @@ pub(crate) fn adjust_observed(
     junctions: &[Vector3<f64>],
     config: &BundleAdjustmentConfig,
 ) -> Vec<Vector3<f64>> {
+    adjust_with_pulls(edges, &Pulls::default(), junctions, config)
+}
+
+/// [`adjust_observed`], with places that the graph is pulled towards.
+pub(crate) fn adjust_with_pulls(
+    edges: &[ObservedEdge],
+    pulls: &Pulls,
+    junctions: &[Vector3<f64>],
+    config: &BundleAdjustmentConfig,
+) -> Vec<Vector3<f64>> {
     let mut junctions = junctions.to_vec();
     if edges.is_empty() {
         return junctions;
     }
-    let mut cost = total_cost(edges, &junctions, config);
+    let pairs = edges.iter().map(|edge| edge.junctions);
+    let pairs = pairs.chain(pulls.directions.iter().map(|edge| edge.junctions));
+    let elimination = Elimination::new(junctions.len(), pairs);
+    let total_cost = |junctions: &[Vector3<f64>]| {
+        total_cost(edges, junctions, config) + pulls.cost(junctions, config)
+    };
+    let mut cost = total_cost(&junctions);
     let mut damping = config.initial_damping;
     for _ in 0..config.max_iterations {
-        let equations = linearise(edges, &junctions, config);
+        let mut equations = linearise(edges, &junctions, config);
+        pulls.add_to(&mut equations, &junctions, config);
         let mut accepted = None;
         for _ in 0..config.max_attempts {
-            if let Some(step) = equations.solve(damping) {
+            if let Some(step) = equations.solve_in_order(damping, &elimination) {
                 let moved: Vec<_> = junctions.iter().zip(&step).map(|(x, dx)| x - dx).collect();
-                let moved_cost = total_cost(edges, &moved, config);
+                let moved_cost = total_cost(&moved);
                 if moved_cost < cost {
                     accepted = Some((moved, moved_cost));
                     break;
@@ -153,6 +190,16 @@ fn total_cost(
     costs.iter().sum()
 }
 
+/// What the detections tell of every junction while the others stay: the
+/// diagonal blocks of the normal equations, in pixels² per squared world unit.
+pub(crate) fn information(
+    edges: &[ObservedEdge],
+    junctions: &[Vector3<f64>],
+    config: &BundleAdjustmentConfig,
+) -> Vec<Matrix3<f64>> {
+    linearise(edges, junctions, config).diagonal
+}
+
 /// The normal equations at `junctions`, assembled edge by edge.
 fn linearise(
     edges: &[ObservedEdge],
@@ -184,6 +231,42 @@ struct EdgeBlocks {
     gradient: [Vector3<f64>; 2],
 }
 
+/// A view whose detections are found by place.
+struct IndexedView<'a> {
+    view: &'a ViewObservation,
+    grid: SegmentGrid,
+}
+
+impl<'a> IndexedView<'a> {
+    fn new(view: &'a ViewObservation) -> Self {
+        let segments: Vec<_> = view.segments.iter().map(|s| s.segment).collect();
+        let grid = SegmentGrid::new(&segments, view.camera.width, view.camera.height);
+        Self { view, grid }
+    }
+
+    /// Names every detection with all of it at most `max_distance` from the
+    /// edge's line that covers more than `min_overlap` of the edge, and others;
+    /// some more than once.
+    fn for_each_near(
+        &self,
+        edge: &LineSegment2,
+        max_distance: f64,
+        min_overlap: f64,
+        mut visit: impl FnMut(usize),
+    ) {
+        if min_overlap >= MIN_OVERLAP_FOR_INDEX {
+            // What covers more than this share of the edge covers a multiple of it.
+            let places = (1..).map(|i| min_overlap * f64::from(i));
+            for place in places.take_while(|place| *place < 1.0) {
+                let point = edge.point_at(place);
+                self.grid.for_each_near(&point, max_distance, &mut visit);
+            }
+        } else {
+            (0..self.view.segments.len()).for_each(visit);
+        }
+    }
+}
+
 /// An edge with the detections that observe it.
 pub(crate) struct ObservedEdge {
     /// Indices of its junctions.
@@ -207,7 +290,7 @@ pub(crate) struct EdgeObservation {
 impl ObservedEdge {
     fn associate(
         junctions_of_edge: [usize; 2],
-        views: &[ViewObservation],
+        views: &[IndexedView],
         junctions: &[Vector3<f64>],
         association_in_pixels: f64,
         config: &BundleAdjustmentConfig,
@@ -216,10 +299,9 @@ impl ObservedEdge {
         let observations = views
             .iter()
             .filter_map(|view| {
-                let edge = LineSegment2::new(
-                    project_in_front(&view.camera, &a)?,
-                    project_in_front(&view.camera, &b)?,
-                );
+                let camera = &view.view.camera;
+                let edge =
+                    LineSegment2::new(project_in_front(camera, &a)?, project_in_front(camera, &b)?);
                 EdgeObservation::best(&edge, view, association_in_pixels, config)
             })
             .collect();
@@ -323,10 +405,10 @@ impl EdgeBlocks {
 
 impl EdgeObservation {
     /// The detection that lies on the projected edge with the nearest ends, if
-    /// any does.
+    /// any does; of equal ones the first.
     fn best(
         edge: &LineSegment2,
-        view: &ViewObservation,
+        indexed: &IndexedView,
         association_in_pixels: f64,
         config: &BundleAdjustmentConfig,
     ) -> Option<Self> {
@@ -335,16 +417,20 @@ impl EdgeObservation {
             return None;
         }
         let max_distance = (config.max_relative_distance * length).min(association_in_pixels);
-        let (_, best) = view
-            .segments
-            .iter()
-            .map(|detection| (match_segment(edge, &detection.segment), detection))
-            .filter(|(fit, detection)| {
-                fit.perpendicular_distance < max_distance
-                    && fit.overlap > config.min_overlap
-                    && detection.segment.length() < config.max_relative_length * length
-            })
-            .min_by(|(a, _), (b, _)| a.end_distance.total_cmp(&b.end_distance))?;
+        let view = indexed.view;
+        let mut best: Option<(f64, usize)> = None;
+        indexed.for_each_near(edge, max_distance, config.min_overlap, |index| {
+            let detection = &view.segments[index].segment;
+            let fit = match_segment(edge, detection);
+            let lies_on_edge = fit.perpendicular_distance < max_distance
+                && fit.overlap > config.min_overlap
+                && detection.length() < config.max_relative_length * length;
+            let candidate = (fit.end_distance, index);
+            if lies_on_edge && best.is_none_or(|best| candidate < best) {
+                best = Some(candidate);
+            }
+        });
+        let best = view.segments.get(best?.1)?;
         let near_end = |pixel: &Vector2<f64>| {
             let [start, end] = best.segment.ends();
             let nearest = if (end - pixel).norm() < (start - pixel).norm() {
@@ -444,9 +530,10 @@ mod tests {
             cauchy_scale_in_pixels: 1.5,
             ..Default::default()
         };
+        let indexed: Vec<_> = views.iter().map(IndexedView::new).collect();
         let observed: Vec<_> = edges
             .iter()
-            .map(|edge| ObservedEdge::associate(*edge, &views, &start, 20.0, &config))
+            .map(|edge| ObservedEdge::associate(*edge, &indexed, &start, 20.0, &config))
             .collect();
         assert!(
             observed
@@ -474,6 +561,71 @@ mod tests {
     }
 
     #[test]
+    fn the_index_finds_what_a_scan_finds() {
+        let mut noise = Noise(41);
+        let (junctions, edges) = cube();
+        let mut views = views_of_edges(&cameras_on_sphere(6), &junctions, &edges);
+        for view in &mut views {
+            let segments = view.segments.clone();
+            for _ in 0..20 {
+                for detection in &segments {
+                    let mut cut = *detection;
+                    let [from, to] = [noise.uniform(), noise.uniform()].map(|x| 0.5 + 0.6 * x);
+                    cut.segment = LineSegment2::new(
+                        detection.segment.point_at(from) + 5.0 * noise.vector().xy(),
+                        detection.segment.point_at(to) + 5.0 * noise.vector().xy(),
+                    );
+                    view.segments.push(cut);
+                }
+            }
+            view.segments.extend(segments);
+        }
+        let moved: Vec<_> = junctions
+            .iter()
+            .map(|x| x + 0.01 * noise.vector())
+            .collect();
+        for min_overlap in [0.4, 0.05, 0.7] {
+            let config = BundleAdjustmentConfig {
+                min_overlap,
+                ..Default::default()
+            };
+            for view in &views {
+                let indexed = IndexedView::new(view);
+                for [a, b] in &edges {
+                    let project = |i: usize| view.camera.project(&moved[i]).pixel;
+                    let edge = LineSegment2::new(project(*a), project(*b));
+                    let best = EdgeObservation::best(&edge, &indexed, 8.0, &config);
+                    assert_eq!(
+                        best.map(|best| best.detection),
+                        best_by_scan(&edge, view, 8.0, &config)
+                    );
+                }
+            }
+        }
+    }
+
+    /// The definition: every detection of the view is looked at.
+    fn best_by_scan(
+        edge: &LineSegment2,
+        view: &ViewObservation,
+        association_in_pixels: f64,
+        config: &BundleAdjustmentConfig,
+    ) -> Option<LineSegment2> {
+        let length = edge.length();
+        let max_distance = (config.max_relative_distance * length).min(association_in_pixels);
+        view.segments
+            .iter()
+            .map(|detection| (match_segment(edge, &detection.segment), detection.segment))
+            .filter(|(fit, detection)| {
+                fit.perpendicular_distance < max_distance
+                    && fit.overlap > config.min_overlap
+                    && detection.length() < config.max_relative_length * length
+            })
+            .min_by(|(a, _), (b, _)| a.end_distance.total_cmp(&b.end_distance))
+            .map(|(_, detection)| detection)
+    }
+
+    #[test]
     fn exact_detections_give_back_the_exact_junctions() {
         let NoisyCube {
             truth,
@@ -489,7 +641,7 @@ mod tests {
     }
 
     #[test]
-    fn many_junctions_take_the_sparse_path_to_the_same_place() {
+    fn many_junctions_come_to_the_true_place() {
         let (corners, cube_edges) = cube();
         let mut truth = Vec::new();
         let mut edges = Vec::new();

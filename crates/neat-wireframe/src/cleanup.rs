@@ -2,6 +2,8 @@
 //! isolated.
 
 use crate::edge_support::SupportedEdge;
+use crate::point_grid::GrowingPointGrid;
+use crate::point_index::PointIndex;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};
@@ -78,16 +80,21 @@ impl Merging {
         let mut order: Vec<usize> = (0..junctions.len()).collect();
         order.sort_by_key(|junction| Reverse(support[*junction]));
         let mut kept: Vec<usize> = Vec::new();
+        let mut kept_positions = GrowingPointGrid::new(distance);
         let mut representative: Vec<usize> = (0..junctions.len()).collect();
         for junction in order {
-            let near = kept.iter().find(|other| {
-                let pair = [junction.min(**other), junction.max(**other)];
-                (junctions[**other] - junctions[junction]).norm() < distance
-                    && !told_apart.contains(&pair)
-            });
-            match near {
-                Some(other) => representative[junction] = *other,
-                None => kept.push(junction),
+            let position = junctions[junction];
+            let stands_for_it = |other: usize, apart: f64| {
+                let other = kept[other];
+                apart < distance
+                    && !told_apart.contains(&[junction.min(other), junction.max(other)])
+            };
+            match kept_positions.first_near(&position, stands_for_it) {
+                Some(other) => representative[junction] = kept[other],
+                None => {
+                    kept.push(junction);
+                    kept_positions.push(position);
+                }
             }
         }
         Self {
@@ -131,13 +138,20 @@ fn resolve_collinear(
     config: &CleanupConfig,
 ) {
     let segment = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
+    let index = PointIndex::new(candidates.iter().map(|c| junctions[*c]).collect());
+    let mut neighbours = vec![BTreeSet::new(); junctions.len()];
+    for [a, b] in edges.keys() {
+        neighbours[*a].insert(*b);
+        neighbours[*b].insert(*a);
+    }
     let mut longest_first: Vec<[usize; 2]> = edges.keys().copied().collect();
     longest_first.sort_by(|p, q| f64::total_cmp(&segment(*q).length(), &segment(*p).length()));
 
     for pair in longest_first {
         let [a, b] = pair;
         let long = segment(pair);
-        for &c in candidates {
+        for c in near_segment(&long, &index, config.collinear_distance) {
+            let c = candidates[c];
             let Some(long_support) = edges.get(&pair).map(|edge| edge.support) else {
                 break;
             };
@@ -151,18 +165,40 @@ fn resolve_collinear(
                 .map(|part| part.support)
                 .max()
                 .unwrap_or(0);
-            let something_else_hangs_here = edges
-                .keys()
-                .any(|other| other.contains(&c) && !parts.contains(other));
-            if long_support >= part_support || !something_else_hangs_here {
-                for part in &parts {
-                    edges.remove(part);
-                }
-            } else {
-                edges.remove(&pair);
+            let something_else_hangs_here = neighbours[c].iter().any(|d| *d != a && *d != b);
+            let removed: &[[usize; 2]] =
+                if long_support >= part_support || !something_else_hangs_here {
+                    &parts
+                } else {
+                    &[pair]
+                };
+            for [p, q] in removed {
+                edges.remove(&[*p, *q]);
+                neighbours[*p].remove(q);
+                neighbours[*q].remove(p);
             }
         }
     }
+}
+
+/// The points at most `distance` away from a segment, and some farther ones, by
+/// ascending index.
+fn near_segment(segment: &LineSegment3, index: &PointIndex<3>, distance: f64) -> Vec<usize> {
+    // A ball around the whole of a long segment would hold much of the scene.
+    let pieces = (segment.length() / (8.0 * distance))
+        .ceil()
+        .clamp(1.0, 1000.0);
+    let radius = (0.5 * segment.length() / pieces).hypot(distance);
+    let mut near: Vec<usize> = (0..pieces as usize)
+        .flat_map(|piece| {
+            let middle = segment.point_at((piece as f64 + 0.5) / pieces);
+            index.within(&middle, radius * (1.0 + 1e-9))
+        })
+        .map(|neighbour| neighbour.index)
+        .collect();
+    near.sort_unstable();
+    near.dedup();
+    near
 }
 
 fn lies_inside(edge: &LineSegment3, point: &Vector3<f64>, config: &CleanupConfig) -> bool {
@@ -199,6 +235,7 @@ fn drop_isolated(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_scenes::Noise;
 
     fn edge(a: usize, b: usize, support: usize) -> SupportedEdge {
         SupportedEdge {
@@ -262,5 +299,68 @@ mod tests {
             (vec![junctions[0], junctions[1]], vec![([0, 1], 5)])
         );
         assert_eq!(cleaned(&[], &[]), (Vec::new(), Vec::new()));
+    }
+
+    /// The definition: every junction that stays is tried on every edge.
+    fn resolve_by_scan(
+        edges: &mut EdgesByPair,
+        junctions: &[Vector3<f64>],
+        candidates: &[usize],
+        config: &CleanupConfig,
+    ) {
+        let segment = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
+        let mut longest_first: Vec<[usize; 2]> = edges.keys().copied().collect();
+        longest_first.sort_by(|p, q| f64::total_cmp(&segment(*q).length(), &segment(*p).length()));
+        for pair in longest_first {
+            let [a, b] = pair;
+            for &c in candidates {
+                let Some(long_support) = edges.get(&pair).map(|edge| edge.support) else {
+                    break;
+                };
+                if c == a || c == b || !lies_inside(&segment(pair), &junctions[c], config) {
+                    continue;
+                }
+                let parts = [[a.min(c), a.max(c)], [b.min(c), b.max(c)]];
+                let support = |part| edges.get(part).map(|edge: &SupportedEdge| edge.support);
+                let part_support = parts.iter().filter_map(support).max().unwrap_or(0);
+                let something_else_hangs_here = edges
+                    .keys()
+                    .any(|other| other.contains(&c) && !parts.contains(other));
+                if long_support >= part_support || !something_else_hangs_here {
+                    for part in &parts {
+                        edges.remove(part);
+                    }
+                } else {
+                    edges.remove(&pair);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn collinear_edges_are_those_of_a_scan() {
+        let mut noise = Noise(13);
+        // Near a few lines, so that many junctions lie inside many edges.
+        let junctions: Vec<_> = (0..150)
+            .map(|i| {
+                let along = noise.uniform();
+                let line = f64::from(i % 5) * 0.2;
+                Vector3::new(along, line, 0.5 * along * line) + 0.01 * noise.vector()
+            })
+            .collect();
+        let mut pick = || ((noise.uniform() + 1.0) * 75.0) as usize;
+        let edges: EdgesByPair = (0..400)
+            .map(|i| (pick(), pick(), i % 17))
+            .filter(|(a, b, _)| a != b)
+            .map(|(a, b, support)| edge(a.min(b), a.max(b), support))
+            .map(|edge| (edge.junctions, edge))
+            .collect();
+        let candidates: Vec<usize> = (0..150).rev().filter(|i| i % 7 != 0).collect();
+        let config = CleanupConfig::default();
+        let (mut fast, mut scanned) = (edges.clone(), edges.clone());
+        resolve_collinear(&mut fast, &junctions, &candidates, &config);
+        resolve_by_scan(&mut scanned, &junctions, &candidates, &config);
+        assert_eq!(fast, scanned);
+        assert!(fast.len() + 30 < edges.len());
     }
 }

@@ -15,13 +15,15 @@ use crate::bundle_adjustment::{BundleAdjustmentConfig, bundle_adjust};
 use crate::cleanup::{CleanupConfig, clean_up};
 use crate::edge_completion::complete_edges;
 use crate::edge_splitting::{EdgeSplittingConfig, split_edges};
-use crate::edge_support::{EdgeSupportConfig, SupportedEdge, edge_support};
+use crate::edge_support::{EdgeSupportConfig, SupportedEdge};
 use crate::evidence::Evidence;
 use crate::exclusive_support::exclusively_supported;
 use crate::junction_modes::{JunctionModesConfig, junction_modes, supported_junctions};
 use crate::junction_splitting::{JunctionSplittingConfig, SplitJunctions, split_junctions};
 use crate::occlusion::{OcclusionConfig, visible_views};
+use crate::regularities::{RegularitiesConfig, adjust_with_regularities};
 use crate::segment_ends::{SegmentEndConfig, segment_ends};
+use crate::step_report::{GraphSize, Step, StepReport};
 use crate::triangulation::{TriangulationConfig, associate, retriangulate};
 use crate::{SegmentProposal, SignedDistance, ViewObservation};
 use nalgebra::Vector3;
@@ -72,6 +74,8 @@ pub struct FastBackEndConfig {
     pub merging: CleanupConfig,
     /// Constants of the splitting of edges.
     pub crossings: EdgeSplittingConfig,
+    /// Parallel and orthogonal edges, flat faces and straight lines, off by default.
+    pub regularities: RegularitiesConfig,
 }
 
 impl Default for FastBackEndConfig {
@@ -97,6 +101,7 @@ impl Default for FastBackEndConfig {
             occlusion: OcclusionConfig::default(),
             merging: CleanupConfig::default(),
             crossings: EdgeSplittingConfig::default(),
+            regularities: RegularitiesConfig::default(),
         }
     }
 }
@@ -155,6 +160,8 @@ pub struct FastBackEndReport {
     pub junctions: usize,
     /// Edges of the result.
     pub edges: usize,
+    /// What each step that ran added and removed, in their order.
+    pub steps: Vec<StepReport>,
 }
 
 /// Builds the wireframe.
@@ -179,6 +186,27 @@ pub fn run(
     scene_radius: f64,
     config: &FastBackEndConfig,
 ) -> FastBackEndResult {
+    run_observed(
+        observations,
+        proposals,
+        perceived_junctions,
+        surface,
+        scene_radius,
+        config,
+        &mut |_| {},
+    )
+}
+
+/// [`run`] that tells `on_step` of every step as soon as it is done.
+pub fn run_observed(
+    observations: &[ViewObservation],
+    proposals: &[SegmentProposal],
+    perceived_junctions: &[Vector3<f64>],
+    surface: &dyn SignedDistance,
+    scene_radius: f64,
+    config: &FastBackEndConfig,
+    on_step: &mut dyn FnMut(&StepReport),
+) -> FastBackEndResult {
     if !(scene_radius.is_normal() && scene_radius > 0.0) {
         return FastBackEndResult::default();
     }
@@ -198,15 +226,19 @@ pub fn run(
         proposals: &proposals,
         config,
     };
-    let mut report = FastBackEndReport {
-        usable_views: views.len(),
-        usable_proposals: proposals.len(),
-        required_views: back_end.required_views,
-        ..Default::default()
+    let mut record = Record {
+        report: FastBackEndReport {
+            usable_views: views.len(),
+            usable_proposals: proposals.len(),
+            required_views: back_end.required_views,
+            ..Default::default()
+        },
+        on_step,
     };
-    let junctions = back_end.find_junctions(&perceived, &mut report);
-    let (junctions, edges) = back_end.find_edges(junctions, &mut report);
+    let junctions = back_end.find_junctions(&perceived, &mut record);
+    let (junctions, edges) = back_end.find_edges(junctions, &mut record);
     let (junctions, edges) = canonical_order(junctions, edges);
+    let mut report = record.report;
     report.junctions = junctions.len();
     report.edges = edges.len();
     FastBackEndResult {
@@ -216,6 +248,40 @@ pub fn run(
         },
         edges: edges.iter().map(|edge| back_end.evidence(edge)).collect(),
         report,
+    }
+}
+
+/// The growing report, and who wants to hear of it.
+struct Record<'a> {
+    report: FastBackEndReport,
+    on_step: &'a mut dyn FnMut(&StepReport),
+}
+
+impl Record<'_> {
+    fn push(&mut self, step: StepReport) {
+        (self.on_step)(&step);
+        self.report.steps.push(step);
+    }
+
+    /// A step on junctions that have no edges yet.
+    fn push_junctions(&mut self, step: Step, before: usize, after: usize) {
+        let [before, after] = [before, after].map(|junctions| GraphSize {
+            junctions,
+            edges: 0,
+        });
+        self.push(StepReport::from_sizes(step, before, after));
+    }
+
+    /// A step that chose edges anew.
+    fn push_edges(
+        &mut self,
+        step: Step,
+        junctions: usize,
+        before: &[SupportedEdge],
+        after: &[SupportedEdge],
+    ) {
+        let [before, after] = [before, after].map(pairs_of);
+        self.push(StepReport::from_edges(step, junctions, &before, &after));
     }
 }
 
@@ -230,26 +296,26 @@ struct BackEnd<'a> {
 
 impl BackEnd<'_> {
     /// Candidates from the proposals' ends, re-triangulated.
-    fn find_junctions(
-        &self,
-        perceived: &[Vector3<f64>],
-        report: &mut FastBackEndReport,
-    ) -> SplitJunctions {
+    fn find_junctions(&self, perceived: &[Vector3<f64>], record: &mut Record) -> SplitJunctions {
         let config = self.config;
         let ends = segment_ends(self.views, self.proposals, &config.ends);
-        report.segment_ends = ends.len();
+        record.report.segment_ends = ends.len();
 
         let mut junctions = Vec::new();
         if config.use_junction_modes {
             junctions = junction_modes(&ends, &config.modes);
+            record.push_junctions(Step::JunctionModes, 0, junctions.len());
         }
-        report.junction_modes = junctions.len();
+        record.report.junction_modes = junctions.len();
         if config.use_perceived_junctions {
+            let before = junctions.len();
             let added = supported_junctions(perceived, &ends, &junctions, &config.modes);
-            report.added_perceived_junctions = added.len();
+            record.report.added_perceived_junctions = added.len();
             junctions.extend(added);
+            record.push_junctions(Step::PerceivedJunctions, before, junctions.len());
         }
         if config.retriangulation {
+            let before = junctions.len();
             junctions = retriangulate(
                 &junctions,
                 &ends,
@@ -257,8 +323,9 @@ impl BackEnd<'_> {
                 self.required_views,
                 &config.triangulation,
             );
+            record.push_junctions(Step::Retriangulation, before, junctions.len());
         }
-        report.triangulated_junctions = junctions.len();
+        record.report.triangulated_junctions = junctions.len();
         let mut split = SplitJunctions {
             junctions,
             ..SplitJunctions::default()
@@ -267,6 +334,7 @@ impl BackEnd<'_> {
             config.junction_splitting,
             config.triangulation.rounds.first(),
         ) {
+            let before = split.junctions.len();
             let observations = associate(&split.junctions, &ends, self.views, round);
             split = split_junctions(
                 &split.junctions,
@@ -276,8 +344,10 @@ impl BackEnd<'_> {
                 &config.triangulation,
                 &config.splitting,
             );
+            let after = split.junctions.len();
+            record.report.split_junctions = after - before;
+            record.push_junctions(Step::JunctionSplitting, before, after);
         }
-        report.split_junctions = split.junctions.len() - report.triangulated_junctions;
         split
     }
 
@@ -289,44 +359,69 @@ impl BackEnd<'_> {
             mut junctions,
             told_apart,
         }: SplitJunctions,
-        report: &mut FastBackEndReport,
+        record: &mut Record,
     ) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
         let config = self.config;
         let hypotheses = (!config.edge_completion)
             .then(|| attraction_hypotheses(&junctions, self.proposals, &config.attraction));
         let mut edges = self.supported_edges(&junctions, hypotheses);
-        report.supported_edges = edges.len();
+        record.report.supported_edges = edges.len();
+        record.push_edges(Step::Edges, junctions.len(), &[], &edges);
 
         if config.bundle_adjustment {
             for association in &config.adjustment.association_in_pixels {
                 junctions = self.adjust(&junctions, &edges, *association);
             }
+            record.push_edges(Step::BundleAdjustment, junctions.len(), &edges, &edges);
             // Junctions have moved: pairs that just failed may pass now, and the
             // other way round.
             let hypotheses = (!config.edge_completion).then(|| pairs_of(&edges));
-            edges = self.supported_edges(&junctions, hypotheses);
+            let chosen = self.supported_edges(&junctions, hypotheses);
+            record.push_edges(Step::EdgesAfterAdjustment, junctions.len(), &edges, &chosen);
+            edges = chosen;
         }
-        report.supported_edges_after_adjustment = edges.len();
+        record.report.supported_edges_after_adjustment = edges.len();
 
         if config.occlusion_test {
-            edges = self.unoccluded(&junctions, edges);
+            let unoccluded = self.unoccluded(&junctions, &edges);
+            record.push_edges(Step::OcclusionTest, junctions.len(), &edges, &unoccluded);
+            edges = unoccluded;
         }
-        report.unoccluded_edges = edges.len();
+        record.report.unoccluded_edges = edges.len();
 
         if config.cleanup {
+            let before = size_of(&junctions, &edges);
             (junctions, edges) = clean_up(&junctions, &edges, &told_apart, &config.merging);
+            let after = size_of(&junctions, &edges);
+            record.push(StepReport::from_sizes(Step::CleanUp, before, after));
         }
         if config.bundle_adjustment {
             let association = config.adjustment.final_association_in_pixels;
             junctions = self.adjust(&junctions, &edges, association);
+            record.push_edges(Step::FinalAdjustment, junctions.len(), &edges, &edges);
+        }
+        if config.regularities.is_on() {
+            junctions = adjust_with_regularities(
+                self.views,
+                &junctions,
+                &pairs_of(&edges),
+                config.adjustment.final_association_in_pixels,
+                &config.adjustment,
+                &config.regularities,
+            );
+            record.push_edges(Step::Regularities, junctions.len(), &edges, &edges);
         }
         if config.edge_splitting {
+            let before = size_of(&junctions, &edges);
             (junctions, edges) = split_edges(&junctions, &edges, &config.crossings);
+            let after = size_of(&junctions, &edges);
+            record.push(StepReport::from_sizes(Step::EdgeSplitting, before, after));
         }
         (junctions, edges)
     }
 
-    /// The pairs with enough support: among `hypotheses`, or among all.
+    /// The pairs with enough support: among `hypotheses`, which are sorted, or
+    /// among all.
     fn supported_edges(
         &self,
         junctions: &[Vector3<f64>],
@@ -334,14 +429,10 @@ impl BackEnd<'_> {
     ) -> Vec<SupportedEdge> {
         let config = &self.config.support;
         let required = self.required_views;
-        let edges = match hypotheses {
-            None => complete_edges(self.views, junctions, required, config),
-            Some(hypotheses) => {
-                let mut edges = edge_support(self.views, junctions, &hypotheses, config);
-                edges.retain(|edge| edge.support >= required);
-                edges
-            }
-        };
+        let mut edges = complete_edges(self.views, junctions, required, config);
+        if let Some(hypotheses) = hypotheses {
+            edges.retain(|edge| hypotheses.binary_search(&edge.junctions).is_ok());
+        }
         if self.config.exclusive_support {
             exclusively_supported(self.views, junctions, &edges, required, config)
         } else {
@@ -368,18 +459,18 @@ impl BackEnd<'_> {
     fn unoccluded(
         &self,
         junctions: &[Vector3<f64>],
-        edges: Vec<SupportedEdge>,
+        edges: &[SupportedEdge],
     ) -> Vec<SupportedEdge> {
         let config = &self.config.occlusion;
         let visible = visible_views(
             self.views,
             junctions,
-            &pairs_of(&edges),
+            &pairs_of(edges),
             &self.surface,
             config,
         );
         edges
-            .into_iter()
+            .iter()
             .zip(visible)
             .filter(|(edge, visible)| {
                 config.support_ratio(edge.support, *visible, self.views.len())
@@ -387,7 +478,7 @@ impl BackEnd<'_> {
             })
             .map(|(edge, visible)| SupportedEdge {
                 visible_views: Some(visible),
-                ..edge
+                ..*edge
             })
             .collect()
     }
@@ -402,6 +493,13 @@ impl BackEnd<'_> {
             visible_views: edge.visible_views,
             support_ratio: edge.visible_views.map(ratio),
         }
+    }
+}
+
+fn size_of(junctions: &[Vector3<f64>], edges: &[SupportedEdge]) -> GraphSize {
+    GraphSize {
+        junctions: junctions.len(),
+        edges: edges.len(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Junction candidates: the modes of the density of segment ends, and the
 //! perceived junctions that segment ends support.
 
+use crate::point_grid::{GrowingPointGrid, PointGrid, one_per_cell};
 use crate::point_index::PointIndex;
 use crate::segment_ends::SegmentEnd;
 use nalgebra::Vector3;
@@ -10,6 +11,10 @@ use serde::{Deserialize, Serialize};
 /// Ends farther than this many sigmas from a point weigh less than 0.0004 of a
 /// near one: leaving them out makes the search near-linear.
 const KERNEL_RADIUS_IN_SIGMAS: f64 = 4.0;
+
+/// Of the ends in a cube of this side one starts a search: more would climb the
+/// same hill, and the time would grow with the square of the number of views.
+const START_CELL_IN_SIGMAS: f64 = 1.0;
 
 /// Settings of [`junction_modes`] and [`supported_junctions`]; lengths in world
 /// units.
@@ -22,7 +27,7 @@ pub struct JunctionModesConfig {
     pub separation: f64,
     /// A mode needs more kernel-weighted mass than this: about two good ends.
     pub min_mass: f64,
-    /// Mean shift steps from every end.
+    /// Mean shift steps of every search.
     pub iterations: usize,
     /// A perceived junction is supported by the ends closer than this.
     pub perceived_radius: f64,
@@ -45,13 +50,15 @@ impl Default for JunctionModesConfig {
 
 /// The modes of the weighted density of `ends`, heaviest first.
 ///
-/// Mean shift from every end; of modes closer than the separation the heaviest
-/// stays.
+/// Mean shift from ends in all places; of modes closer than the separation the
+/// heaviest stays.
 pub fn junction_modes(ends: &[SegmentEnd], config: &JunctionModesConfig) -> Vec<Vector3<f64>> {
-    let index = PointIndex::new(ends.iter().map(|end| end.position).collect());
-    let modes = ends
+    let positions = ends.iter().map(|end| end.position);
+    let grid = PointGrid::new(positions.clone(), KERNEL_RADIUS_IN_SIGMAS * config.sigma);
+    let starts = one_per_cell(positions, START_CELL_IN_SIGMAS * config.sigma);
+    let modes = starts
         .par_iter()
-        .map(|end| climb(end.position, ends, &index, config))
+        .map(|start| climb(*start, ends, &grid, config))
         .collect();
     separated(modes, config.min_mass, config.separation, &[])
 }
@@ -91,19 +98,18 @@ pub fn supported_junctions(
 fn climb(
     start: Vector3<f64>,
     ends: &[SegmentEnd],
-    index: &PointIndex<3>,
+    grid: &PointGrid,
     config: &JunctionModesConfig,
 ) -> (Vector3<f64>, f64) {
+    let by_squared_distance = -0.5 / (config.sigma * config.sigma);
     let kernel_sums = |at: &Vector3<f64>| {
         let mut mass = 0.0;
         let mut weighted_sum = Vector3::zeros();
-        for near in index.within(at, KERNEL_RADIUS_IN_SIGMAS * config.sigma) {
-            let end = &ends[near.index];
-            let sigmas = near.distance / config.sigma;
-            let kernel = end.weight * (-0.5 * sigmas * sigmas).exp();
+        grid.for_each_within(at, |index, position, squared_distance| {
+            let kernel = ends[index].weight * (by_squared_distance * squared_distance).exp();
             mass += kernel;
-            weighted_sum += kernel * end.position;
-        }
+            weighted_sum += kernel * position;
+        });
         (mass, weighted_sum)
     };
     let mut mode = start;
@@ -127,11 +133,16 @@ fn separated(
     candidates.retain(|(_, mass)| *mass > min_mass);
     // A stable sort: of equal masses the first comes first.
     candidates.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut accepted: Vec<Vector3<f64>> = Vec::new();
+    let mut grid = GrowingPointGrid::new(separation);
+    for position in present {
+        grid.push(*position);
+    }
+    let mut accepted = Vec::new();
     for (position, _) in candidates {
-        let mut others = present.iter().chain(&accepted);
-        if others.all(|other| (position - other).norm() > separation) {
+        let near = grid.first_near(&position, |_, distance| distance <= separation);
+        if near.is_none() {
             accepted.push(position);
+            grid.push(position);
         }
     }
     accepted

@@ -27,17 +27,24 @@ pub mod occlusion;
 pub mod paper_back_end;
 pub mod projection;
 pub mod proposal;
+pub mod regularities;
 pub mod robust_segments;
 pub mod segment_ends;
 pub mod segment_matching;
 pub mod signed_distance;
+pub mod step_report;
 pub mod supported_truth;
 pub mod triangulation;
 pub mod validity;
 pub mod visibility;
 
+mod alignments;
+mod block_cholesky;
 mod evidence;
+mod point_grid;
 mod point_index;
+mod pulls;
+mod segment_grid;
 
 pub use neat_core::Wireframe3d;
 pub use observation::ViewObservation;

@@ -1,6 +1,7 @@
 //! Junctions re-estimated from the 2D ends that belong to them.
 
 use crate::ViewObservation;
+use crate::point_grid::GrowingPointGrid;
 use crate::point_index::PointIndex;
 use crate::projection::{project_in_front, project_with_jacobian};
 use crate::segment_ends::SegmentEnd;
@@ -208,13 +209,13 @@ fn select(
     });
     // A stable sort: of equally seen junctions the first comes first.
     candidates.sort_by_key(|candidate| std::cmp::Reverse(candidate.views));
-    let mut kept: Vec<Vector3<f64>> = Vec::new();
+    let mut kept = Vec::new();
+    let mut grid = GrowingPointGrid::new(config.separation);
     for Candidate { position, .. } in candidates {
-        if kept
-            .iter()
-            .all(|other| (position - other).norm() > config.separation)
-        {
+        let near = grid.first_near(&position, |_, distance| distance <= config.separation);
+        if near.is_none() {
             kept.push(position);
+            grid.push(position);
         }
     }
     kept

@@ -106,10 +106,19 @@ impl SyntheticScene {
                 2.0 * size,
             ),
         ];
+        SyntheticError::first_outside(&ranges)
+    }
+}
+
+impl SyntheticError {
+    /// Checks fields given as name, value, smallest and largest possible value.
+    pub(super) fn first_outside(
+        ranges: &[(&'static str, f64, f64, f64)],
+    ) -> Result<(), SyntheticError> {
         ranges
-            .into_iter()
+            .iter()
             .find(|(_, value, min, max)| !(min..=max).contains(&value))
-            .map_or(Ok(()), |(field, value, min, max)| {
+            .map_or(Ok(()), |&(field, value, min, max)| {
                 Err(SyntheticError {
                     field,
                     value,
