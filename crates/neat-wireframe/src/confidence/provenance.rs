@@ -338,7 +338,7 @@ mod tests {
         let edge = segment(0.0, 0.0, 100.0, 0.0);
         assert!(fit(&edge, &segment(90.0, 1.0, 10.0, -0.5), &config).is_some());
         for other in [
-            segment(10.0, 4.0, 90.0, 4.0),
+            segment(10.0, 4.5, 90.0, 4.5),
             segment(50.0, -2.0, 52.0, 2.9),
             segment(95.0, 0.0, 150.0, 0.0),
             segment(50.0, 0.0, 50.0, 0.0),

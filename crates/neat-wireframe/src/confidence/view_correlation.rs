@@ -12,7 +12,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 /// Views farther apart than this many bins are taken for independent.
-const BINS: usize = 4;
+const BINS: usize = 6;
 const BIN_IN_DEGREES: f64 = 15.0;
 /// At most so many views of a junction are compared with each other, so that time
 /// stays linear.
@@ -37,19 +37,29 @@ pub(super) struct ViewCorrelation {
 }
 
 impl ViewCorrelation {
-    /// From the views of all junctions and the junctions' covariances.
+    /// From the views of all junctions and the junctions' covariances, as they were
+    /// if views were independent.
     pub(super) fn estimate(views: &[Vec<JunctionView>], covariances: &[Matrix3<f64>]) -> Self {
+        /// What adjustment took up depends on the correlation itself.
+        const ROUNDS: usize = 3;
+        let mut found = Self { bins: [0.0; BINS] };
+        for _ in 0..ROUNDS {
+            found = found.refined(views, covariances);
+        }
+        found
+    }
+
+    fn refined(&self, views: &[Vec<JunctionView>], covariances: &[Matrix3<f64>]) -> Self {
         let mut sums = [0.0; BINS];
         let mut counts = [0.0; BINS];
         for (views, covariance) in views.iter().zip(covariances) {
+            let covariance = covariance * self.design_effect(views);
             for [a, b] in pairs(views) {
                 if let Some(bin) = bin(a, b) {
-                    // Adjustment makes the residuals of independent views correlate
-                    // by the second term.
-                    let parameters =
-                        (a.by_junction * covariance * b.by_junction.transpose()).trace();
+                    // Adjustment takes this from the common errors.
+                    let taken = (a.by_junction * covariance * b.by_junction.transpose()).trace();
                     // Two numbers in each view.
-                    sums[bin] += 0.5 * (a.residual.dot(&b.residual) + parameters);
+                    sums[bin] += 0.5 * (a.residual.dot(&b.residual) + taken);
                     counts[bin] += 1.0;
                 }
             }
