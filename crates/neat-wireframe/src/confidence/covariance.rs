@@ -4,8 +4,8 @@
 //! minimises the squared residuals in units of their standard deviations; its
 //! covariance is the inverse of the information matrix. The wireframe comes from
 //! another estimate, by whichever back end. Best estimates do not correlate with
-//! the differences between them and other unbiased ones (Hausman 1978, following
-//! Rao–Blackwell), so the expected square of the error of what is given is the
+//! the differences between them and other unbiased ones (Hausman 1978),
+//! so the expected square of the error of what is given is the
 //! covariance of the best estimate plus the square of the observed difference. That
 //! is what is reported: a wireframe that ignores the evidence gets the variance
 //! that it deserves, whatever made it.

@@ -9,7 +9,7 @@ use super::config::ProvenanceConfig;
 use crate::ViewObservation;
 use crate::line_tracks::segment_index::SegmentIndex;
 use crate::metrics::visible_projection;
-use neat_core::{LineSegment2, LineSegment3};
+use neat_core::{Camera, LineSegment2, LineSegment3};
 use rayon::prelude::*;
 
 /// A 2D segment that supports an edge.
@@ -231,7 +231,7 @@ fn settle(mut claims: Vec<Claim>) -> Vec<Claim> {
 
 /// The share of the part of an edge within the image that `covered` parameters of
 /// its projection show.
-fn covered_share(camera: &neat_core::Camera, edge: &LineSegment3, covered: &[[f64; 2]]) -> f64 {
+fn covered_share(camera: &Camera, edge: &LineSegment3, covered: &[[f64; 2]]) -> f64 {
     /// Evenly spaced places on the projection that are tested.
     const SAMPLES: usize = 32;
     let Some(projected) = visible_projection(camera, edge) else {
