@@ -8,12 +8,15 @@
 //! Prints one line per noise, number of views, detector and back end: "adjusted"
 //! is the true graph, displaced and brought back by the bundle adjustment of the
 //! fast back end, "given" the displaced graph itself (0.003 per coordinate),
-//! "tracks" what the line-track back end finds.
+//! "tracks" what the line-track back end finds. A second table compares the
+//! probabilities of true and false edges with the truth.
 
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 #[path = "../../tests/confidence/noise.rs"]
 mod noise;
+#[path = "../../tests/confidence/reliability.rs"]
+mod reliability;
 #[path = "../../tests/confidence/scenario.rs"]
 mod scenario;
 
@@ -22,6 +25,7 @@ use neat_core::Wireframe3d;
 use neat_core::synthetic::Solid;
 use neat_wireframe::confidence::{ConfidenceConfig, DetectionNoise, assess};
 use neat_wireframe::line_tracks::{LineTracksConfig, run};
+use reliability::{Bin, bins, brier_score, judged};
 use scenario::{Coverage, Detector, Scene, adjusted, displaced, scene};
 
 const SEEDS: u64 = 2;
@@ -30,6 +34,35 @@ const SEEDS: u64 = 2;
 const MAX_ERROR: f64 = 0.03;
 
 fn main() {
+    print_covariances();
+    println!();
+    print_probabilities();
+}
+
+/// How often edges of one probability exist, where as many false edges have been
+/// added as there are true ones.
+fn print_probabilities() {
+    println!("| views | surface | probability | edges | mean probability | true | Brier score |");
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    for views in [10, 40] {
+        for with_surface in [false, true] {
+            let judged = judged(with_surface, views);
+            let score = brier_score(&judged, |probability| probability);
+            for (index, Bin { count, said, is }) in (0..).zip(bins(&judged)) {
+                if count == 0 {
+                    continue;
+                }
+                let low = 0.2 * f64::from(index);
+                println!(
+                    "| {views} | {with_surface} | {low:.1} to {:.1} | {count} | {said:.3} | {is:.3} | {score:.3} |",
+                    low + 0.2,
+                );
+            }
+        }
+    }
+}
+
+fn print_covariances() {
     println!(
         "| noise | views | detector | wireframe | junctions | without | 50 % | 68 % | 95 % | median sigma | median error | estimated noise |"
     );

@@ -110,6 +110,11 @@ pub struct ExistenceConfig {
     pub max_decoys: usize,
     /// Chance supports an edge in at least this share of the views.
     pub min_coincidence_rate: f64,
+    /// What is seen nowhere has no evidence either: an edge counts as expected in at
+    /// least this share of the views …
+    pub min_expected_share: f64,
+    /// … or this number of them, whichever is less.
+    pub min_expected_views: f64,
     /// Correlation of what two views say about one edge, as bounds of its
     /// estimate. Independent views have 0.
     pub view_correlation: [f64; 2],
@@ -123,7 +128,18 @@ impl Default for ExistenceConfig {
             usual_detection_rate: 0.6,
             max_decoys: 256,
             min_coincidence_rate: 0.01,
+            min_expected_share: 0.2,
+            min_expected_views: 20.0,
             view_correlation: [0.05, 0.5],
         }
+    }
+}
+
+impl ExistenceConfig {
+    /// The number of views out of `views` in which every edge counts as expected.
+    pub(super) fn least_expected_views(&self, views: usize) -> usize {
+        let share = self.min_expected_share.min(1.0) * views as f64;
+        // Saturating: a negative number or none becomes 0.
+        share.min(self.min_expected_views).round() as usize
     }
 }

@@ -4,19 +4,21 @@
 //! minimises the squared residuals in units of their standard deviations; its
 //! covariance is the inverse of the information matrix. The wireframe comes from
 //! another estimate, by whichever back end. Best estimates do not correlate with
-//! the differences between them and other unbiased ones (Hausman 1978, following
-//! Rao–Blackwell), so the expected square of the error of what is given is the
+//! the differences between them and other unbiased ones (Hausman 1978),
+//! so the expected square of the error of what is given is the
 //! covariance of the best estimate plus the square of the observed difference. That
 //! is what is reported: a wireframe that ignores the evidence gets the variance
 //! that it deserves, whatever made it.
 //!
-//! The noise is one per scene, and the squared residuals around each junction say
-//! how much more or less it is there.
+//! The noise is one per scene. The squared residuals around each junction say how
+//! much more or less it is there, and the [`ViewCorrelation`] how much less than
+//! their number the views are worth.
 
 use super::config::CovarianceConfig;
 use super::detected_ends::{DetectedEnd, Shown};
 use super::noise::{DetectionNoise, NoiseKind};
 use super::sparse_cholesky::{BlockCholesky, BlockMatrix};
+use super::view_correlation::{JunctionView, ViewCorrelation};
 use crate::ViewObservation;
 use crate::projection::project_with_jacobian;
 use nalgebra::{Matrix3, Vector2, Vector3};
@@ -84,7 +86,7 @@ pub(super) fn estimate(
         None => vec![None; junctions.len()],
     };
     let max_variance = (config.max_relative_sigma * scene_radius).powi(2);
-    let views = adjustment.views_of_junctions();
+    let views = adjustment.view_counts();
     let determined = |(covariance, views): (Option<Matrix3<f64>>, usize)| {
         covariance.filter(|covariance| {
             views >= config.min_views && largest_eigenvalue(covariance) <= max_variance
@@ -110,6 +112,8 @@ struct Residual {
     kind: NoiseKind,
     /// In pixels: observed minus predicted.
     value: f64,
+    /// Direction in the image along which it is measured.
+    axis: Vector2<f64>,
     /// In pixels: by this it is judged whether the observation is an error.
     magnitude: f64,
     /// Its share of the information, where one end has several residuals.
@@ -157,6 +161,7 @@ impl Adjustment<'_> {
                 let component = |kind: NoiseKind, axis: Vector2<f64>, magnitude: f64| Residual {
                     kind,
                     value: offset.dot(&axis),
+                    axis,
                     magnitude,
                     share: 1.0,
                     by_junctions: [Some((*junction, jacobian.tr_mul(&axis))), None],
@@ -191,6 +196,7 @@ impl Adjustment<'_> {
                     Some(Residual {
                         kind: NoiseKind::Across,
                         value,
+                        axis: across,
                         magnitude: value.abs(),
                         share: (edges.len() as f64).recip(),
                         by_junctions: [
@@ -251,11 +257,15 @@ impl Adjustment<'_> {
         residuals: &[Residual],
         noise: &DetectionNoise,
     ) -> Vec<Option<Matrix3<f64>>> {
+        let covariances = factor.inverse_diagonal();
         let scales = self.local_variances(residuals, noise);
-        (factor.inverse_diagonal().into_iter().enumerate())
+        let views = self.views_of_junctions(best, noise);
+        let correlation = ViewCorrelation::estimate(&views, &covariances);
+        (covariances.into_iter().enumerate())
             .map(|(junction, covariance)| {
+                let scale = scales[junction] * correlation.design_effect(&views[junction]);
                 let difference = best[junction] - self.given[junction];
-                let moment = scales[junction] * covariance + difference * difference.transpose();
+                let moment = scale * covariance + difference * difference.transpose();
                 moment.iter().all(|x| x.is_finite()).then_some(moment)
             })
             .collect()
@@ -288,8 +298,42 @@ impl Adjustment<'_> {
         sums.into_iter().map(variance).collect()
     }
 
+    /// The ends that show each junction, but for errors.
+    fn views_of_junctions(
+        &self,
+        best: &[Vector3<f64>],
+        noise: &DetectionNoise,
+    ) -> Vec<Vec<JunctionView>> {
+        let mut views = vec![Vec::new(); best.len()];
+        for end in self.ends {
+            let Shown::Junction { junction, .. } = end.shows else {
+                continue;
+            };
+            let camera = &self.observations[end.view].camera;
+            let residuals = self.residuals_of_end(end, best);
+            if residuals.is_empty() || !residuals.iter().all(|r| self.is_noise(r, noise)) {
+                continue;
+            }
+            let mut view = JunctionView {
+                toward_camera: (camera.center_in_world - best[junction]).normalize(),
+                residual: Vector3::zeros(),
+                by_junction: Matrix3::zeros(),
+            };
+            for residual in &residuals {
+                let sigma = noise.of(residual.kind);
+                let axis = camera.world_from_camera * residual.axis.push(0.0);
+                view.residual += axis * (residual.value / sigma);
+                for (_, by) in residual.by_junctions.iter().flatten() {
+                    view.by_junction += axis * by.transpose() / sigma;
+                }
+            }
+            views[junction].push(view);
+        }
+        views
+    }
+
     /// The number of views with an observation of each junction or of its edges.
-    fn views_of_junctions(&self) -> Vec<usize> {
+    fn view_counts(&self) -> Vec<usize> {
         let mut views: Vec<Vec<usize>> = vec![Vec::new(); self.given.len()];
         for end in self.ends {
             let mut seen = |junction: usize| views[junction].push(end.view);

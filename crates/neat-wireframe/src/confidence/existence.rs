@@ -7,7 +7,9 @@
 //! is correlated (neighbours see the same occlusion, the same texture), so both
 //! counts follow beta-binomial distributions with mean p and pairwise correlation
 //! ρ of the views. With a common ρ the likelihood ratio grows with every view that
-//! shows the edge, and more slowly than for independent views.
+//! shows the edge, and more slowly than for independent views. Edges that the
+//! surface hides from nearly all views would escape the test; for them n has a
+//! least value.
 //!
 //! p₁, ρ and the share π of true edges come from the edges themselves by
 //! expectation maximisation, with weak priors that decide where there are few.
@@ -23,6 +25,15 @@ pub(super) struct ViewCount {
     pub expected: usize,
 }
 
+impl ViewCount {
+    fn at_least(self, expected: usize) -> Self {
+        Self {
+            expected: self.expected.max(expected),
+            ..self
+        }
+    }
+}
+
 /// The two distributions of counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ExistenceModel {
@@ -34,6 +45,8 @@ pub(super) struct ExistenceModel {
     coincidence_rate: f64,
     /// Of what two views say about one edge.
     view_correlation: f64,
+    /// An edge is expected in at least so many views.
+    least_expected: usize,
 }
 
 /// No model is surer than that.
@@ -44,7 +57,16 @@ const ITERATIONS: usize = 50;
 
 impl ExistenceModel {
     /// From the counts of a wireframe's edges and of decoys.
-    pub(super) fn fit(edges: &[ViewCount], decoys: &[ViewCount], config: &ExistenceConfig) -> Self {
+    ///
+    /// Every edge counts as expected in at least `least_expected` views.
+    pub(super) fn fit(
+        edges: &[ViewCount],
+        decoys: &[ViewCount],
+        least_expected: usize,
+        config: &ExistenceConfig,
+    ) -> Self {
+        let at_least = |count: &ViewCount| count.at_least(least_expected);
+        let edges: Vec<ViewCount> = edges.iter().map(at_least).collect();
         let [shown, expected] = totals(decoys.iter().map(|count| (count, 1.0)));
         // Half a view: nothing seen so far does not mean never.
         let coincidence_rate = within(
@@ -59,6 +81,7 @@ impl ExistenceModel {
             detection_rate: config.usual_detection_rate,
             coincidence_rate,
             view_correlation: low,
+            least_expected,
         };
         model.detection_rate = model.possible_detection_rate(model.detection_rate);
         for _ in 0..ITERATIONS {
@@ -91,6 +114,7 @@ impl ExistenceModel {
     /// The probability that an edge with these counts exists; never 0 or 1, and
     /// never less with more views that show the edge.
     pub(super) fn probability(&self, count: ViewCount) -> f64 {
+        let count = count.at_least(self.least_expected);
         let log_odds = (self.prior / (1.0 - self.prior)).ln()
             + self.log_likelihood(count, self.detection_rate)
             - self.log_likelihood(count, self.coincidence_rate);
@@ -162,7 +186,7 @@ mod tests {
     fn clear_cases_are_clear() {
         let edges = counts(&[(30, 40), (25, 38), (33, 41), (28, 40), (1, 40), (0, 35)]);
         let decoys = counts(&[(0, 40), (1, 38), (0, 30), (0, 41)]);
-        let model = ExistenceModel::fit(&edges, &decoys, &ExistenceConfig::default());
+        let model = ExistenceModel::fit(&edges, &decoys, 0, &ExistenceConfig::default());
         assert!(model.detection_rate > 0.6 && model.coincidence_rate < 0.03);
         for edge in &edges[..4] {
             assert!(model.probability(*edge) > 0.95);
@@ -177,12 +201,15 @@ mod tests {
         // Nobody could see it: nothing speaks for it or against it.
         let unseen = counts(&[(0, 0)])[0];
         assert!((model.probability(unseen) - model.prior).abs() < 1e-12);
+        // Unless no edge is allowed to be seen nowhere.
+        let model = ExistenceModel::fit(&edges, &decoys, 8, &ExistenceConfig::default());
+        assert!(model.probability(unseen) < 0.3);
     }
 
     #[test]
     fn nothing_at_all_leaves_the_prior() {
         let config = ExistenceConfig::default();
-        let model = ExistenceModel::fit(&[], &[], &config);
+        let model = ExistenceModel::fit(&[], &[], 0, &config);
         assert!((model.prior - config.prior).abs() < 1e-12);
     }
 
@@ -200,7 +227,7 @@ mod tests {
                 pairs.into_iter().map(count).collect()
             };
             let (edges, decoys) = (counts(edges), counts(decoys));
-            let model = ExistenceModel::fit(&edges, &decoys, &ExistenceConfig::default());
+            let model = ExistenceModel::fit(&edges, &decoys, 0, &ExistenceConfig::default());
             for expected in [1, 7, 40] {
                 let mut before = 0.0;
                 for showing in 0..=expected {

@@ -35,6 +35,7 @@ mod expected_views;
 mod noise;
 mod provenance;
 mod sparse_cholesky;
+mod view_correlation;
 
 pub use config::{ConfidenceConfig, CovarianceConfig, ExistenceConfig, ProvenanceConfig};
 pub use document::transformed_covariance;
@@ -144,7 +145,9 @@ pub fn assess(
     let found_decoys =
         provenance(&views, &with_decoys, &config.provenance).split_off(segments.len());
     let decoy_counts = count(&decoys, &found_decoys);
-    let model = ExistenceModel::fit(&counts, &decoy_counts, &config.existence);
+    let usable_views = views.iter().flatten().count();
+    let least = config.existence.least_expected_views(usable_views);
+    let model = ExistenceModel::fit(&counts, &decoy_counts, least, &config.existence);
 
     let ends = detected_ends(
         observations,

@@ -9,7 +9,7 @@ use super::config::ProvenanceConfig;
 use crate::ViewObservation;
 use crate::line_tracks::segment_index::SegmentIndex;
 use crate::metrics::visible_projection;
-use neat_core::{LineSegment2, LineSegment3};
+use neat_core::{Camera, LineSegment2, LineSegment3};
 use rayon::prelude::*;
 
 /// A 2D segment that supports an edge.
@@ -231,7 +231,7 @@ fn settle(mut claims: Vec<Claim>) -> Vec<Claim> {
 
 /// The share of the part of an edge within the image that `covered` parameters of
 /// its projection show.
-fn covered_share(camera: &neat_core::Camera, edge: &LineSegment3, covered: &[[f64; 2]]) -> f64 {
+fn covered_share(camera: &Camera, edge: &LineSegment3, covered: &[[f64; 2]]) -> f64 {
     /// Evenly spaced places on the projection that are tested.
     const SAMPLES: usize = 32;
     let Some(projected) = visible_projection(camera, edge) else {
@@ -338,7 +338,7 @@ mod tests {
         let edge = segment(0.0, 0.0, 100.0, 0.0);
         assert!(fit(&edge, &segment(90.0, 1.0, 10.0, -0.5), &config).is_some());
         for other in [
-            segment(10.0, 4.0, 90.0, 4.0),
+            segment(10.0, 4.5, 90.0, 4.5),
             segment(50.0, -2.0, 52.0, 2.9),
             segment(95.0, 0.0, 150.0, 0.0),
             segment(50.0, 0.0, 50.0, 0.0),

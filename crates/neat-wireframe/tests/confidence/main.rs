@@ -5,6 +5,7 @@ mod calibration;
 mod covariances;
 mod documents;
 mod noise;
+mod reliability;
 mod robustness;
 mod scenario;
 mod toy_object;

@@ -56,6 +56,6 @@ fn real_detections_are_covered_reasonably() {
              95 %; median sigma {claimed:.5}, error {error:.5}",
             coverage.junctions,
         );
-        assert!(coverage.undetermined == 0);
+        assert!(coverage.undetermined == 0 && most >= 0.5, "{coverage:?}");
     }
 }
