@@ -190,7 +190,7 @@ pub fn run(
         &config.confirmation,
     );
     report.confirmed_edges = graph.edges.len();
-    drop_isolated(&views, &mut graph, &config.isolation);
+    drop_isolated(&views, &mut graph, min_views, &config.isolation);
     report.accompanied_edges = graph.edges.len();
     clock.end_of("adjustment");
 
