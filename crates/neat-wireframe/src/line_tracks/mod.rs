@@ -28,11 +28,14 @@ mod end_joining;
 mod epipolar_matching;
 mod free_ends;
 mod graph_adjustment;
+mod graph_segmentation;
 mod hypothesis_scoring;
 mod isolated_edges;
 mod junction_graph;
+mod line3d;
 mod line_refinement;
 mod neighbours;
+mod parallel_edges;
 mod projected_line;
 mod report;
 mod segment_index;
@@ -55,7 +58,9 @@ pub use hypothesis_scoring::HypothesisScoringConfig;
 pub use isolated_edges::IsolatedEdgesConfig;
 pub use junction_graph::JunctionGraphConfig;
 pub use line_refinement::LineRefinementConfig;
+pub use line3d::{Line3dConfig, Line3dSegment, line3d, wireframe_of_segments};
 pub use neighbours::NeighboursConfig;
+pub use parallel_edges::ParallelEdgesConfig;
 pub use report::{LineEvidence, LineTracksReport, LineTracksResult, SegmentSupport, StepTiming};
 pub use straight_junctions::StraightJunctionsConfig;
 pub use track_merging::TrackMergingConfig;
@@ -73,6 +78,7 @@ use graph_adjustment::{adjust_graph, noise_in_pixels};
 use hypothesis_scoring::{DepthPrior, score_hypotheses};
 use isolated_edges::drop_isolated;
 use junction_graph::{GraphEdge, JunctionGraph, junction_graph};
+use parallel_edges::merge_parallel;
 use rayon::prelude::*;
 use std::time::Instant;
 use straight_junctions::dissolve_straight;
@@ -195,6 +201,9 @@ pub fn run(
     clock.end_of("adjustment");
 
     let noise = noise_in_pixels(&views, &graph);
+    let merged = merge_parallel(&views, &mut graph, noise, &config.parallel);
+    report.dropped_copies = merged.copies;
+    report.merged_pieces = merged.pieces;
     let joined = join_free_ends(
         &views,
         &mut graph,

@@ -6,7 +6,9 @@
 use neat_core::ground_truth::read_wireframe;
 use neat_core::{LoadOptions, load_scene};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::line_tracks::{LineTracksConfig, run};
+use neat_wireframe::line_tracks::{
+    Line3dConfig, LineTracksConfig, line3d, run, wireframe_of_segments,
+};
 use neat_wireframe::metrics::EvaluationConfig;
 use std::path::PathBuf;
 
@@ -49,4 +51,28 @@ fn the_true_graph_comes_back_and_little_else() {
     // Chords of the round hole are seen by many views too; they are no truth.
     assert!(scores.junctions[0].precision >= 0.8);
     assert!(scores.segments_max[0].precision >= 0.9);
+}
+
+#[test]
+fn the_baseline_finds_most_edges_and_no_graph() {
+    let Some(dir) = toy_dir() else {
+        return;
+    };
+    let scene = load_scene(&dir, &LoadOptions::default()).unwrap().scene;
+    let truth = read_wireframe(&dir.join("gt_wireframe.json")).unwrap();
+    let views = ViewObservation::from_scene(&scene, 0.05);
+    let found = line3d(&views, scene.sphere_radius, &Line3dConfig::default());
+    let wireframe =
+        wireframe_of_segments(&found).map(|junction| scene.original_from_world.apply(junction));
+    let scores = EvaluationConfig {
+        thresholds: vec![0.01],
+        ..Default::default()
+    }
+    .evaluate(&wireframe, Some(&truth), None)
+    .unwrap()
+    .wireframe
+    .unwrap();
+    assert!(scores.segments_max[0].recall >= 0.8);
+    // Each edge has ends of its own: the corners are there several times.
+    assert!(scores.junctions[0].precision < 0.5);
 }
