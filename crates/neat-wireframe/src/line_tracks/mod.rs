@@ -10,7 +10,8 @@
 //! The steps: neighbouring views; candidate partners of every segment by the
 //! epipolar geometry; scores of the 3D positions that they make; one position per
 //! segment by mutual agreement; tracks of segments on one line; merging; a graph
-//! of junctions where 2D vertices join tracks; bundle adjustment of that graph.
+//! of junctions where 2D vertices join tracks; bundle adjustment of that graph;
+//! free ends that meet something, and edges cut where others end on or cross them.
 //! Matching and scoring follow Hofer, Maurer and Bischof, *Efficient 3D scene
 //! abstraction using line segments* (Line3D++, 2017).
 //!
@@ -26,6 +27,7 @@ mod edge_crossings;
 mod edge_splitting;
 mod end_joining;
 mod epipolar_matching;
+mod free_end_search;
 mod free_ends;
 mod graph_adjustment;
 mod graph_segmentation;
@@ -226,6 +228,7 @@ pub fn run(
         &views,
         &mut graph,
         &[joined.on_edges, crossings].concat(),
+        min_views,
         noise,
         &config.refinement,
         &config.splitting,

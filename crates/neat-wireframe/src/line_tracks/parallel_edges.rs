@@ -5,7 +5,6 @@
 //! them by segments of their own.
 
 use super::clustering::view_count;
-use super::free_ends::edges_of_segments;
 use super::graph_adjustment::segment_of_edge;
 use super::junction_graph::{GraphEdge, JunctionGraph};
 use super::projected_line::ProjectedLine;
@@ -133,7 +132,7 @@ fn pairs_with_common_segments(
     graph: &JunctionGraph,
 ) -> Vec<(Vec<SegmentId>, [usize; 2])> {
     let mut common: BTreeMap<[usize; 2], Vec<SegmentId>> = BTreeMap::new();
-    for (view, of_view) in edges_of_segments(views, graph).iter().enumerate() {
+    for (view, of_view) in graph.edges_of_segments(views).iter().enumerate() {
         for (segment, edges) in of_view.iter().enumerate() {
             for (i, a) in edges.iter().enumerate() {
                 for b in &edges[i + 1..] {
