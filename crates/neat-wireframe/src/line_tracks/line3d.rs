@@ -2,16 +2,19 @@
 //! *Efficient 3D scene abstraction using line segments* (Line3D++, 2017), without
 //! junctions, consensus, tracks and adjustment of [`super::run`].
 //!
-//! | their section | here |
+//! The constants are those of the program that its authors published, where this
+//! has the same.
+//!
+//! | step of theirs | here |
 //! | --- | --- |
-//! | 3.1 neighbouring views | by shared sight of points in the scene ball, instead of sparse points in common |
-//! | 3.2 partners by epipolar overlap of at least 0.25 | all of them, instead of the ten best per view |
-//! | 3.3 scores of hypotheses, one partner per view | distances in the partner's image, instead of an angle and a distance in space |
-//! | 3.3 the best hypothesis of every 2D segment | as the weighted mean of the partners that agree |
-//! | 3.4 affinity of partners, both ways, at least 0.25 | the same |
-//! | 3.4 clusters by Felzenszwalb and Huttenlocher's segmentation | the same |
-//! | 3.4 a line through all end points of a cluster, parts that three views show | the same |
-//! | optional replicator diffusion, optional bundle adjustment | left out |
+//! | ten neighbouring views by sparse points in common | by shared sight of points in the scene ball |
+//! | partners by epipolar overlap of at least 0.25, the ten best per view | all of them |
+//! | scores of hypotheses by angle (10°) and distance (2.5 pixels) in space, one partner per view | by distances in the partner's image |
+//! | the best hypothesis of every 2D segment, of score at least 0.75 | the weighted mean of the partners that agree, of score above 1 and in enough views |
+//! | affinity of partners, the smaller of both ways, at least 0.5 | the same, with distances in the images |
+//! | clusters by Felzenszwalb and Huttenlocher's segmentation, scale 3 | the same |
+//! | a line through a cluster, parts that three views show | by the principal axis of all end points |
+//! | optional diffusion, collinearity and bundle adjustment | left out |
 
 use super::epipolar_matching::EpipolarMatchingConfig;
 use super::graph_segmentation::{Link, segment_graph};
@@ -61,7 +64,7 @@ impl Default for Line3dConfig {
             matching: EpipolarMatchingConfig::default(),
             sigma_in_pixels: 2.5,
             sigma_in_degrees: 10.0,
-            min_affinity: 0.25,
+            min_affinity: 0.5,
             clustering_scale: 3.0,
         }
     }
