@@ -127,5 +127,12 @@ pub fn distill_run(
     for stage in [Stage::Distill, Stage::Export] {
         session.manifest.seconds.remove(&stage);
     }
-    session.finish(|session| session.distill(&field))
+    session.forget_distillation_warnings();
+    // How the training ended stays as it is.
+    let result = session.distill(&field);
+    let recorded = session.write_manifest();
+    // Of two errors the first is the cause.
+    let reconstruction = result?;
+    recorded?;
+    Ok(reconstruction)
 }

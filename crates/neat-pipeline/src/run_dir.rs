@@ -4,15 +4,19 @@
 //! config.toml         every choice of the run
 //! manifest.json       what ran, where, on which inputs, and how long
 //! metrics.jsonl       one line of losses every few steps
+//! junctions.jsonl     where the global junctions were, fifty times over the training
 //! checkpoints/        the last two, step-NNNNNNNN.safetensors
 //! wireframe.json      junctions and edges, in the frame of the user's files
 //! wireframe.obj, .ply the same for other programs
 //! wireframe.png       a picture of it
+//! report.html         all of it to look at, with the evidence for every edge
 //! overlays/           the wireframe drawn on some of the photographs
 //! detections/         2D wireframes, where the scene came without
 //! ```
 //!
-//! Every file is complete or not there; `metrics.jsonl` only grows.
+//! `neat render` and `neat export` add `renders/` and `mesh.ply` if they are asked to.
+//! Every file is complete or not there; the logs (`.jsonl`) only grow, but for the
+//! steps that a resumed run takes again.
 
 use crate::config::Config;
 use crate::manifest::Manifest;
@@ -34,6 +38,8 @@ const REPORT: &str = "report.html";
 const CHECKPOINTS: &str = "checkpoints";
 const OVERLAYS: &str = "overlays";
 const DETECTIONS: &str = "detections";
+const RENDERS: &str = "renders";
+const MESH: &str = "mesh.ply";
 const RESULT_FILES: [&str; 4] = [
     "wireframe.json",
     "wireframe.obj",
@@ -162,13 +168,13 @@ impl RunDir {
     }
 
     fn remove_earlier_run(&self) -> Result<(), SceneError> {
-        let files = [CONFIG, MANIFEST, METRICS, JUNCTIONS, REPORT]
+        let files = [CONFIG, MANIFEST, METRICS, JUNCTIONS, REPORT, MESH]
             .iter()
             .chain(&RESULT_FILES);
         for name in files {
             ignore_missing(fs::remove_file(self.root.join(name)), &self.root.join(name))?;
         }
-        for name in [CHECKPOINTS, OVERLAYS, DETECTIONS] {
+        for name in [CHECKPOINTS, OVERLAYS, DETECTIONS, RENDERS] {
             let path = self.root.join(name);
             ignore_missing(fs::remove_dir_all(&path), &path)?;
         }
@@ -256,6 +262,15 @@ impl RunDir {
     /// `report.html`.
     pub fn report(&self) -> PathBuf {
         self.root.join(REPORT)
+    }
+
+    /// Removes `report.html`, if there is one.
+    ///
+    /// # Errors
+    /// If the system refuses.
+    pub fn remove_report(&self) -> Result<(), RunDirError> {
+        let path = self.report();
+        Ok(ignore_missing(fs::remove_file(&path), &path)?)
     }
 
     /// Writes the checkpoint of a step and removes all but the last two.
@@ -391,8 +406,15 @@ mod tests {
             RunDir::create(&root, Existing::Resume),
             Err(RunDirError::NotARun(_))
         ));
+        let ours = [CONFIG, MANIFEST, METRICS, JUNCTIONS, REPORT, MESH];
+        for name in ours.iter().chain(&RESULT_FILES) {
+            fs::write(root.join(name), "old").unwrap();
+        }
+        fs::create_dir(root.join(RENDERS)).unwrap();
         RunDir::create(&root, Existing::Overwrite).unwrap();
-        assert!(!root.join("wireframe.obj").exists());
+        let entries = fs::read_dir(&root).unwrap();
+        let left: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(left, ["notes.txt"]);
         assert_eq!(fs::read(root.join("notes.txt")).unwrap(), b"mine");
 
         assert!(matches!(

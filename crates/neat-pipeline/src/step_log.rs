@@ -77,8 +77,9 @@ pub fn read_log<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, RunDirError>
 }
 
 fn read_text(path: &Path) -> Result<String, RunDirError> {
-    match fs::read_to_string(path) {
-        Ok(text) => Ok(text),
+    match fs::read(path) {
+        // A damaged line is passed over; it must not cost the others.
+        Ok(bytes) => Ok(String::from_utf8_lossy(&bytes).into_owned()),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(String::new()),
         Err(error) => Err(read_error(path, error).into()),
     }

@@ -129,8 +129,9 @@ impl Merging {
 }
 
 /// Where a junction lies on the inside of an edge, removes the edge or its two
-/// parts: the long edge stays if its support is not less than that of either
-/// part, or if nothing else hangs on the junction. Long edges decide first.
+/// parts: the long edge stays alone if its support is not less than that of either
+/// part, or if nothing else hangs on the junction; it goes if both parts are there.
+/// Long edges decide first.
 fn resolve_collinear(
     edges: &mut EdgesByPair,
     junctions: &[Vector3<f64>],
@@ -159,18 +160,17 @@ fn resolve_collinear(
                 continue;
             }
             let parts = [[a.min(c), a.max(c)], [b.min(c), b.max(c)]];
-            let part_support = parts
-                .iter()
-                .filter_map(|part| edges.get(part))
-                .map(|part| part.support)
-                .max()
-                .unwrap_or(0);
+            let supports = parts.map(|part| edges.get(&part).map(|part| part.support));
+            let part_support = supports.iter().flatten().max().copied().unwrap_or(0);
             let something_else_hangs_here = neighbours[c].iter().any(|d| *d != a && *d != b);
             let removed: &[[usize; 2]] =
                 if long_support >= part_support || !something_else_hangs_here {
                     &parts
-                } else {
+                } else if supports.iter().all(Option::is_some) {
                     &[pair]
+                } else {
+                    // Without the long edge there would be a gap.
+                    &[]
                 };
             for [p, q] in removed {
                 edges.remove(&[*p, *q]);
@@ -183,7 +183,11 @@ fn resolve_collinear(
 
 /// The points at most `distance` away from a segment, and some farther ones, by
 /// ascending index.
-fn near_segment(segment: &LineSegment3, index: &PointIndex<3>, distance: f64) -> Vec<usize> {
+pub(crate) fn near_segment(
+    segment: &LineSegment3,
+    index: &PointIndex<3>,
+    distance: f64,
+) -> Vec<usize> {
     // A ball around the whole of a long segment would hold much of the scene.
     let pieces = (segment.length() / (8.0 * distance))
         .ceil()

@@ -12,10 +12,10 @@ use nalgebra::{Vector2, Vector3};
 use neat_core::LineSegment2;
 use rayon::prelude::*;
 
-/// The edges that keep at least `required_views` supporting views when every
-/// detection counts for one edge only: of those it confirms, the one with the
-/// smallest squared distance of the ends, the first of equals. Their support is
-/// that number.
+/// The edges, as they are, that win enough views when every detection counts for one
+/// edge only: of those it confirms, the one with the smallest squared distance of
+/// the ends, the first of equals. Enough are `required_views`, and
+/// [`EdgeSupportConfig::min_exclusive_share`] of the views that support the edge.
 pub fn exclusively_supported(
     views: &[ViewObservation],
     junctions: &[Vector3<f64>],
@@ -68,8 +68,7 @@ fn edges_with_a_detection(
         .iter()
         .filter_map(|detection| {
             let middle = detection.segment.point_at(0.5);
-            let mut near = middles.within(&middle, config.max_end_distance_in_pixels);
-            near.sort_by_key(|near| near.index);
+            let near = middles.within(&middle, config.max_end_distance_in_pixels);
             near.iter()
                 .filter_map(|near| {
                     let misfit = misfit(&projected[near.index], &detection.segment, config)?;

@@ -14,7 +14,6 @@ use crate::attraction_hypotheses::{AttractionHypothesesConfig, attraction_hypoth
 use crate::bundle_adjustment::{BundleAdjustmentConfig, bundle_adjust};
 use crate::cleanup::{CleanupConfig, clean_up};
 use crate::edge_completion::complete_edges;
-use crate::edge_splitting::{EdgeSplittingConfig, split_edges};
 use crate::edge_support::{EdgeSupportConfig, SupportedEdge};
 use crate::evidence::Evidence;
 use crate::exclusive_support::exclusively_supported;
@@ -24,6 +23,7 @@ use crate::occlusion::{OcclusionConfig, visible_views};
 use crate::regularities::{RegularitiesConfig, adjust_with_regularities};
 use crate::segment_ends::{SegmentEndConfig, segment_ends};
 use crate::step_report::{GraphSize, Step, StepReport};
+use crate::touching_edges::{TouchingEdgesConfig, split_touching_edges};
 use crate::triangulation::{TriangulationConfig, associate, retriangulate};
 use crate::{SegmentProposal, SignedDistance, ViewObservation};
 use nalgebra::Vector3;
@@ -40,7 +40,7 @@ pub struct FastBackEndConfig {
     pub use_perceived_junctions: bool,
     /// Re-estimate the junctions from the 2D ends.
     pub retriangulation: bool,
-    /// Split junctions that views show side by side.
+    /// Split junctions that the images tell apart.
     pub junction_splitting: bool,
     /// Test all pairs of junctions as edges; off: those that proposals suggest.
     pub edge_completion: bool,
@@ -73,7 +73,7 @@ pub struct FastBackEndConfig {
     /// Constants of the clean-up.
     pub merging: CleanupConfig,
     /// Constants of the splitting of edges.
-    pub crossings: EdgeSplittingConfig,
+    pub crossings: TouchingEdgesConfig,
     /// Parallel and orthogonal edges, flat faces and straight lines, off by default.
     pub regularities: RegularitiesConfig,
 }
@@ -100,7 +100,7 @@ impl Default for FastBackEndConfig {
             adjustment: BundleAdjustmentConfig::default(),
             occlusion: OcclusionConfig::default(),
             merging: CleanupConfig::default(),
-            crossings: EdgeSplittingConfig::default(),
+            crossings: TouchingEdgesConfig::default(),
             regularities: RegularitiesConfig::default(),
         }
     }
@@ -364,7 +364,7 @@ impl BackEnd<'_> {
         let config = self.config;
         let hypotheses = (!config.edge_completion)
             .then(|| attraction_hypotheses(&junctions, self.proposals, &config.attraction));
-        let mut edges = self.supported_edges(&junctions, hypotheses);
+        let mut edges = self.supported_edges(&junctions, hypotheses.as_deref());
         record.report.supported_edges = edges.len();
         record.push_edges(Step::Edges, junctions.len(), &[], &edges);
 
@@ -375,8 +375,7 @@ impl BackEnd<'_> {
             record.push_edges(Step::BundleAdjustment, junctions.len(), &edges, &edges);
             // Junctions have moved: pairs that just failed may pass now, and the
             // other way round.
-            let hypotheses = (!config.edge_completion).then(|| pairs_of(&edges));
-            let chosen = self.supported_edges(&junctions, hypotheses);
+            let chosen = self.supported_edges(&junctions, hypotheses.as_deref());
             record.push_edges(Step::EdgesAfterAdjustment, junctions.len(), &edges, &chosen);
             edges = chosen;
         }
@@ -413,7 +412,7 @@ impl BackEnd<'_> {
         }
         if config.edge_splitting {
             let before = size_of(&junctions, &edges);
-            (junctions, edges) = split_edges(&junctions, &edges, &config.crossings);
+            (junctions, edges) = split_touching_edges(&junctions, &edges, &config.crossings);
             let after = size_of(&junctions, &edges);
             record.push(StepReport::from_sizes(Step::EdgeSplitting, before, after));
         }
@@ -425,7 +424,7 @@ impl BackEnd<'_> {
     fn supported_edges(
         &self,
         junctions: &[Vector3<f64>],
-        hypotheses: Option<Vec<[usize; 2]>>,
+        hypotheses: Option<&[[usize; 2]]>,
     ) -> Vec<SupportedEdge> {
         let config = &self.config.support;
         let required = self.required_views;

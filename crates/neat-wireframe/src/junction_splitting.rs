@@ -6,8 +6,10 @@
 //! scatter: for each corner they agree on a point in space to a fraction of a
 //! pixel. Sequential consensus finds these points: the point that most views agree
 //! on, then the next one among the ends that are left. A second point counts only
-//! if enough views show an end for it *beside* an end for the first, so that noise
-//! and outliers around one corner do not make two of it.
+//! if it projects farther from the first than noise explains and a good share of
+//! the views that show the one or the other show it, so that noise and outliers
+//! around one corner do not make two of it. Detectors join what lies a few pixels
+//! apart: most views show only one of the two, so none is asked to show both.
 
 use crate::ViewObservation;
 use crate::point_index::PointIndex;
@@ -61,18 +63,21 @@ impl Default for JunctionSplittingConfig {
 pub struct SplitJunctions {
     /// The given junctions, some moved, then those split off.
     pub junctions: Vec<Vector3<f64>>,
-    /// Pairs `[a, b]`, a < b, that views show side by side: not to be merged
-    /// for lying close together.
+    /// Pairs `[a, b]`, a < b, that the images tell apart: not to be merged for lying
+    /// close together.
     pub told_apart: BTreeSet<[usize; 2]>,
 }
 
 /// Splits every junction into the points that its 2D ends agree on.
 ///
 /// - `observations`: for every junction the ends of its neighbourhood.
-/// - `required_views`: in how many views two points must appear side by side, and
-///   how many views a point needs.
+/// - `required_views`: how many views a point needs, at least two.
 ///
-/// A junction of which there is but one stays where it is.
+/// A junction that is not split stays where it is.
+///
+/// # Panics
+/// If there is not one list of observations per junction, or one names a view that
+/// does not exist.
 pub fn split_junctions(
     junctions: &[Vector3<f64>],
     observations: &[Vec<JunctionObservation>],
@@ -92,15 +97,26 @@ pub fn split_junctions(
         triangulation,
         config,
     };
-    let points: Vec<Vec<Vector3<f64>>> = observations
-        .par_iter()
-        .map(|observations| splitter.points_of(observations))
+    let index = PointIndex::new(junctions.to_vec());
+    let points: Vec<Vec<Vector3<f64>>> = (0..junctions.len())
+        .into_par_iter()
+        .map(|junction| {
+            let mut of_junction = observations[junction].clone();
+            // Views are counted by runs of the same one.
+            of_junction.sort_by_key(|seen| seen.view);
+            // A stray end of a neighbour may be the neighbour found once more.
+            let is_own = |point: &Vector3<f64>| {
+                let distance = (point - junctions[junction]).norm();
+                let nearest = index.nearest_within(point, distance);
+                nearest.is_none_or(|nearest| nearest.index == junction)
+            };
+            splitter.points_of(&of_junction, is_own)
+        })
         .collect();
     let mut split = SplitJunctions {
         junctions: junctions.to_vec(),
         told_apart: BTreeSet::new(),
     };
-    let index = PointIndex::new(junctions.to_vec());
     for (junction, points) in points.into_iter().enumerate() {
         let mut points = points.into_iter();
         let Some(first) = points.next() else {
@@ -109,12 +125,6 @@ pub fn split_junctions(
         split.junctions[junction] = first;
         let mut same_mode = vec![junction];
         for point in points {
-            // A stray end of a neighbour may be the neighbour found once more.
-            let own = (point - junctions[junction]).norm();
-            let nearest = index.nearest_within(&point, own);
-            if nearest.is_some_and(|nearest| nearest.index != junction) {
-                continue;
-            }
             let new = split.junctions.len();
             split.junctions.push(point);
             split
@@ -165,9 +175,13 @@ struct Splitter<'a> {
 }
 
 impl Splitter<'_> {
-    /// The points that the ends agree on, if there are two or more that views
-    /// show side by side; the one with most views first.
-    fn points_of(&self, observations: &[JunctionObservation]) -> Vec<Vector3<f64>> {
+    /// The points that the ends, sorted by view, agree on, if there are two or more
+    /// that the images tell apart; the one with most views first.
+    fn points_of(
+        &self,
+        observations: &[JunctionObservation],
+        is_own: impl Fn(&Vector3<f64>) -> bool,
+    ) -> Vec<Vector3<f64>> {
         let mut left = observations.to_vec();
         let mut points: Vec<Vector3<f64>> = Vec::new();
         for _ in 0..self.config.max_junctions {
@@ -176,7 +190,7 @@ impl Splitter<'_> {
             };
             left.retain(|seen| self.distance(seen, &point) >= self.inlier_radius);
             let apart = |other: &Vector3<f64>| self.are_apart(observations, other, &point);
-            if points.iter().all(apart) {
+            if is_own(&point) && points.iter().all(apart) {
                 points.push(point);
             }
         }
@@ -291,18 +305,32 @@ fn direction(camera: &Camera, pixel: &Vector2<f64>) -> Vector3<f64> {
     camera.ray_through(pixel).direction.normalize()
 }
 
-/// At most `count` different pairs below `n`, evenly spread over all of them.
+/// At most `count` different pairs below `n`, as if drawn at random, the same ones
+/// every time.
 fn spread_pairs(n: usize, count: usize) -> impl Iterator<Item = [usize; 2]> {
     let all = n * n.saturating_sub(1) / 2;
-    let taken = all.min(count);
-    (0..taken).map(move |i| {
-        // A fixed stride through the pairs in the order of their distance
-        // visits near and far partners alike.
-        let pair = i * all / taken;
-        let (gap, start) = (pair / n.max(1) + 1, pair % n.max(1));
-        let other = (start + gap) % n;
-        [start.min(other), start.max(other)]
+    // Steps by the golden ratio land far from all earlier ones; a step without a
+    // common divisor meets every pair before it returns to one.
+    let golden = (0.618 * all as f64) as usize;
+    let step = (golden.max(1)..).find(|step| greatest_common_divisor(*step, all) == 1);
+    let step = step.unwrap_or(1);
+    (0..all.min(count)).map(move |i| {
+        let pair = i * step % all;
+        // Pairs by their larger member: 01 02 12 03 13 23 …
+        let mut larger = ((1.0 + (1.0 + 8.0 * pair as f64).sqrt()) / 2.0) as usize;
+        while larger * (larger - 1) / 2 > pair {
+            larger -= 1;
+        }
+        [pair - larger * (larger - 1) / 2, larger]
     })
+}
+
+fn greatest_common_divisor(a: usize, b: usize) -> usize {
+    if b == 0 {
+        a
+    } else {
+        greatest_common_divisor(b, a % b)
+    }
 }
 
 #[cfg(test)]
@@ -408,8 +436,7 @@ mod tests {
             &JunctionSplittingConfig::default(),
         );
         assert_eq!(found.junctions.len(), 2);
-        assert!((found.junctions[0] - corners[0]).norm() < 3e-4);
-        assert_eq!(found.junctions[1], corners[1]);
+        assert_eq!(found.junctions, corners);
     }
 
     #[test]
@@ -420,5 +447,13 @@ mod tests {
         let unique: BTreeSet<_> = pairs.iter().copied().collect();
         assert_eq!((pairs.len(), unique.len()), (6, 6));
         assert_eq!(spread_pairs(1, 9).count() + spread_pairs(0, 9).count(), 0);
+        for n in 2..500 {
+            let pairs: Vec<_> = spread_pairs(n, 200).collect();
+            let unique: BTreeSet<_> = pairs.iter().copied().collect();
+            assert_eq!(unique.len(), pairs.len(), "{n}");
+            assert!(pairs.iter().all(|[a, b]| a < b && *b < n), "{n}");
+            let members: BTreeSet<_> = pairs.iter().flatten().collect();
+            assert!(members.len() >= n.min(100), "{n}: {}", members.len());
+        }
     }
 }

@@ -13,7 +13,7 @@ pub enum Step {
     PerceivedJunctions,
     /// Junctions move to where their 2D ends meet; few-view ones and doubles go.
     Retriangulation,
-    /// Junctions that views show side by side become two or more.
+    /// Junctions that the images tell apart become two or more.
     JunctionSplitting,
     /// Pairs of junctions that detections join become edges.
     Edges,

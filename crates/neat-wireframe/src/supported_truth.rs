@@ -12,7 +12,7 @@
 use crate::projection::project_in_front;
 use crate::segment_matching::match_segment;
 use crate::{ViewObservation, Wireframe3d};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use neat_core::LineSegment2;
 use neat_core::ground_truth::Curve;
 use rayon::prelude::*;
@@ -116,27 +116,36 @@ fn is_covered(
     share >= config.min_coverage
 }
 
-/// For every junction the first one from which no image tells it apart.
+/// For every junction the first one that stands for itself and from which no image
+/// tells it apart.
 fn merge_unresolved(
     junctions: &[Vector3<f64>],
     views: &[ViewObservation],
     config: &SupportedTruthConfig,
 ) -> Vec<usize> {
-    let same = |a: &Vector3<f64>, b: &Vector3<f64>| {
-        views.iter().all(|view| {
-            let projected = Option::zip(
-                project_in_front(&view.camera, a),
-                project_in_front(&view.camera, b),
-            );
-            projected.is_none_or(|(a, b)| (a - b).norm() < config.resolution_in_pixels)
+    let pixels: Vec<Vec<Option<Vector2<f64>>>> = junctions
+        .par_iter()
+        .map(|junction| {
+            let views = views.iter();
+            let pixels = views.map(|view| project_in_front(&view.camera, junction));
+            pixels.collect()
         })
+        .collect();
+    let same = |a: usize, b: usize| {
+        let mut distances = (pixels[a].iter().zip(&pixels[b]))
+            .filter_map(|(a, b)| Some((a.as_ref()? - b.as_ref()?).norm()))
+            .peekable();
+        // What no view shows is told apart by none.
+        distances.peek().is_some() && distances.all(|d| d < config.resolution_in_pixels)
     };
+    let mut kept: Vec<usize> = Vec::new();
     (0..junctions.len())
-        .into_par_iter()
-        .map(|index| {
-            (0..index)
-                .find(|first| same(&junctions[*first], &junctions[index]))
-                .unwrap_or(index)
+        .map(|junction| {
+            let representative = kept.iter().copied().find(|other| same(*other, junction));
+            representative.unwrap_or_else(|| {
+                kept.push(junction);
+                junction
+            })
         })
         .collect()
 }
@@ -326,6 +335,19 @@ mod tests {
         let last = doubled.edges[2];
         doubled.edges.push([8, last[1]]);
         assert_eq!(supported(&doubled, &views), truth);
+    }
+
+    #[test]
+    fn a_junction_that_no_view_shows_stands_for_no_other() {
+        let mut truth = cube_wireframe();
+        // All cameras are within 2.5 and look at the origin.
+        let cameras = [cameras_on_sphere(12)[5]; 5];
+        let views = views_of_edges(&cameras, &truth.junctions, &truth.edges);
+        let behind = 3.0 * cameras[0].center_in_world;
+        truth.junctions.insert(0, behind);
+        truth.edges.iter_mut().flatten().for_each(|end| *end += 1);
+        assert_eq!(supported(&truth, &views), cube_wireframe());
+        assert_eq!(supported(&truth, &[]), Wireframe3d::default());
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::trainer::StepReport;
 use neat_report::{Curve, FactGroup, JunctionSnapshot, PhotographConfig, Report};
 use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::metrics::ImageEvidence;
-use std::path::PathBuf;
+use std::path::{MAIN_SEPARATOR, PathBuf};
 
 impl Session<'_> {
     /// Writes the page; returns its path.
@@ -17,6 +17,9 @@ impl Session<'_> {
         document: WireframeDocument,
         agreement: Option<ImageEvidence>,
     ) -> Result<PathBuf, PipelineError> {
+        let path = self.dir.report();
+        // A page of an earlier result must not stand beside this one.
+        self.dir.remove_report()?;
         let min_score = self.config.data.min_segment_score;
         let photographs = match self.config.distill.overlay {
             OverlayGround::Photo => PhotographConfig::default(),
@@ -39,8 +42,10 @@ impl Session<'_> {
         // The configuration was written as TOML when the run began.
         report.configuration = toml::to_string_pretty(&self.config).unwrap_or_default();
         report.facts = self.facts(&report.document, agreement);
-        report.warnings.clone_from(&self.manifest.warnings);
-        let path = self.dir.report();
+        // The page may be passed on: where the scene lies is nobody's business.
+        let folder = format!("{}{MAIN_SEPARATOR}", self.manifest.scene.display());
+        let warnings = self.manifest.warnings.iter();
+        report.warnings = warnings.map(|text| text.replace(&folder, "")).collect();
         report.write(&path)?;
         Ok(path)
     }
@@ -69,7 +74,7 @@ impl Session<'_> {
             result.extend(explained.into_iter().chain(off));
         }
         let run = vec![
-            ("Scene", manifest.scene.display().to_string()),
+            ("Scene", self.scene.name.clone()),
             ("Preset", manifest.preset.clone()),
             ("Seed", manifest.seed.to_string()),
             ("Steps", manifest.steps.to_string()),

@@ -20,7 +20,17 @@ use std::collections::BTreeMap;
 /// The wireframe is drawn on so many photographs.
 const OVERLAYS: usize = 6;
 
+const NO_EDGES: &str =
+    "the wireframe has no edges: train longer, or look at the 2D wireframes of the scene";
+const NO_REPORT: &str = "there is no report.html";
+
 impl Session<'_> {
+    /// Warnings about an earlier result, which a new one replaces.
+    pub fn forget_distillation_warnings(&mut self) {
+        let warnings = &mut self.manifest.warnings;
+        warnings.retain(|text| text != NO_EDGES && !text.starts_with(NO_REPORT));
+    }
+
     /// Takes the wireframe out of the field and writes it.
     pub fn distill(&mut self, field: &TrainedField) -> Result<Reconstruction, PipelineError> {
         let distilled = self.stage(Stage::Distill, |session| {
@@ -35,17 +45,18 @@ impl Session<'_> {
             Ok(distill(scene, field, config, &mut progress)?)
         })?;
         if distilled.wireframe.edges.is_empty() {
-            self.warn(
-                "the wireframe has no edges: train longer, or look at the 2D wireframes of the scene",
-            );
+            self.warn(NO_EDGES);
         }
         let agreement = agreement(&self.scene, &self.config, &distilled.wireframe);
         let (wireframe, document) = self.stage(Stage::Export, |session| {
             session.export(&distilled, agreement)
         })?;
-        // Last, so that it knows the times and warnings of all stages.
-        let report = self.write_report(document, agreement)?;
-        self.written(report);
+        // Last, so that it knows the times and warnings of all stages. Results
+        // without a page are results nevertheless.
+        match self.write_report(document, agreement) {
+            Ok(report) => self.written(report),
+            Err(error) => self.warn(&format!("{NO_REPORT}: {error}")),
+        }
         Ok(Reconstruction {
             run: self.dir.clone(),
             wireframe,

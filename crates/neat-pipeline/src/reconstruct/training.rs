@@ -60,7 +60,10 @@ impl Session<'_> {
         let mut metrics = StepLog::open(&self.dir.metrics(), trainer.iteration())?;
         let mut junctions = StepLog::open(&self.dir.junctions(), trainer.iteration())?;
         let mut fraction = progress.fraction(trainer.iteration());
-        let mut snapshots = (fraction * JUNCTION_SNAPSHOTS).ceil();
+        let mut snapshots = match trainer.iteration() {
+            0 => 0.0,
+            _ => (fraction * JUNCTION_SNAPSHOTS).floor() + 1.0,
+        };
         while fraction < 1.0 {
             if cancelled.load(Ordering::Relaxed) {
                 let checkpoint = self.save(&trainer, &progress)?;

@@ -4,16 +4,18 @@
 //! Detections run through such places, so nothing before this step knows of them.
 //! In the graph an edge that goes on and one that ends on it share a junction.
 
+use crate::cleanup::near_segment;
 use crate::edge_support::SupportedEdge;
+use crate::point_index::PointIndex;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Settings of [`split_edges`]; lengths in world units.
+/// Settings of [`split_touching_edges`]; lengths in world units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct EdgeSplittingConfig {
+pub struct TouchingEdgesConfig {
     /// Junctions and edges closer than this to an edge touch it.
     pub touch_distance: f64,
     /// Parts shorter than this are not cut off.
@@ -22,7 +24,7 @@ pub struct EdgeSplittingConfig {
     pub min_sine: f64,
 }
 
-impl Default for EdgeSplittingConfig {
+impl Default for TouchingEdgesConfig {
     fn default() -> Self {
         Self {
             touch_distance: 0.004,
@@ -38,21 +40,22 @@ impl Default for EdgeSplittingConfig {
 ///
 /// # Panics
 /// If an edge names a junction that does not exist.
-pub fn split_edges(
+pub fn split_touching_edges(
     junctions: &[Vector3<f64>],
     edges: &[SupportedEdge],
-    config: &EdgeSplittingConfig,
+    config: &TouchingEdgesConfig,
 ) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
     let mut junctions = junctions.to_vec();
     let segments: Vec<LineSegment3> = edges
         .iter()
         .map(|edge| LineSegment3::new(junctions[edge.junctions[0]], junctions[edge.junctions[1]]))
         .collect();
+    let index = PointIndex::new(junctions.clone());
     // On every edge its cuts: where, and at which junction.
     let mut cuts: Vec<Vec<(f64, usize)>> = segments
         .iter()
         .zip(edges)
-        .map(|(segment, edge)| junctions_inside(segment, edge, &junctions, config))
+        .map(|(segment, edge)| junctions_inside(segment, edge, &junctions, &index, config))
         .collect();
     for [a, b] in overlapping_boxes(&segments, config.touch_distance) {
         let Some([t, u]) = crossing(&segments[a], &segments[b], config) else {
@@ -64,21 +67,37 @@ pub fn split_edges(
             };
             cuts[edge].iter().find(near).map(|cut| cut.1)
         };
-        let (on_a, on_b) = (cut_near(a, t), cut_near(b, u));
-        // A junction near the crossing has cut, or ends, one of the edges.
-        let junction = match (on_a, on_b) {
+        match (cut_near(a, t), cut_near(b, u)) {
             (None, None) => {
+                let junction = junctions.len();
                 junctions.push((segments[a].point_at(t) + segments[b].point_at(u)) / 2.0);
-                junctions.len() - 1
+                cuts[a].push((t, junction));
+                cuts[b].push((u, junction));
             }
-            (Some(_), Some(_)) => continue,
-            (Some(junction), None) | (None, Some(junction)) => junction,
-        };
-        if on_a.is_none() {
-            cuts[a].push((t, junction));
-        }
-        if on_b.is_none() {
-            cuts[b].push((u, junction));
+            (Some(_), Some(_)) => {}
+            // A third edge has made a junction here already, on one of the two.
+            (Some(junction), None) => {
+                let cut = cut_at(
+                    &segments[b],
+                    &edges[b],
+                    &cuts[b],
+                    junction,
+                    &junctions,
+                    config,
+                );
+                cuts[b].extend(cut);
+            }
+            (None, Some(junction)) => {
+                let cut = cut_at(
+                    &segments[a],
+                    &edges[a],
+                    &cuts[a],
+                    junction,
+                    &junctions,
+                    config,
+                );
+                cuts[a].extend(cut);
+            }
         }
     }
     let mut by_pair: BTreeMap<[usize; 2], SupportedEdge> = BTreeMap::new();
@@ -105,23 +124,51 @@ pub fn split_edges(
     (junctions, by_pair.into_values().collect())
 }
 
+/// The cut of an edge at a junction, if the junction touches its inside and does not
+/// end or cut it already.
+fn cut_at(
+    segment: &LineSegment3,
+    edge: &SupportedEdge,
+    cuts: &[(f64, usize)],
+    junction: usize,
+    junctions: &[Vector3<f64>],
+    config: &TouchingEdgesConfig,
+) -> Option<(f64, usize)> {
+    let is_new = !edge.junctions.contains(&junction) && cuts.iter().all(|cut| cut.1 != junction);
+    let place = place_inside(segment, &junctions[junction], config);
+    place.filter(|_| is_new).map(|place| (place, junction))
+}
+
+/// Where a point touches the inside of a segment.
+fn place_inside(
+    segment: &LineSegment3,
+    point: &Vector3<f64>,
+    config: &TouchingEdgesConfig,
+) -> Option<f64> {
+    let margin = config.min_length / segment.length();
+    let place = segment.line_parameter(point);
+    let touches = (segment.point_at(place) - point).norm() < config.touch_distance;
+    (touches && place > margin && place < 1.0 - margin).then_some(place)
+}
+
 /// The junctions that touch the inside of an edge, with their place on it, at
 /// least the smallest length apart.
 fn junctions_inside(
     segment: &LineSegment3,
     edge: &SupportedEdge,
     junctions: &[Vector3<f64>],
-    config: &EdgeSplittingConfig,
+    index: &PointIndex<3>,
+    config: &TouchingEdgesConfig,
 ) -> Vec<(f64, usize)> {
     let margin = config.min_length / segment.length();
-    let mut inside: Vec<(f64, usize)> = junctions
-        .iter()
-        .enumerate()
-        .filter(|(index, _)| !edge.junctions.contains(index))
-        .filter_map(|(index, junction)| {
-            let t = segment.line_parameter(junction);
-            let touches = (segment.point_at(t) - junction).norm() < config.touch_distance;
-            (touches && t > margin && t < 1.0 - margin).then_some((t, index))
+    let mut inside: Vec<(f64, usize)> = near_segment(segment, index, config.touch_distance)
+        .into_iter()
+        .filter(|junction| !edge.junctions.contains(junction))
+        .filter_map(|junction| {
+            Some((
+                place_inside(segment, &junctions[junction], config)?,
+                junction,
+            ))
         })
         .collect();
     inside.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -131,7 +178,7 @@ fn junctions_inside(
 
 /// Where two edges touch, as places on each, if both are inside and the edges
 /// are not nearly parallel.
-fn crossing(a: &LineSegment3, b: &LineSegment3, config: &EdgeSplittingConfig) -> Option<[f64; 2]> {
+fn crossing(a: &LineSegment3, b: &LineSegment3, config: &TouchingEdgesConfig) -> Option<[f64; 2]> {
     let (along_a, along_b) = (a.end - a.start, b.end - b.start);
     let normal = along_a.cross(&along_b);
     let squared_norm = normal.norm_squared();
@@ -199,7 +246,8 @@ mod tests {
     }
 
     fn split(junctions: &[Vector3<f64>], edges: &[SupportedEdge]) -> Split {
-        let (junctions, edges) = split_edges(junctions, edges, &EdgeSplittingConfig::default());
+        let (junctions, edges) =
+            split_touching_edges(junctions, edges, &TouchingEdgesConfig::default());
         let edges = edges.iter().map(|e| (e.junctions, e.support)).collect();
         (junctions, edges)
     }
@@ -278,6 +326,49 @@ mod tests {
         assert_eq!(split.len(), 7);
         assert_eq!(edges.len(), 6);
         assert!(edges.iter().all(|(pair, _)| pair[1] == 6));
+    }
+
+    #[test]
+    fn three_edges_that_cross_in_a_small_triangle_make_no_loops() {
+        // Sides of 0.015, 0.015 and 0.025: less than a part may be long.
+        let corners = [
+            at(0.0, 0.0, 0.0),
+            at(0.025, 0.0, 0.0),
+            at(0.0125, 0.0083, 0.0),
+        ];
+        let through = |a: Vector3<f64>, b: Vector3<f64>| {
+            let along = (b - a).normalize();
+            [a - 0.5 * along, b + 0.5 * along]
+        };
+        let lines = [
+            through(corners[0], corners[1]),
+            through(corners[1], corners[2]),
+            through(corners[2], corners[0]),
+        ];
+        for order in [
+            [0, 1, 2],
+            [0, 2, 1],
+            [1, 0, 2],
+            [1, 2, 0],
+            [2, 0, 1],
+            [2, 1, 0],
+        ] {
+            let junctions: Vec<_> = order.iter().flat_map(|line| lines[*line]).collect();
+            let (split, edges) = split(&junctions, &[edge(0, 1, 5), edge(2, 3, 5), edge(4, 5, 5)]);
+            assert!(edges.iter().all(|([a, b], _)| a < b), "{edges:?}");
+            // Every junction that cuts an edge lies on it.
+            for ([a, b], _) in &edges {
+                let part = LineSegment3::new(split[*a], split[*b]);
+                let off = |line: &[Vector3<f64>; 2]| {
+                    let whole = LineSegment3::new(line[0], line[1]);
+                    let distances = part
+                        .ends()
+                        .map(|end| (whole.point_at(whole.line_parameter(&end)) - end).norm());
+                    distances[0].max(distances[1])
+                };
+                assert!(lines.iter().any(|line| off(line) < 0.004));
+            }
+        }
     }
 
     #[test]
