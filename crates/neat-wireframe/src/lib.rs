@@ -7,6 +7,7 @@ pub mod attraction_hypotheses;
 pub mod bundle_adjustment;
 pub mod cleanup;
 pub mod confidence;
+pub mod curved_rims;
 pub mod distance_matrix;
 pub mod edge_completion;
 pub mod edge_splitting;

@@ -3,8 +3,12 @@
 //!
 //! ```text
 //! cargo run --release -p neat-wireframe --example line_tracks -- SCENE \
-//!     [--out DIR] [--overlays DIR] [--config FILE.json] [--truth gt_wireframe.json]
+//!     [--out DIR] [--overlays DIR] [--config FILE.json] [--truth gt_wireframe.json] \
+//!     [--baseline]
 //! ```
+//!
+//! With `--baseline` the segments of `line3d` instead: the plain method of the
+//! paper's comparison, whose settings `--config` has then.
 //!
 //! Writes `wireframe.json`, `.obj` and `.ply` in the frame and the unit of the
 //! scene's own files, and prints what each step kept, how long it took, and how
@@ -18,14 +22,18 @@ use nalgebra::Vector3;
 use neat_core::ground_truth::read_wireframe;
 use neat_core::{LoadOptions, load_scene};
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
-use neat_wireframe::line_tracks::{LineTracksConfig, run};
+use neat_wireframe::line_tracks::{
+    Line3dConfig, LineTracksConfig, line3d, run, wireframe_of_segments,
+};
 use neat_wireframe::metrics::{
     ImageEvidenceConfig, Matching, PointCloud, SegmentDistance, image_evidence, junction_distances,
     precision_recall, segment_distances,
 };
 use neat_wireframe::{ViewObservation, Wireframe3d};
+use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 type AnyError = Box<dyn std::error::Error>;
 
@@ -37,6 +45,7 @@ struct Arguments {
     overlays: Option<PathBuf>,
     config: Option<PathBuf>,
     truth: Option<PathBuf>,
+    baseline: bool,
 }
 
 impl Arguments {
@@ -49,6 +58,10 @@ impl Arguments {
                 Some("--overlays") => &mut parsed.overlays,
                 Some("--config") => &mut parsed.config,
                 Some("--truth") => &mut parsed.truth,
+                Some("--baseline") => {
+                    parsed.baseline = true;
+                    continue;
+                }
                 _ => {
                     parsed.scene = argument.into();
                     continue;
@@ -66,10 +79,6 @@ impl Arguments {
 
 fn main() -> Result<(), AnyError> {
     let arguments = Arguments::parse()?;
-    let config: LineTracksConfig = match &arguments.config {
-        Some(path) => serde_json::from_slice(&std::fs::read(path)?)?,
-        None => LineTracksConfig::default(),
-    };
     let loaded = load_scene(&arguments.scene, &LoadOptions::default())?;
     for warning in &loaded.warnings {
         println!("warning: {warning}");
@@ -77,19 +86,14 @@ fn main() -> Result<(), AnyError> {
     let scene = loaded.scene;
     let observations = ViewObservation::from_scene(&scene, 0.05);
 
-    let result = run(&observations, &[], None, scene.sphere_radius, &config);
-
-    println!("{}", serde_json::to_string_pretty(&result.report)?);
-    let mut total = 0.0;
-    for timing in &result.timings {
-        println!(
-            "{:>12} {:8.3} s",
-            timing.step,
-            timing.duration.as_secs_f64()
-        );
-        total += timing.duration.as_secs_f64();
-    }
-    println!("{:>12} {total:8.3} s", "total");
+    let Reconstruction {
+        wireframe,
+        views_per_edge,
+    } = if arguments.baseline {
+        baseline(&arguments, &observations, scene.sphere_radius)?
+    } else {
+        tracks(&arguments, &observations, scene.sphere_radius)?
+    };
 
     let points: Vec<_> = scene
         .sparse_points
@@ -97,7 +101,7 @@ fn main() -> Result<(), AnyError> {
         .map(|point| point.position_in_world)
         .collect();
     let evidence = image_evidence(
-        &result.wireframe,
+        &wireframe,
         &observations,
         &points,
         &ImageEvidenceConfig::default(),
@@ -107,19 +111,17 @@ fn main() -> Result<(), AnyError> {
         "explained share of segments: {:?}",
         evidence.explained_share()
     );
-    print_graph(&result.wireframe, &points)?;
+    print_graph(&wireframe, &points)?;
     println!(
         "scene radius {:.4}, unit of the files {:.4}",
         scene.sphere_radius, scene.original_from_world.scale
     );
 
-    let wireframe = result
-        .wireframe
-        .map(|junction| scene.original_from_world.apply(junction));
+    let in_files = wireframe.map(|junction| scene.original_from_world.apply(junction));
     if let Some(path) = &arguments.truth {
         let truth = read_wireframe(path)?;
-        let junctions = junction_distances(&wireframe.junctions, &truth.junctions);
-        let (ours, true_ones) = (wireframe.segments(), truth.segments());
+        let junctions = junction_distances(&in_files.junctions, &truth.junctions);
+        let (ours, true_ones) = (in_files.segments(), truth.segments());
         let segments = segment_distances(&ours, &true_ones, SegmentDistance::Max);
         for (name, distances) in [("junctions", junctions), ("segments", segments)] {
             for score in precision_recall(&distances, &[0.01, 0.02, 0.05], Matching::MinimumSum)? {
@@ -130,21 +132,70 @@ fn main() -> Result<(), AnyError> {
             }
         }
     }
-    let views_per_edge: Vec<usize> = result.edges.iter().map(|edge| edge.views).collect();
     if let Some(dir) = &arguments.out {
         std::fs::create_dir_all(dir)?;
-        let mut document = WireframeDocument::from(&wireframe);
+        let mut document = WireframeDocument::from(&in_files);
         let views = views_per_edge.iter().map(|views| *views as f64).collect();
         document.edge_fields.insert("views".into(), views);
         write_json(&dir.join("wireframe.json"), &document)?;
-        write_obj(&dir.join("wireframe.obj"), &wireframe)?;
-        write_ply(&dir.join("wireframe.ply"), &wireframe)?;
+        write_obj(&dir.join("wireframe.obj"), &in_files)?;
+        write_ply(&dir.join("wireframe.ply"), &in_files)?;
     }
     if let Some(dir) = &arguments.overlays {
-        drawing::draw_overlays(dir, &scene, &result.wireframe, &views_per_edge)?;
-        drawing::draw_plans(dir, &result.wireframe)?;
+        drawing::draw_overlays(dir, &scene, &wireframe, &views_per_edge)?;
+        drawing::draw_plans(dir, &wireframe)?;
     }
     Ok(())
+}
+
+/// A wireframe in the world of the cameras.
+struct Reconstruction {
+    wireframe: Wireframe3d,
+    views_per_edge: Vec<usize>,
+}
+
+fn tracks(
+    arguments: &Arguments,
+    observations: &[ViewObservation],
+    scene_radius: f64,
+) -> Result<Reconstruction, AnyError> {
+    let config: LineTracksConfig = read_config(arguments.config.as_deref())?;
+    let result = run(observations, &[], None, scene_radius, &config);
+    println!("{}", serde_json::to_string_pretty(&result.report)?);
+    let mut total = 0.0;
+    for timing in &result.timings {
+        let seconds = timing.duration.as_secs_f64();
+        println!("{:>12} {seconds:8.3} s", timing.step);
+        total += seconds;
+    }
+    println!("{:>12} {total:8.3} s", "total");
+    Ok(Reconstruction {
+        views_per_edge: result.edges.iter().map(|edge| edge.views).collect(),
+        wireframe: result.wireframe,
+    })
+}
+
+fn baseline(
+    arguments: &Arguments,
+    observations: &[ViewObservation],
+    scene_radius: f64,
+) -> Result<Reconstruction, AnyError> {
+    let config: Line3dConfig = read_config(arguments.config.as_deref())?;
+    let start = Instant::now();
+    let segments = line3d(observations, scene_radius, &config);
+    let seconds = start.elapsed().as_secs_f64();
+    println!("{} segments in {seconds:.3} s", segments.len());
+    Ok(Reconstruction {
+        wireframe: wireframe_of_segments(&segments),
+        views_per_edge: segments.iter().map(|segment| segment.views).collect(),
+    })
+}
+
+fn read_config<T: DeserializeOwned + Default>(path: Option<&Path>) -> Result<T, AnyError> {
+    Ok(match path {
+        Some(path) => serde_json::from_slice(&std::fs::read(path)?)?,
+        None => T::default(),
+    })
 }
 
 /// What kind of graph it is, and how far its junctions are from points on the

@@ -4,12 +4,15 @@
 //! uncertain in depth while its images are sharp. Whether two lines meet must
 //! therefore be asked of their images, not of a distance in space.
 
+use super::graph_adjustment::segment_of_edge;
+use super::junction_graph::JunctionGraph;
 use super::line_refinement::{LineRefinementConfig, directions_across, normal_equations};
 use super::projected_line::ProjectedLine;
 use super::view_segments::{SegmentId, TrackView};
 use crate::projection::project_in_front;
 use nalgebra::{Matrix3, Matrix3x2, Matrix4, Vector3};
 use neat_core::LineSegment3;
+use rayon::prelude::*;
 
 /// No line is less certain than this, in pixels at its own depth: keeps lines that
 /// their views do not determine apart from those that nothing determines.
@@ -94,6 +97,22 @@ impl CertainLine {
     pub(super) fn distance_in_pixels(&self, views: &[TrackView], point: &Vector3<f64>) -> f64 {
         mean_distance_in_pixels(views, &self.views, &self.line, point)
     }
+}
+
+/// Every edge with its certainty.
+pub(super) fn certain_lines(
+    views: &[TrackView],
+    graph: &JunctionGraph,
+    refinement: &LineRefinementConfig,
+) -> Vec<Option<CertainLine>> {
+    graph
+        .edges
+        .par_iter()
+        .map(|edge| {
+            let line = segment_of_edge(graph, edge);
+            CertainLine::new(views, &edge.supports, &line, refinement)
+        })
+        .collect()
 }
 
 /// Mean distance in pixels of a point's image from a line's over some views.

@@ -12,6 +12,7 @@ use super::isolated_edges::IsolatedEdgesConfig;
 use super::junction_graph::JunctionGraphConfig;
 use super::line_refinement::LineRefinementConfig;
 use super::neighbours::NeighboursConfig;
+use super::parallel_edges::ParallelEdgesConfig;
 use super::straight_junctions::StraightJunctionsConfig;
 use super::track_merging::TrackMergingConfig;
 use crate::occlusion::OcclusionConfig;
@@ -51,6 +52,8 @@ pub struct LineTracksConfig {
     pub confirmation: EdgeConfirmationConfig,
     /// Which edges float alone.
     pub isolation: IsolatedEdgesConfig,
+    /// Which edges are copies or pieces of others.
+    pub parallel: ParallelEdgesConfig,
     /// Which free ends meet something.
     pub free_ends: FreeEndsConfig,
     /// Which junctions cut an edge.
@@ -80,6 +83,7 @@ impl Default for LineTracksConfig {
             adjustment: GraphAdjustmentConfig::default(),
             confirmation: EdgeConfirmationConfig::default(),
             isolation: IsolatedEdgesConfig::default(),
+            parallel: ParallelEdgesConfig::default(),
             free_ends: FreeEndsConfig::default(),
             splitting: EdgeSplittingConfig::default(),
             occlusion_test: false,

@@ -1,9 +1,8 @@
 //! Edges that cross each other on the inside of both, such as the bars of a
 //! window: the crossing is a junction too.
 
-use super::certain_line::{CertainLine, meeting};
+use super::certain_line::{CertainLine, certain_lines, meeting};
 use super::edge_splitting::{EdgeSplittingConfig, Split};
-use super::free_ends::{certain_lines, edges_of_segments};
 use super::junction_graph::JunctionGraph;
 use super::line_refinement::LineRefinementConfig;
 use super::track_merging::project_segment;
@@ -28,7 +27,7 @@ pub(super) fn add_crossings(
         return Vec::new();
     }
     let lines = certain_lines(views, graph, refinement);
-    let edges_of = edges_of_segments(views, graph);
+    let edges_of = graph.edges_of_segments(views);
     let max_miss = config.max_crossing_miss_in_noise * noise_in_pixels;
     let found: Vec<Vec<(usize, Vector3<f64>)>> = (0..lines.len())
         .into_par_iter()

@@ -1,8 +1,8 @@
 //! Cuts edges at the junctions that lie on their inside: bars of a window, steps
 //! at a wall.
 
-use super::certain_line::{CertainLine, mean_distance_in_pixels};
-use super::free_ends::{certain_lines, edges_of_segments};
+use super::certain_line::{CertainLine, certain_lines, mean_distance_in_pixels};
+use super::clustering::view_count;
 use super::junction_graph::{GraphEdge, JunctionGraph};
 use super::line_refinement::{LineRefinementConfig, shown_interval};
 use super::view_segments::{SegmentId, TrackView};
@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct EdgeSplittingConfig {
-    /// Junctions on the inside of an edge cut it.
+    /// Junctions on the inside of an edge cut it; if not, edges stay whole.
     pub enabled: bool,
     /// Such a junction lies this near to the edge in the images, as a multiple of
     /// the noise of the 2D segments.
@@ -66,16 +66,18 @@ pub(super) fn split_edges(
     views: &[TrackView],
     graph: &mut JunctionGraph,
     on_edges: &[Split],
+    min_views: usize,
     noise_in_pixels: f64,
     refinement: &LineRefinementConfig,
     config: &EdgeSplittingConfig,
 ) -> usize {
-    let lines = certain_lines(views, graph, refinement);
-    let mut splits = on_edges.to_vec();
-    if config.enabled {
-        let max_distance = config.max_distance_in_noise * noise_in_pixels;
-        splits.extend(touching(views, graph, &lines, max_distance, config));
+    if !config.enabled {
+        return 0;
     }
+    let lines = certain_lines(views, graph, refinement);
+    let max_distance = config.max_distance_in_noise * noise_in_pixels;
+    let mut splits = touching(views, graph, &lines, max_distance, config);
+    splits.extend(on_edges);
     splits.sort_unstable();
     splits.dedup();
 
@@ -92,7 +94,7 @@ pub(super) fn split_edges(
             None => Vec::new(),
         };
         cut += usize::from(!places.is_empty());
-        pieces.extend(cut_edge(views, graph, edge, &places));
+        pieces.extend(cut_edge(views, graph, edge, &places, min_views));
     }
     let mut edges: BTreeMap<[usize; 2], Vec<SegmentId>> = BTreeMap::new();
     for piece in pieces {
@@ -126,7 +128,7 @@ fn touching(
     max_distance: f64,
     config: &EdgeSplittingConfig,
 ) -> Vec<Split> {
-    let edges_of = edges_of_segments(views, graph);
+    let edges_of = graph.edges_of_segments(views);
     let mut edges_at: Vec<Vec<usize>> = vec![Vec::new(); graph.junctions.len()];
     for (edge, of_graph) in graph.edges.iter().enumerate() {
         for junction in of_graph.junctions {
@@ -222,12 +224,14 @@ fn inner_places(
 }
 
 /// The pieces between an edge's ends and the junctions on it, each with the 2D
-/// segments that show it.
+/// segments that show it. Pieces that too few views show, such as what runs past a
+/// corner, are left out.
 fn cut_edge(
     views: &[TrackView],
     graph: &JunctionGraph,
     edge: &GraphEdge,
     places: &[usize],
+    min_views: usize,
 ) -> Vec<GraphEdge> {
     if places.is_empty() {
         return vec![edge.clone()];
@@ -251,6 +255,7 @@ fn cut_edge(
                 supports: edge.supports.iter().copied().filter(shows).collect(),
             }
         })
+        .filter(|piece| view_count(&piece.supports) >= min_views)
         .collect()
 }
 
@@ -314,7 +319,7 @@ mod tests {
                 ..Default::default()
             };
             let refinement = LineRefinementConfig::default();
-            split_edges(&views, graph, on_edges, 0.5, &refinement, &config)
+            split_edges(&views, graph, on_edges, 3, 0.5, &refinement, &config)
         };
         let mut untouched = graph.clone();
         assert_eq!(split(&mut untouched, &[], false), 0);

@@ -4,6 +4,7 @@
 //! They betray themselves in the images: the edges around them lie at quite
 //! another depth, while a true structure has at least some edges at its own.
 
+use super::clustering::view_count;
 use super::graph_adjustment::segment_of_edge;
 use super::junction_graph::JunctionGraph;
 use super::projected_line::line_parameter_of_ray;
@@ -18,19 +19,18 @@ use serde::{Deserialize, Serialize};
 pub struct IsolatedEdgesConfig {
     /// Depths that differ by less than this share are the same.
     pub max_relative_depth_difference: f64,
-    /// An edge stays if at least this share of its neighbours in the images has
-    /// its depth …
-    pub min_share_at_depth: f64,
-    /// … or if it has fewer neighbours than this, counted in all its views.
-    pub min_neighbours: usize,
+    /// An edge counts as many views as show it, times the share of its neighbours
+    /// in the images that have its depth; it stays if that is at least this share
+    /// of the views that every edge needs. Three views that agree by chance are
+    /// easily found on a façade, but seldom where all around agrees too.
+    pub min_accompanied_share: f64,
 }
 
 impl Default for IsolatedEdgesConfig {
     fn default() -> Self {
         Self {
             max_relative_depth_difference: 0.08,
-            min_share_at_depth: 0.15,
-            min_neighbours: 8,
+            min_accompanied_share: 0.85,
         }
     }
 }
@@ -40,6 +40,7 @@ impl Default for IsolatedEdgesConfig {
 pub(super) fn drop_isolated(
     views: &[TrackView],
     graph: &mut JunctionGraph,
+    min_views: usize,
     config: &IsolatedEdgesConfig,
 ) {
     let degree = graph.degrees();
@@ -67,7 +68,7 @@ pub(super) fn drop_isolated(
             if joined {
                 return true;
             }
-            let (mut same, mut all) = (0, 0);
+            let (mut same, mut all) = (0_usize, 0_usize);
             for id in &edge.supports {
                 let Some(depth) = depth_of(views, *id, &lines[i]) else {
                     continue;
@@ -78,7 +79,10 @@ pub(super) fn drop_isolated(
                     same += usize::from(difference < config.max_relative_depth_difference * depth);
                 }
             }
-            all < config.min_neighbours || same as f64 >= config.min_share_at_depth * all as f64
+            // One neighbour more of each kind: few say little.
+            let share = (same + 1) as f64 / (all + 2) as f64;
+            share * view_count(&edge.supports) as f64
+                >= config.min_accompanied_share * min_views as f64
         })
         .collect();
     let mut keep = keep.into_iter();
@@ -151,7 +155,7 @@ mod tests {
             })
             .collect();
         let mut graph = JunctionGraph { junctions, edges };
-        drop_isolated(&views, &mut graph, &IsolatedEdgesConfig::default());
+        drop_isolated(&views, &mut graph, 3, &IsolatedEdgesConfig::default());
         assert_eq!(graph.edges.len(), 12);
         assert!(graph.edges.iter().all(|edge| edge.junctions != [24, 25]));
     }

@@ -80,6 +80,20 @@ impl JunctionGraph {
         }
         degrees
     }
+
+    /// The edges that each 2D segment of each view supports, ascending.
+    pub(super) fn edges_of_segments(&self, views: &[TrackView]) -> Vec<Vec<Vec<usize>>> {
+        let mut edges_of: Vec<Vec<Vec<usize>>> = views
+            .iter()
+            .map(|view| vec![Vec::new(); view.segments.len()])
+            .collect();
+        for (index, edge) in self.edges.iter().enumerate() {
+            for id in &edge.supports {
+                edges_of[id.view][id.segment].push(index);
+            }
+        }
+        edges_of
+    }
 }
 
 /// The graph of the tracks, completed by edges that 2D segments without a track

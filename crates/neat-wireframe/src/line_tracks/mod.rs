@@ -10,7 +10,8 @@
 //! The steps: neighbouring views; candidate partners of every segment by the
 //! epipolar geometry; scores of the 3D positions that they make; one position per
 //! segment by mutual agreement; tracks of segments on one line; merging; a graph
-//! of junctions where 2D vertices join tracks; bundle adjustment of that graph.
+//! of junctions where 2D vertices join tracks; bundle adjustment of that graph;
+//! free ends that meet something, and edges cut where others end on or cross them.
 //! Matching and scoring follow Hofer, Maurer and Bischof, *Efficient 3D scene
 //! abstraction using line segments* (Line3D++, 2017).
 //!
@@ -26,13 +27,17 @@ mod edge_crossings;
 mod edge_splitting;
 mod end_joining;
 mod epipolar_matching;
+mod free_end_search;
 mod free_ends;
 mod graph_adjustment;
+mod graph_segmentation;
 mod hypothesis_scoring;
 mod isolated_edges;
 mod junction_graph;
+mod line3d;
 mod line_refinement;
 mod neighbours;
+mod parallel_edges;
 mod projected_line;
 mod report;
 pub(crate) mod segment_index;
@@ -55,7 +60,9 @@ pub use hypothesis_scoring::HypothesisScoringConfig;
 pub use isolated_edges::IsolatedEdgesConfig;
 pub use junction_graph::JunctionGraphConfig;
 pub use line_refinement::LineRefinementConfig;
+pub use line3d::{Line3dConfig, Line3dSegment, line3d, wireframe_of_segments};
 pub use neighbours::NeighboursConfig;
+pub use parallel_edges::ParallelEdgesConfig;
 pub use report::{LineEvidence, LineTracksReport, LineTracksResult, SegmentSupport, StepTiming};
 pub use straight_junctions::StraightJunctionsConfig;
 pub use track_merging::TrackMergingConfig;
@@ -73,6 +80,7 @@ use graph_adjustment::{adjust_graph, noise_in_pixels};
 use hypothesis_scoring::{DepthPrior, score_hypotheses};
 use isolated_edges::drop_isolated;
 use junction_graph::{GraphEdge, JunctionGraph, junction_graph};
+use parallel_edges::merge_parallel;
 use rayon::prelude::*;
 use std::time::Instant;
 use straight_junctions::dissolve_straight;
@@ -190,11 +198,14 @@ pub fn run(
         &config.confirmation,
     );
     report.confirmed_edges = graph.edges.len();
-    drop_isolated(&views, &mut graph, &config.isolation);
+    drop_isolated(&views, &mut graph, min_views, &config.isolation);
     report.accompanied_edges = graph.edges.len();
     clock.end_of("adjustment");
 
     let noise = noise_in_pixels(&views, &graph);
+    let merged = merge_parallel(&views, &mut graph, noise, &config.parallel);
+    report.dropped_copies = merged.copies;
+    report.merged_pieces = merged.pieces;
     let joined = join_free_ends(
         &views,
         &mut graph,
@@ -217,6 +228,7 @@ pub fn run(
         &views,
         &mut graph,
         &[joined.on_edges, crossings].concat(),
+        min_views,
         noise,
         &config.refinement,
         &config.splitting,

@@ -64,6 +64,10 @@ pub struct LineTracksReport {
     pub confirmed_edges: usize,
     /// Edges that do not float alone.
     pub accompanied_edges: usize,
+    /// Edges dropped as copies of others.
+    pub dropped_copies: usize,
+    /// Pairs of edges that have become one.
+    pub merged_pieces: usize,
     /// Pairs of free ends that have become one junction.
     pub joined_corners: usize,
     /// Free ends that have become part of a junction.

@@ -17,7 +17,7 @@ pub struct ImageEvidenceConfig {
     pub tolerance_in_pixels: f64,
     /// … under at most this angle to it …
     pub max_angle_in_degrees: f64,
-    /// … and the edge covers at least this share of the segment.
+    /// … and such edges together cover at least this share of the segment.
     pub min_overlap: f64,
 }
 
@@ -36,7 +36,7 @@ impl Default for ImageEvidenceConfig {
 pub struct ImageEvidence {
     /// 2D segments in all views.
     pub segments: usize,
-    /// Those that some edge explains.
+    /// Those that edges explain.
     pub explained_segments: usize,
     /// Their share of the length of all 2D segments; `None` without segments.
     pub explained_length_share: Option<f64>,
@@ -126,51 +126,83 @@ fn view_evidence(
         shows: vec![false; edges.len()],
         ..Default::default()
     };
+    let mut fits: Vec<(usize, Fit)> = Vec::new();
     for detection in &observation.segments {
         let length = detection.segment.length();
         if !length.is_finite() {
             continue;
         }
         evidence.length += length;
-        let mut best: Option<f64> = None;
-        for (edge, projected) in projected.iter().enumerate() {
-            let error = projected
-                .as_ref()
-                .and_then(|projected| explains(projected, &detection.segment, config));
-            if let Some(error) = error {
-                evidence.shows[edge] = true;
-                best = Some(best.map_or(error, |other| other.min(error)));
-            }
+        fits.clear();
+        fits.extend(
+            projected
+                .iter()
+                .enumerate()
+                .filter_map(|(edge, projected)| {
+                    let fit = Fit::of(projected.as_ref()?, &detection.segment, config)?;
+                    Some((edge, fit))
+                }),
+        );
+        // Pieces of a line that was cut explain together what no piece does alone.
+        fits.sort_by(|(_, a), (_, b)| a.covered[0].total_cmp(&b.covered[0]));
+        let (mut covered, mut reached) = (0.0, 0.0);
+        for (_, fit) in &fits {
+            let [from, to] = fit.covered;
+            covered += (to - f64::max(from, reached)).max(0.0);
+            reached = f64::max(reached, to);
         }
-        if let Some(error) = best {
+        if covered >= config.min_overlap {
+            for (edge, _) in &fits {
+                evidence.shows[*edge] = true;
+            }
+            let errors = fits.iter().map(|(_, fit)| fit.error);
             evidence.explained += 1;
             evidence.explained_length += length;
-            evidence.error_sum += error;
+            evidence.error_sum += errors.fold(f64::INFINITY, f64::min);
         }
     }
     evidence
 }
 
-/// Mean distance of the segment's ends from the edge, if the edge explains it.
-fn explains(
-    edge: &LineSegment2,
-    segment: &LineSegment2,
-    config: &ImageEvidenceConfig,
-) -> Option<f64> {
-    let direction = (edge.end - edge.start).try_normalize(1e-9)?;
-    let across = segment
-        .ends()
-        .map(|end| (end - edge.start).perp(&direction));
-    if across[0].abs().max(across[1].abs()) > config.tolerance_in_pixels {
-        return None;
+/// How a segment lies along a projected edge.
+struct Fit {
+    /// The part of the segment beside the edge, from 0 to 1 along it.
+    covered: [f64; 2],
+    /// Mean distance of the segment's ends from the edge's line, in pixels.
+    error: f64,
+}
+
+impl Fit {
+    /// `None` for a segment that does not lie along the edge.
+    fn of(
+        edge: &LineSegment2,
+        segment: &LineSegment2,
+        config: &ImageEvidenceConfig,
+    ) -> Option<Self> {
+        let direction = (edge.end - edge.start).try_normalize(1e-9)?;
+        let across = segment
+            .ends()
+            .map(|end| (end - edge.start).perp(&direction));
+        if across[0].abs().max(across[1].abs()) > config.tolerance_in_pixels {
+            return None;
+        }
+        let length = segment.length();
+        let sine = (across[0] - across[1]).abs() / length;
+        let along = segment.ends().map(|end| (end - edge.start).dot(&direction));
+        let low = along[0].min(along[1]);
+        let extent = along[0].max(along[1]) - low;
+        let covered = [0.0, edge.length()].map(|end| ((end - low) / extent).clamp(0.0, 1.0));
+        let beside =
+            covered[1] > covered[0] && sine <= config.max_angle_in_degrees.to_radians().sin();
+        beside.then(|| Self {
+            covered: if along[0] <= along[1] {
+                covered
+            } else {
+                [1.0 - covered[1], 1.0 - covered[0]]
+            },
+            error: 0.5 * (across[0].abs() + across[1].abs()),
+        })
     }
-    let length = segment.length();
-    let sine = (across[0] - across[1]).abs() / length;
-    let along = segment.ends().map(|end| (end - edge.start).dot(&direction));
-    let common = along[0].max(along[1]).min(edge.length()) - along[0].min(along[1]).max(0.0);
-    (sine <= config.max_angle_in_degrees.to_radians().sin()
-        && common >= config.min_overlap * length)
-        .then(|| 0.5 * (across[0].abs() + across[1].abs()))
 }
 
 /// The projection of the part of an edge that lies in front of the camera.
@@ -222,6 +254,38 @@ mod tests {
         let measured = image_evidence(&half, &views, &[], &config).unwrap();
         assert!((0.5..0.7).contains(&measured.explained_share().unwrap()));
         assert_eq!(measured.median_junction_to_point_distance, None);
+    }
+
+    #[test]
+    fn pieces_of_a_cut_edge_explain_together_what_they_cover() {
+        let whole = cube_wireframe();
+        let views = views_of_edges(&cameras_on_sphere(5), &whole.junctions, &whole.edges);
+        let config = ImageEvidenceConfig::default();
+        // Every edge cut in four; then without the last of the pieces.
+        let mut cut = Wireframe3d::default();
+        for edge in whole.segments() {
+            let first = cut.junctions.len();
+            let places = [0.0, 0.25, 0.5, 0.75, 1.0];
+            cut.junctions.extend(places.map(|t| edge.point_at(t)));
+            cut.edges.extend((first..first + 4).map(|i| [i, i + 1]));
+        }
+        let measured = image_evidence(&cut, &views, &[], &config).unwrap();
+        assert_eq!(measured.explained_share(), Some(1.0));
+        let expected = image_evidence(&whole, &views, &[], &config).unwrap();
+        assert_eq!(measured.mean_views_per_edge, expected.mean_views_per_edge);
+        let keep = |pieces: usize| Wireframe3d {
+            edges: (cut.edges.iter().enumerate())
+                .filter(|(index, _)| index % 4 < pieces)
+                .map(|(_, edge)| *edge)
+                .collect(),
+            junctions: cut.junctions.clone(),
+        };
+        let share = |pieces| {
+            let measured = image_evidence(&keep(pieces), &views, &[], &config).unwrap();
+            measured.explained_length_share.unwrap()
+        };
+        assert!(share(3) > 0.9);
+        assert!(share(1) < 0.1);
     }
 
     #[test]

@@ -3,7 +3,9 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::synthetic::{Solid, SyntheticScene, generate};
 use neat_core::{Camera, Intrinsics, LineSegment2, LineSegment3, ScoredSegment2};
-use neat_wireframe::line_tracks::{LineTracksConfig, LineTracksResult, run};
+use neat_wireframe::line_tracks::{
+    Line3dConfig, LineTracksConfig, LineTracksResult, line3d, run, wireframe_of_segments,
+};
 use neat_wireframe::validity::check_wireframe;
 use neat_wireframe::{SegmentProposal, ViewObservation};
 use proptest::prelude::*;
@@ -124,6 +126,9 @@ proptest! {
         for support in result.edges.iter().flat_map(|edge| &edge.supports) {
             prop_assert!(support.segment_in_view < views[support.view].segments.len());
         }
+        let baseline = line3d(&views, radius, &Line3dConfig { min_views: 2, ..Default::default() });
+        let wireframe = wireframe_of_segments(&baseline);
+        prop_assert!(check_wireframe(&wireframe.junctions, &wireframe.edges).is_ok());
     }
 }
 
@@ -209,6 +214,8 @@ proptest! {
         let wireframe = &result.wireframe;
         prop_assert!(check_wireframe(&wireframe.junctions, &wireframe.edges).is_ok());
         prop_assert!(wireframe.segments().iter().all(|segment| segment.length() > 0.0));
+        let baseline = line3d(&views, radius, &Line3dConfig { min_views, ..Default::default() });
+        prop_assert!(baseline.iter().all(|line| line.segment.length() > 0.0));
     }
 }
 

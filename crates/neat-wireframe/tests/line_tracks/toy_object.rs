@@ -7,7 +7,9 @@ use crate::scores::scores_within;
 use neat_core::ground_truth::read_wireframe;
 use neat_core::{LoadOptions, load_scene};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::line_tracks::{LineTracksConfig, run};
+use neat_wireframe::line_tracks::{
+    Line3dConfig, LineTracksConfig, line3d, run, wireframe_of_segments,
+};
 use std::path::PathBuf;
 
 /// The folder of the toy object, or `None`, said aloud, where there is none.
@@ -42,4 +44,21 @@ fn the_true_graph_comes_back_and_little_else() {
     // Chords of the round hole are seen by many views too; they are no truth.
     assert!(junctions.precision >= 0.8);
     assert!(segments.precision >= 0.9);
+}
+
+#[test]
+fn the_baseline_finds_most_edges_and_no_graph() {
+    let Some(dir) = toy_dir() else {
+        return;
+    };
+    let scene = load_scene(&dir, &LoadOptions::default()).unwrap().scene;
+    let truth = read_wireframe(&dir.join("gt_wireframe.json")).unwrap();
+    let views = ViewObservation::from_scene(&scene, 0.05);
+    let found = line3d(&views, scene.sphere_radius, &Line3dConfig::default());
+    let wireframe =
+        wireframe_of_segments(&found).map(|junction| scene.original_from_world.apply(junction));
+    let (junctions, segments) = scores_within(0.01, &wireframe, &truth);
+    assert!(segments.recall >= 0.8);
+    // Each edge has ends of its own: the corners are there several times.
+    assert!(junctions.precision < 0.5);
 }
