@@ -19,6 +19,9 @@ pub struct SceneArgs {
     /// (auto), or x,y,z,radius in the frame of the files
     #[arg(long, value_name = "WHERE", allow_hyphen_values = true)]
     scene_sphere: Option<SphereChoice>,
+    /// Use at most so many views, spread evenly over the order of the files
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..))]
+    max_views: Option<u32>,
     /// Scale images down so that their longer side has at most so many pixels; intrinsics and 2D
     /// wireframes follow
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(16..))]
@@ -57,6 +60,7 @@ impl SceneArgs {
         if let Some(sphere) = self.scene_sphere {
             data.scene_sphere = sphere;
         }
+        data.max_views = (self.max_views.map(|n| n as usize)).or(data.max_views);
         data.max_image_size = self.max_image_size.or(data.max_image_size);
         data.focal_scale = self.focal_scale.or(data.focal_scale);
         data.intrinsics_scale = self.intrinsics_scale.or(data.intrinsics_scale);
@@ -81,6 +85,7 @@ impl fmt::Display for SceneArgs {
             None => Ok(()),
         };
         flag("scene-sphere", self.scene_sphere.map(|x| x.to_string()))?;
+        flag("max-views", self.max_views.map(|x| x.to_string()))?;
         flag("max-image-size", self.max_image_size.map(|x| x.to_string()))?;
         flag("poses", self.poses.map(|x| x.to_string()))?;
         flag("camera-axes", self.camera_axes.map(|x| x.to_string()))?;

@@ -554,3 +554,26 @@ fn a_mirrored_world_is_refused_and_read_by_saying_so() {
         assert_eq!(view.camera, expected.camera);
     }
 }
+
+#[test]
+fn at_most_so_many_views_spread_over_the_files() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut many = scene();
+    many.views = (0..7).map(view).collect();
+    abc::write_scene(&many, dir.path()).unwrap();
+    let names = |max_views| {
+        let options = LoadOptions {
+            max_views: Some(max_views),
+            ..LoadOptions::default()
+        };
+        let scene = load_scene(dir.path(), &options).unwrap().scene;
+        let names = scene.views.into_iter().map(|view| view.name);
+        names.collect::<Vec<_>>()
+    };
+    assert_eq!(names(3), ["view_2", "view_4", "view_6"]);
+    assert_eq!(names(7).len(), 7);
+    assert_eq!(names(100).len(), 7);
+    for max_views in 2..7 {
+        assert_eq!(names(max_views).len(), max_views);
+    }
+}

@@ -54,6 +54,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let options = ExportOptions::default();
     for format in Format::ALL {
+        if format == Format::Limap && document.edge_support.is_empty() {
+            println!("limap: the wireframe knows no 2D segments");
+            continue;
+        }
         match format.endings().first() {
             Some(ending) => report(&format!("wireframe.{ending}"), format, &options)?,
             None => report(format.name(), format, &options)?,

@@ -2,7 +2,7 @@
 
 use crate::orthographic::Drawing;
 use crate::{ExportError, ExportOptions, Format};
-use crate::{colmap, dxf, geojson, gltf, npz, picture, step, svg};
+use crate::{colmap, dxf, geojson, gltf, limap, npz, picture, step, svg};
 use neat_core::file;
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
 use std::path::{Path, PathBuf};
@@ -23,8 +23,8 @@ pub struct Written {
 
 /// Writes a document in a format, in the frame and the unit of the document.
 ///
-/// `path` is a file that is replaced when the new one is complete; for
-/// [`Format::Colmap`], a new or empty folder.
+/// `path` is a file that is replaced when the new one is complete; for a
+/// [`Format::is_folder`], a new or empty folder.
 ///
 /// # Errors
 /// If an option is out of range, the document is not valid or lacks a field that
@@ -76,6 +76,7 @@ pub fn export(
         Format::GeoJson => write(geojson::text(&document).as_bytes())?,
         Format::Npz => npz::write(path, &document)?,
         Format::Colmap => written.files = colmap::write(path, &document)?,
+        Format::Limap => written.files = limap::write(path, &document)?,
     }
     Ok(written)
 }

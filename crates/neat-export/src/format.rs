@@ -31,11 +31,13 @@ pub enum Format {
     Npz,
     /// A COLMAP text model whose points are the junctions.
     Colmap,
+    /// LIMAP's line tracks.
+    Limap,
 }
 
 impl Format {
     /// All formats, in the order in which help texts list them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Json,
         Self::Obj,
         Self::Ply,
@@ -48,6 +50,7 @@ impl Format {
         Self::GeoJson,
         Self::Npz,
         Self::Colmap,
+        Self::Limap,
     ];
 
     /// Name, for command lines and messages.
@@ -65,6 +68,7 @@ impl Format {
             Self::GeoJson => "geojson",
             Self::Npz => "npz",
             Self::Colmap => "colmap",
+            Self::Limap => "limap",
         }
     }
 
@@ -83,8 +87,13 @@ impl Format {
             Self::Png => &["png"],
             Self::GeoJson => &["geojson"],
             Self::Npz => &["npz"],
-            Self::Colmap => &[],
+            Self::Colmap | Self::Limap => &[],
         }
+    }
+
+    /// Whether it fills a folder instead of a file.
+    pub fn is_folder(self) -> bool {
+        self.endings().is_empty()
     }
 
     /// What it is for, in one line.
@@ -102,6 +111,7 @@ impl Format {
             Self::GeoJson => "LineString features with z, coordinates as they are (QGIS)",
             Self::Npz => "NumPy: lines3d as the published NEAT code, junctions, edges",
             Self::Colmap => "a folder: COLMAP text model of the junctions, and lines3D.txt",
+            Self::Limap => "a folder: line tracks with their 2D segments, as LIMAP leaves them",
         }
     }
 

@@ -45,6 +45,7 @@ mod export;
 mod geojson;
 mod gltf;
 mod isolated;
+mod limap;
 mod npz;
 mod picture;
 mod step;

@@ -59,6 +59,9 @@ pub struct DataConfig {
     /// Multiplies the intrinsics of the files, for images of another size.
     #[serde(default)]
     pub intrinsics_scale: Option<f64>,
+    /// At most so many views are used, spread evenly over the order of the files.
+    #[serde(default)]
+    pub max_views: Option<usize>,
     /// Images with a longer side than this, in pixels, are scaled down.
     #[serde(default)]
     pub max_image_size: Option<u32>,

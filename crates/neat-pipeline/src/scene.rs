@@ -159,6 +159,7 @@ pub fn load_options(config: &DataConfig, cache: Option<&FileCache>) -> LoadOptio
         pose_convention: config.pose_convention,
         focal_scale: config.focal_scale,
         intrinsics_scale: config.intrinsics_scale,
+        max_views: config.max_views,
         max_image_size: config.max_image_size,
         cache_dir: cache.map(|cache| cache.dir().into()),
         ..LoadOptions::default()

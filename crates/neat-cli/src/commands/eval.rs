@@ -1,6 +1,7 @@
 //! `neat eval`.
 
 use crate::arguments::positive;
+use crate::cache::CacheArgs;
 use crate::error::CliError;
 use crate::output;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -13,8 +14,13 @@ use neat_eval::{
     LimapLength, NeatAbc, NeatSurface, ObservationMask, Protocol, ScannedSurface, Scores,
     StructureScore, foreign,
 };
+use neat_pipeline::preset::Preset;
+use neat_pipeline::scene::prepare_scene;
+use neat_wireframe::ViewObservation;
+use neat_wireframe::edge_support::EdgeSupportConfig;
 use neat_wireframe::metrics::Matching;
-use std::path::PathBuf;
+use neat_wireframe::supported_truth::{SupportedTruthConfig, supported_truth, without_curves};
+use std::path::{Path, PathBuf};
 
 /// Measure a wireframe against the truth or a scanned surface, by a published protocol
 ///
@@ -24,6 +30,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   neat eval --pred RUN/wireframe.json --gt SCENE/gt_wireframe.json
+  neat eval --pred RUN/wireframe.json --gt SCENE/gt_wireframe.json --scene SCENE
   neat eval --pred RUN/wireframe.json --points scan.ply --json scores.json
   neat eval --pred parametric_edges.json --gt gt_wireframe.json --protocol emap,edge-gaussians
   neat eval --pred RUN/wireframe.json --points stl024_total.ply --protocol neat-dtu \\
@@ -47,6 +54,10 @@ pub struct EvalArgs {
     /// How to measure; several with commas
     #[arg(long = "protocol", value_name = "NAME,...", value_delimiter = ',', value_parser = protocol_parser())]
     protocols: Vec<Protocol>,
+    /// Measure neat-abc once more against what the 2D wireframes of this scene support of the
+    /// truth, with the pieces of curved rims counted apart
+    #[arg(long, value_name = "SCENE", requires = "gt")]
+    scene: Option<PathBuf>,
     /// Cells that DTU's scanner saw, ObsMaskN_10.mat (neat-dtu)
     #[arg(long, value_name = "FILE")]
     obs_mask: Option<PathBuf>,
@@ -69,6 +80,8 @@ pub struct EvalArgs {
     /// Seed of what is random: the thinning of neat-dtu and the volumes of hss
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    cache: CacheArgs,
     /// How to print
     #[arg(long, value_enum, default_value_t)]
     format: Format,
@@ -126,10 +139,13 @@ impl EvalArgs {
         let protocols = self.protocols();
         self.check(&protocols)?;
         let inputs = self.read()?;
-        let reports = protocols
+        let mut reports = protocols
             .iter()
             .map(|protocol| Ok(EvaluationReport::new(self.scores(*protocol, &inputs)?)))
             .collect::<Result<Vec<_>, EvalError>>()?;
+        if let Some(scene) = &self.scene {
+            reports.push(self.supported_report(scene, &inputs)?);
+        }
         let json = || {
             let texts: Vec<String> = reports.iter().map(EvaluationReport::to_json).collect();
             format!("[\n{}\n]\n", texts.join(",\n"))
@@ -189,6 +205,7 @@ impl EvalArgs {
             |p: &Protocol| surfaces.contains(p) || matches!(p, Protocol::Hss | Protocol::Wed);
         for (option, given, is_used) in [
             ("--before", self.before.is_some(), any(&[Protocol::NeatAbc])),
+            ("--scene", self.scene.is_some(), any(&[Protocol::NeatAbc])),
             (
                 "--matching",
                 self.matching.is_some(),
@@ -295,6 +312,48 @@ impl EvalArgs {
                 Scores::Hss(hss.evaluate(predicted, truth)?)
             }
             Protocol::Wed => Scores::Wed(EditDistance::default().evaluate(predicted, truth)?),
+        })
+    }
+
+    /// neat-abc against the part of the truth that the 2D wireframes of a scene support.
+    fn supported_report(
+        &self,
+        scene: &Path,
+        inputs: &Inputs,
+    ) -> Result<EvaluationReport, CliError> {
+        let mut config = Preset::default().config();
+        let cache = self.cache.open();
+        let prepared = prepare_scene(scene, &mut config, None, cache.as_ref(), &mut |_| ())?;
+        let views = ViewObservation::from_scene(&prepared.scene, config.data.min_segment_score);
+        let required = EdgeSupportConfig::default().required_views(views.len());
+        let world_from_original = prepared.scene.original_from_world.inverse();
+        let truth = &inputs.truth.wireframe;
+        let supported = supported_truth(
+            &truth.map(|point| world_from_original.apply(point)),
+            &views,
+            required,
+            &SupportedTruthConfig::default(),
+        )
+        .map(|point| prepared.scene.original_from_world.apply(point));
+        let mut neat = NeatAbc::default();
+        replace(&mut neat.thresholds, &self.thresholds);
+        replace(&mut neat.matching, &self.matching.map(Matching::from));
+        let smallest = neat
+            .thresholds
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min);
+        let curves = &inputs.truth.curves;
+        let straight = without_curves(&inputs.predicted.wireframe, truth, curves, smallest);
+        let scores = neat.evaluate(&straight.wireframe, None, &supported)?;
+        Ok(EvaluationReport {
+            source: format!(
+                "against what at least {required} views of {} support; left out as pieces of curved rims: {} junctions, {} segments",
+                scene.display(),
+                straight.junctions_on_curves,
+                straight.edges_on_curves
+            ),
+            scores: Scores::NeatAbc(scores),
         })
     }
 

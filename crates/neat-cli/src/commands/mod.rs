@@ -1,6 +1,7 @@
 //! One file per subcommand.
 
 mod ablate;
+mod baseline;
 mod bench;
 mod compare_backends;
 mod convert;
@@ -39,6 +40,7 @@ pub enum Command {
     CompareBackends(compare_backends::CompareBackendsArgs),
     Bench(bench::BenchArgs),
     Ablate(ablate::AblateArgs),
+    Baseline(baseline::BaselineArgs),
 }
 
 impl Command {
@@ -61,6 +63,7 @@ impl Command {
             Self::CompareBackends(args) => args.run(quiet),
             Self::Bench(args) => args.run(quiet),
             Self::Ablate(args) => args.run(quiet),
+            Self::Baseline(args) => args.run(quiet),
         }
     }
 }

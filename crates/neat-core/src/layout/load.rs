@@ -80,6 +80,9 @@ pub(super) fn load_posed(
     }
     let mut warnings = Vec::new();
     warnings.extend(drop_missing_images(&mut poses)?);
+    if let Some(max_views) = options.max_views {
+        thin_views(&mut poses, max_views);
+    }
     check_names(poses.views.iter().map(|view| view.name.as_str()), dir)?;
     let hawp_dir = dir.join(HAWP_DIR);
     // Before the images, which take seconds to decode.
@@ -274,6 +277,22 @@ fn drop_missing_images(poses: &mut Poses) -> Result<Option<SceneWarning>, SceneE
     let mut is_there = is_there.into_iter();
     poses.views.retain(|_| is_there.next() == Some(true));
     Ok(Some(warning))
+}
+
+/// Leaves at most `max_views` views, spread evenly over their order.
+fn thin_views(poses: &mut Poses, max_views: usize) {
+    let views = poses.views.len();
+    if views <= max_views {
+        return;
+    }
+    // Of the boundaries of `max_views` equal parts, those that views pass.
+    let part = |view: usize| view * max_views / views;
+    let kept: Vec<bool> = (0..views)
+        .map(|view| part(view) != part(view + 1))
+        .collect();
+    keep_observations(&mut poses.points, &kept);
+    let mut kept = kept.into_iter();
+    poses.views.retain(|_| kept.next() == Some(true));
 }
 
 /// How many views were undistorted, and how many scaled down.

@@ -32,6 +32,9 @@ pub struct LoadOptions {
     /// the layout gives one: 0.5 for intrinsics made before the images were
     /// scaled down to half. The origin is taken to be the corner of the image.
     pub intrinsics_scale: Option<f64>,
+    /// At most so many views, spread evenly over the order of the files; `None`
+    /// takes all.
+    pub max_views: Option<usize>,
     /// The longest side of images, in pixels: larger ones are scaled down.
     /// `None` keeps all as they are.
     pub max_image_size: Option<u32>,
@@ -52,6 +55,7 @@ impl Default for LoadOptions {
             pose_convention: None,
             focal_scale: None,
             intrinsics_scale: None,
+            max_views: None,
             max_image_size: None,
             cache_dir: None,
         }

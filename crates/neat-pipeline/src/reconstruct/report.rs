@@ -1,6 +1,7 @@
 //! `report.html`: the wireframe, its evidence, and how it came about, as a page.
 
 use super::session::Session;
+use crate::config::OverlayGround;
 use crate::error::PipelineError;
 use crate::step_log::{JunctionsLine, read_log};
 use crate::trainer::StepReport;
@@ -17,7 +18,14 @@ impl Session<'_> {
         agreement: Option<ImageEvidence>,
     ) -> Result<PathBuf, PipelineError> {
         let min_score = self.config.data.min_segment_score;
-        let photographs = PhotographConfig::default();
+        let photographs = match self.config.distill.overlay {
+            OverlayGround::Photo => PhotographConfig::default(),
+            // Photographs that may not be passed on have no place in a page either.
+            OverlayGround::Segments => PhotographConfig {
+                max_photographs: 0,
+                ..PhotographConfig::default()
+            },
+        };
         let mut report = Report::of_scene(&self.scene, document, min_score, &photographs)?;
         let metrics: Vec<StepReport> = read_log(&self.dir.metrics())?;
         report.curves = curves(&metrics);
@@ -47,6 +55,10 @@ impl Session<'_> {
             ("Junctions", document.junctions.len().to_string()),
             ("Edges", document.edges.len().to_string()),
         ];
+        if let Some(curved) = document.edge_fields.get("curved") {
+            let pieces = curved.iter().filter(|is_piece| **is_piece > 0.0).count();
+            result.push(("Of them pieces of curves", pieces.to_string()));
+        }
         if let Some(agreement) = agreement {
             let explained = agreement.explained_length_share.map(|share| {
                 let percent = format!("{:.0} % of their length", 100.0 * share);

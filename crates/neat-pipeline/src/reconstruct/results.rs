@@ -10,6 +10,7 @@ use crate::field::TrainedField;
 use crate::image_io::write_png;
 use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe, spread_views};
 use neat_core::{Wireframe3d, file};
+use neat_wireframe::curved_rims::curved_chains;
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::metrics::ImageEvidence;
 use rayon::prelude::*;
@@ -39,9 +40,12 @@ impl Session<'_> {
             );
         }
         let agreement = agreement(&self.scene, &self.config, &distilled.wireframe);
-        let wireframe = self.stage(Stage::Export, |session| {
+        let (wireframe, document) = self.stage(Stage::Export, |session| {
             session.export(&distilled, agreement)
         })?;
+        // Last, so that it knows the times and warnings of all stages.
+        let report = self.write_report(document, agreement)?;
+        self.written(report);
         Ok(Reconstruction {
             run: self.dir.clone(),
             wireframe,
@@ -51,12 +55,12 @@ impl Session<'_> {
     }
 
     /// Writes files and pictures; returns the wireframe in the frame of the
-    /// user's files.
+    /// user's files, bare and as it is written.
     fn export(
         &mut self,
         distilled: &Distilled,
         agreement: Option<ImageEvidence>,
-    ) -> Result<Wireframe3d, PipelineError> {
+    ) -> Result<(Wireframe3d, WireframeDocument), PipelineError> {
         let in_world = &distilled.wireframe;
         let original = in_world.map(|point| self.scene.original_from_world.apply(point));
         let mut document = WireframeDocument {
@@ -66,6 +70,13 @@ impl Session<'_> {
         let names: Vec<String> = self.scene.views.iter().map(|v| v.name.clone()).collect();
         let original_from_world = &self.scene.original_from_world;
         (distilled.confidence).fill(&mut document, &names, original_from_world);
+        let curved = curved_chains(in_world);
+        if curved.contains(&true) {
+            let curved = curved.into_iter().map(|is| f64::from(u8::from(is)));
+            document
+                .edge_fields
+                .insert("curved".into(), curved.collect());
+        }
         let [json, obj, ply, png] =
             ["json", "obj", "ply", "png"].map(|extension| self.dir.wireframe(extension));
         write_json(&json, &document)?;
@@ -94,12 +105,11 @@ impl Session<'_> {
             write_png(path, &picture)
         })?;
         written.extend(overlays.into_iter().map(|(_, path)| path));
-        written.push(self.write_report(document, agreement)?);
 
         for path in written {
             self.written(path);
         }
-        Ok(original)
+        Ok((original, document))
     }
 
     fn metadata(
