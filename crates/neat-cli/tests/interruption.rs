@@ -55,7 +55,7 @@ fn ctrl_c_leaves_a_checkpoint_to_continue_from() {
 fn a_full_disk_is_reported_and_loses_nothing() {
     let scene = TestScene::new();
     let script = format!(
-        "trap '' XFSZ; ulimit -f 16; exec '{}' train '{}' --out '{}' --backend flex --steps 1",
+        "trap '' XFSZ; ulimit -f 64; exec '{}' train '{}' --out '{}' --backend flex --steps 1",
         env!("CARGO_BIN_EXE_neat"),
         scene.path("scene"),
         scene.path("run"),

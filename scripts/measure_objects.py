@@ -1,0 +1,204 @@
+#!/usr/bin/env python3
+"""Reconstructs objects with a known wireframe and measures the results.
+
+    scripts/measure_objects.py DATA OUT                        seeds 0, 1 and 2, all views
+    scripts/measure_objects.py DATA OUT --views 50,25,12       fewer views
+    scripts/measure_objects.py DATA OUT --budgets 1,2,4,8      quality over training time
+
+DATA holds one folder per object, with gt_wireframe.json; HAWP's 2D wireframes are not
+used, except with --hawp. OUT keeps every run, so that an interrupted measurement goes
+on. Prints a Markdown table; OUT/measurements.json holds every number. Needs Python 3.9
+and nothing else; --plot FILE.svg draws the mean F-scores over the training time.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import sys
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("data", type=pathlib.Path)
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--neat", default="target/release/neat", help="the program")
+    parser.add_argument("--objects", help="names of folders, with commas; all with a truth")
+    parser.add_argument("--seeds", default="0,1,2")
+    parser.add_argument("--views", default="", help="numbers of views, with commas")
+    parser.add_argument("--budgets", default="", help="seconds of training, with commas")
+    parser.add_argument("--hawp", action="store_true", help="use HAWP's wireframes")
+    parser.add_argument("--threshold", type=float, default=0.01)
+    parser.add_argument("--plot", type=pathlib.Path)
+    return parser.parse_args()
+
+
+def numbers(text):
+    return [float(x) for x in text.split(",") if x]
+
+
+def without_hawp(scene, out):
+    """A folder of links to all of a scene but its 2D wireframes."""
+    if not (scene / "hawp").exists():
+        return scene
+    copy = (out / "scenes" / scene.name).absolute()
+    copy.mkdir(parents=True, exist_ok=True)
+    for entry in scene.iterdir():
+        link = copy / entry.name
+        if entry.name != "hawp" and not link.exists():
+            link.symlink_to(entry.resolve())
+    return copy
+
+
+def reconstruct(options, scene, run, seed, views, budget):
+    """Runs neat unless that has been done; returns the run's manifest."""
+    manifest = run / "manifest.json"
+    done = manifest.is_file() and json.loads(manifest.read_text())["status"] == "finished"
+    if not done:
+        command = [options.neat, "reconstruct", scene, "--out", run, "--overwrite", "--quiet"]
+        command += ["--backend", "flex", "--no-doctor", "--seed", str(seed)]
+        if views:
+            command += ["--max-views", str(int(views))]
+        if budget:
+            # More steps than the budget leaves time for: the schedule follows the time.
+            command += ["--time-budget", f"{budget}s", "--set", "train.steps=1000000"]
+        subprocess.run([str(x) for x in command], check=True, stdout=subprocess.DEVNULL)
+    return json.loads(manifest.read_text())
+
+
+def evaluate(options, scene, run):
+    """F-scores against the full truth and against what the 2D input supports."""
+    command = [options.neat, "eval", "--pred", run / "wireframe.json"]
+    command += ["--gt", scene / "gt_wireframe.json", "--scene", scene, "--format", "json"]
+    command += ["--thresholds", str(options.threshold), "--matching", "per-threshold"]
+    text = subprocess.run([str(x) for x in command], check=True, capture_output=True, text=True)
+    full, supported = json.loads(text.stdout)
+    scores = {}
+    for name, report in (("full", full), ("supported", supported)):
+        graph = report["scores"]["wireframe"]
+        for of, key in (("junctions", "junctions"), ("segments", "segments_max")):
+            score = graph[key][0]
+            p, r = score["precision"], score["recall"]
+            f = 2 * p * r / (p + r) if p + r > 0 else 0.0
+            scores[f"{name} {of}"] = {"precision": p, "recall": r, "f": f}
+    return scores
+
+
+def measure(options):
+    with_truth = sorted(p.parent for p in options.data.glob("*/gt_wireframe.json"))
+    if options.objects:
+        wanted = options.objects.split(",")
+        with_truth = [scene for scene in with_truth if scene.name in wanted]
+    if not with_truth:
+        sys.exit(f"{options.data}: no folder holds a gt_wireframe.json")
+    settings = [(views, None) for views in numbers(options.views)]
+    settings += [(None, budget) for budget in numbers(options.budgets)]
+    results = []
+    for views, budget in settings or [(None, None)]:
+        for original in with_truth:
+            scene = original if options.hawp else without_hawp(original, options.out)
+            for seed in (int(s) for s in numbers(options.seeds)):
+                what = f"{views or 'all'}-views-{budget or 'full'}-budget-seed-{seed}"
+                run = options.out / "runs" / scene.name / what
+                manifest = reconstruct(options, scene, run, seed, views, budget)
+                result = {"object": scene.name, "views": views, "budget": budget, "seed": seed}
+                result["seconds"] = manifest["seconds"]
+                result["scores"] = evaluate(options, scene, run)
+                results.append(result)
+                print(".", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    (options.out / "measurements.json").write_text(json.dumps(results, indent=1))
+    return results
+
+
+KINDS = ["full junctions", "full segments", "supported junctions", "supported segments"]
+
+
+def spread(values):
+    low, high = min(values), max(values)
+    return f"{low:.2f}" if f"{low:.2f}" == f"{high:.2f}" else f"{low:.2f} to {high:.2f}"
+
+
+def table(results):
+    print("| object | views | training | " + " | ".join(f"F {kind}" for kind in KINDS) + " | all |")
+    print("| --- | --- | --: |" + " --: |" * (len(KINDS) + 1))
+    groups = {}
+    for result in results:
+        groups.setdefault((result["views"], result["budget"]), {}).setdefault(
+            result["object"], []
+        ).append(result)
+    means = []
+    for (views, budget), objects in groups.items():
+        views = int(views) if views else "all"
+        for name, runs in objects.items():
+            cells = [spread([run["scores"][kind]["f"] for run in runs]) for kind in KINDS]
+            train = spread_seconds([run["seconds"].get("train", 0.0) for run in runs])
+            total = spread_seconds([sum(run["seconds"].values()) for run in runs])
+            print(f"| {name} | {views} | {train} | " + " | ".join(cells) + f" | {total} |")
+        f = lambda kind: sum(
+            run["scores"][kind]["f"] for runs in objects.values() for run in runs
+        ) / sum(len(runs) for runs in objects.values())
+        cells = [f"**{f(kind):.3f}**" for kind in KINDS]
+        print(f"| **mean** | {views} | {budget or ''} | " + " | ".join(cells) + " | |")
+        means.append((views, budget, [f(kind) for kind in KINDS]))
+    return means
+
+
+def spread_seconds(values):
+    low, high = f"{min(values):.1f}", f"{max(values):.1f}"
+    return f"{low} s" if low == high else f"{low} to {high} s"
+
+
+def plot(means, path):
+    """The mean F-scores over the training time as SVG."""
+    points = sorted((budget, f) for _, budget, f in means if budget)
+    if len(points) < 2:
+        sys.exit("--plot needs two budgets or more")
+    width, height, left, bottom, top, right = 640, 360, 56, 48, 16, 190
+    largest = max(budget for budget, _ in points)
+    x = lambda t: left + (width - left - right) * t / largest
+    y = lambda f: height - bottom - (height - bottom - top) * f
+    lines = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
+        'font-family="sans-serif" font-size="12">',
+        f'<rect width="{width}" height="{height}" fill="white"/>',
+    ]
+    for f in (0, 0.25, 0.5, 0.75, 1):
+        lines.append(f'<path d="M{left} {y(f):.1f}H{width - right}" stroke="#ddd"/>')
+        lines.append(f'<text x="{left - 8}" y="{y(f) + 4:.1f}" text-anchor="end">{f}</text>')
+    for budget, _ in points:
+        lines.append(
+            f'<text x="{x(budget):.1f}" y="{height - bottom + 18}" '
+            f'text-anchor="middle">{budget:g}</text>'
+        )
+    middle = (left + width - right) / 2
+    lines.append(
+        f'<text x="{middle:.0f}" y="{height - 10}" text-anchor="middle">'
+        "seconds of training</text>"
+    )
+    colors = ["#0072b2", "#d55e00", "#56b4e9", "#e69f00"]
+    for index, (kind, color) in enumerate(zip(KINDS, colors)):
+        path_data = "L".join(f"{x(t):.1f} {y(f[index]):.1f}" for t, f in points)
+        dash = ' stroke-dasharray="6 4"' if index > 1 else ""
+        lines.append(f'<path d="M{path_data}" fill="none" stroke="{color}" stroke-width="2"{dash}/>')
+        row = top + 16 + 20 * index
+        lines.append(
+            f'<path d="M{width - right + 12} {row - 4}h24" stroke="{color}" '
+            f'stroke-width="2"{dash}/>'
+        )
+        lines.append(f'<text x="{width - right + 42}" y="{row}">F {kind}</text>')
+    path.write_text("\n".join(lines + ["</svg>\n"]))
+
+
+def main():
+    options = arguments()
+    options.out.mkdir(parents=True, exist_ok=True)
+    os.environ.setdefault("NEAT_CACHE", str((options.out / "cache").absolute()))
+    means = table(measure(options))
+    if options.plot:
+        plot(means, options.plot)
+
+
+if __name__ == "__main__":
+    main()
