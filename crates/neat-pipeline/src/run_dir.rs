@@ -413,8 +413,9 @@ mod tests {
         fs::create_dir(root.join(RENDERS)).unwrap();
         RunDir::create(&root, Existing::Overwrite).unwrap();
         let entries = fs::read_dir(&root).unwrap();
-        let left: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
-        assert_eq!(left, ["notes.txt"]);
+        let mut left: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+        left.sort();
+        assert_eq!(left, [CHECKPOINTS, "notes.txt"]);
         assert_eq!(fs::read(root.join("notes.txt")).unwrap(), b"mine");
 
         assert!(matches!(

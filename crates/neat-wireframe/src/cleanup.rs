@@ -334,7 +334,7 @@ mod tests {
                     for part in &parts {
                         edges.remove(part);
                     }
-                } else {
+                } else if parts.iter().all(|part| edges.contains_key(part)) {
                     edges.remove(&pair);
                 }
             }
