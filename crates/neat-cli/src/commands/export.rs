@@ -23,6 +23,17 @@ use std::path::{Path, PathBuf};
 /// of the grid that are farther from the surface than this allows are passed over.
 const MAX_SLOPE: f64 = 2.0;
 
+/// Options that --mesh and all that belongs to it exclude. Both have to be said: clap does
+/// not ask for a required option that another one excludes.
+const OF_WIREFRAMES: [&str; 6] = [
+    "format",
+    "min_probability",
+    "min_views",
+    "view",
+    "width",
+    "unit",
+];
+
 /// Write a wireframe for other programs
 ///
 /// Everything is in the frame and unit of your files. The ending of --out chooses the format.
@@ -38,8 +49,8 @@ Examples:
   neat export RUN/wireframe.json --format glb
   neat export RUN --mesh --out house.ply --resolution 512",
     // Only a mesh is computed; of the shared arguments clap knows the names.
-    mut_arg("backend", |arg| arg.requires("mesh")),
-    mut_arg("no_cache", |arg| arg.requires("mesh"))
+    mut_arg("backend", |arg| arg.requires("mesh").conflicts_with_all(OF_WIREFRAMES)),
+    mut_arg("no_cache", |arg| arg.requires("mesh").conflicts_with_all(OF_WIREFRAMES))
 )]
 pub struct ExportArgs {
     /// Folder of a run, or a wireframe.json
@@ -51,7 +62,7 @@ pub struct ExportArgs {
     #[arg(long, value_name = "FILE", required_unless_present_any = ["format", "mesh"])]
     out: Option<PathBuf>,
     /// Format; by default what the ending of --out says
-    #[arg(long, value_name = "FORMAT", value_parser = format_parser(), conflicts_with = "mesh")]
+    #[arg(long, value_name = "FORMAT", value_parser = format_parser())]
     format: Option<Format>,
     /// Only edges that exist with at least this probability
     #[arg(long, value_name = "P", value_parser = probability)]
@@ -69,13 +80,13 @@ pub struct ExportArgs {
     #[arg(long, value_enum)]
     unit: Option<UnitArg>,
     /// Write the learned surface of a run as a triangle mesh (PLY) instead; RUN/mesh.ply by default
-    #[arg(long, conflicts_with_all = ["min_probability", "min_views", "view", "width", "unit"])]
+    #[arg(long, conflicts_with_all = OF_WIREFRAMES)]
     mesh: bool,
     /// Number of cubes of the mesh along the diameter of the scene sphere
-    #[arg(long, value_name = "N", default_value_t = 256, requires = "mesh")]
+    #[arg(long, value_name = "N", default_value_t = 256, requires = "mesh", conflicts_with_all = OF_WIREFRAMES)]
     resolution: usize,
     /// Folder of the scene, if it is not where the run found it (for --mesh)
-    #[arg(long, value_name = "SCENE", requires = "mesh")]
+    #[arg(long, value_name = "SCENE", requires = "mesh", conflicts_with_all = OF_WIREFRAMES)]
     scene: Option<PathBuf>,
     #[command(flatten)]
     backend: BackendArg,
