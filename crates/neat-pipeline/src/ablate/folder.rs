@@ -107,10 +107,11 @@ fn obstacle(found: &Found, asked: &Value) -> Option<String> {
         Found::Ablation(stored) => {
             let stored = stored.as_ref().and_then(Value::as_object);
             let asked = asked.as_object().into_iter().flatten();
-            let differing: Vec<&str> = asked
+            let mut differing: Vec<&str> = asked
                 .filter(|(key, value)| stored.and_then(|stored| stored.get(*key)) != Some(value))
                 .map(|(key, _)| key.as_str())
                 .collect();
+            differing.sort_unstable();
             Some(match (stored, differing.is_empty()) {
                 (Some(_), false) => format!(
                     "another ablation, with a different {} in {REQUEST}",
