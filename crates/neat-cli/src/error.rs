@@ -5,12 +5,11 @@ use neat_core::SceneError;
 use neat_core::synthetic::SyntheticError;
 use neat_eval::EvalError;
 use neat_pipeline::compare_backends::CompareError;
-use neat_pipeline::error::PipelineError;
+use neat_pipeline::error::{PipelineError, with_causes};
 use neat_pipeline::overrides::OverrideError;
 use neat_pipeline::run_dir::RunDirError;
 use neat_pipeline::trainer::TrainError;
 use neat_tensor::BackendError;
-use std::error::Error;
 use std::process::ExitCode;
 
 /// Exit code of a run that failed.
@@ -26,6 +25,17 @@ pub enum CliError {
     /// A run did not finish.
     #[error(transparent)]
     Pipeline(PipelineError),
+    /// A person stopped a run that `--resume` continues.
+    #[error("{0}")]
+    Resumable(PipelineError),
+    /// Variants of an ablation that could not be measured.
+    #[error("{failed} of {all} variants failed: the column `note` of the table says why")]
+    VariantsFailed {
+        /// So many failed …
+        failed: usize,
+        /// … of so many.
+        all: usize,
+    },
     /// A `--set` that does not apply.
     #[error(transparent)]
     Override(#[from] OverrideError),
@@ -89,28 +99,50 @@ through_pipeline!(
 );
 
 impl CliError {
+    /// The error of a command that has `--resume`.
+    pub fn of_resumable(error: PipelineError) -> Self {
+        match error {
+            PipelineError::Interrupted { .. } => Self::Resumable(error),
+            error => Self::Pipeline(error),
+        }
+    }
+
     /// Prints the error with its causes, once, and returns the exit code.
     pub fn report(&self) -> ExitCode {
         let code = self.exit_code();
         if !self.is_closed_pipe() {
-            output::error(&self.chain());
+            output::error(&with_causes(self));
         }
-        if let Self::Pipeline(PipelineError::Interrupted { .. }) = self {
-            output::error_hint("give the same command with --resume to continue");
+        if let Some(hint) = self.hint() {
+            output::error_hint(hint);
         }
         code.into()
     }
 
+    /// How to go on.
+    fn hint(&self) -> Option<&'static str> {
+        match self {
+            Self::Resumable(_) => Some("give the same command with --resume to continue"),
+            Self::Pipeline(PipelineError::AblationInterrupted { .. }) => {
+                Some("give the same command again to continue")
+            }
+            _ => None,
+        }
+    }
+
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Pipeline(PipelineError::Interrupted { .. }) => INTERRUPTED,
+            Self::Resumable(_)
+            | Self::Pipeline(
+                PipelineError::Interrupted { .. } | PipelineError::AblationInterrupted { .. },
+            ) => INTERRUPTED,
             Self::Pipeline(error) if error.is_bad_input() => BAD_INPUT,
             Self::Override(_)
             | Self::UnknownView { .. }
             | Self::Usage(_)
-            | Self::Export(_)
             | Self::Threads(_)
             | Self::NotReady => BAD_INPUT,
+            Self::Export(error) if error.is_bad_input() => BAD_INPUT,
             // `neat info SCENE | head` is no failure.
             Self::Output(_) if self.is_closed_pipe() => 0,
             _ => FAILED,
@@ -120,21 +152,43 @@ impl CliError {
     fn is_closed_pipe(&self) -> bool {
         matches!(self, Self::Output(error) if error.kind() == std::io::ErrorKind::BrokenPipe)
     }
+}
 
-    /// The message and what caused it, in one sentence.
-    fn chain(&self) -> String {
-        let mut text = self.to_string();
-        let mut cause = self.source();
-        while let Some(error) = cause {
-            let message = error.to_string();
-            // Some libraries repeat their cause in their own message.
-            if !text.contains(&message) {
-                text.push_str(" (");
-                text.push_str(&message);
-                text.push(')');
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io;
+
+    #[test]
+    fn every_way_to_be_interrupted_has_its_own_way_to_go_on() {
+        let interrupted = || PipelineError::Interrupted {
+            step: 7,
+            checkpoint: "step-00000007.safetensors".into(),
+        };
+        let ablation = PipelineError::AblationInterrupted { done: 3, all: 20 };
+        for (error, hint) in [
+            (CliError::of_resumable(interrupted()), Some("--resume")),
+            // Of a command without --resume.
+            (interrupted().into(), None),
+            (ablation.into(), Some("the same command again")),
+        ] {
+            assert_eq!(error.exit_code(), INTERRUPTED, "{error}");
+            match hint {
+                Some(part) => assert!(error.hint().is_some_and(|hint| hint.contains(part))),
+                None => assert_eq!(error.hint(), None),
             }
-            cause = error.source();
         }
-        text
+    }
+
+    #[test]
+    fn an_export_that_fails_is_no_bad_input() {
+        let full_disk = SceneError::Write {
+            path: "house.dxf".into(),
+            source: io::ErrorKind::StorageFull.into(),
+        };
+        let failed = CliError::Export(full_disk.into());
+        assert_eq!(failed.exit_code(), FAILED);
+        let unknown = neat_export::Format::from_name("dwg").unwrap_err();
+        assert_eq!(CliError::Export(unknown).exit_code(), BAD_INPUT);
     }
 }

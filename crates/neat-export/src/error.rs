@@ -69,3 +69,80 @@ pub enum ExportError {
     #[error(transparent)]
     File(#[from] SceneError),
 }
+
+impl ExportError {
+    /// Whether the cause lies in what was asked for or in the input, and trying
+    /// again without a change is pointless; otherwise the export itself failed.
+    pub fn is_bad_input(&self) -> bool {
+        use neat_wireframe::export::ExportError as WireframeError;
+        match self {
+            Self::UnknownEnding { .. }
+            | Self::UnknownFormat { .. }
+            | Self::BadOption { .. }
+            | Self::NoField { .. }
+            | Self::OutOfRange { .. } => true,
+            Self::BadDistance { .. } => false,
+            Self::Wireframe(WireframeError::File(error)) | Self::File(error) => {
+                !matches!(error, SceneError::Write { .. })
+            }
+            Self::Wireframe(_) => true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use neat_wireframe::export::ExportError as WireframeError;
+    use std::io;
+
+    fn full_disk() -> SceneError {
+        SceneError::Write {
+            path: "house.dxf".into(),
+            source: io::ErrorKind::StorageFull.into(),
+        }
+    }
+
+    #[test]
+    fn a_full_disk_and_a_bad_field_are_failures_and_no_bad_input() {
+        let bad_distance = ExportError::BadDistance {
+            point: [0.0; 3],
+            value: f64::NAN,
+        };
+        for error in [
+            bad_distance,
+            full_disk().into(),
+            WireframeError::File(full_disk()).into(),
+        ] {
+            assert!(!error.is_bad_input(), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_a_person_can_change_is_bad_input() {
+        let missing = || SceneError::Missing {
+            path: "wireframe.json".into(),
+            remedy: "give the folder of a run".into(),
+        };
+        let no_json = serde_json::from_str::<u8>("{").unwrap_err();
+        for error in [
+            ExportError::UnknownFormat {
+                name: "dwg".into(),
+                known: "dxf".into(),
+            },
+            ExportError::NoField {
+                field: "probability",
+                option: "--min-probability",
+            },
+            missing().into(),
+            WireframeError::File(missing()).into(),
+            WireframeError::Json {
+                path: "wireframe.json".into(),
+                source: no_json,
+            }
+            .into(),
+        ] {
+            assert!(error.is_bad_input(), "{error}");
+        }
+    }
+}

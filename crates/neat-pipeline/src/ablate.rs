@@ -1,19 +1,20 @@
 //! `neat ablate`: what each part of the method is worth, on one scene.
 
+mod folder;
+pub mod table;
 pub mod variants;
 
-use crate::config::Config;
+use crate::config::{BackEnd, Config};
 use crate::distill::{Distilled, distill};
-use crate::error::PipelineError;
+use crate::error::{PipelineError, with_causes};
 use crate::event::{Event, OnEvent, Stage};
 use crate::field::TrainedField;
 use crate::image_io::every_nth_pixel;
-use crate::manifest::Status;
 use crate::overlay::spread_views;
 use crate::overrides::apply_overrides;
 use crate::reconstruct::{OpenedRun, RunOptions, open_run, reconstruct};
 use crate::render::render_view;
-use crate::run_dir::{Existing, RunDir};
+use crate::run_dir::Existing;
 use nalgebra::Vector3;
 use neat_core::{Scene, Wireframe3d, file};
 use neat_eval::image_quality::psnr;
@@ -21,10 +22,9 @@ use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
 use neat_field::attraction_region::AttractionRegions;
 use neat_wireframe::export::{WireframeDocument, write_json};
 use neat_wireframe::metrics::PrecisionRecall;
-use serde::Serialize;
-use std::fmt::Write;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
+use table::{Note, Row};
 use variants::{Variant, variants};
 
 /// PSNR is the mean over so many views, at most …
@@ -44,84 +44,117 @@ pub struct Truth {
     pub threshold: f64,
 }
 
-/// One row of the table. Scores are `None` where there is no truth for them.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Row {
-    /// The table of the paper, or the group, that the variant belongs to.
-    pub table: String,
-    /// What is different.
-    pub variant: String,
-    /// Seconds of training; `None` if the field is that of the unchanged run.
-    pub training_seconds: Option<f64>,
-    /// Seconds of distillation.
-    pub distillation_seconds: f64,
-    /// Number of junctions.
-    pub junctions: usize,
-    /// Number of segments.
-    pub segments: usize,
-    /// Precision of the junctions.
-    pub junction_precision: Option<f64>,
-    /// Recall of the junctions.
-    pub junction_recall: Option<f64>,
-    /// Precision of the segments, by the larger end distance.
-    pub segment_precision: Option<f64>,
-    /// Recall of the segments.
-    pub segment_recall: Option<f64>,
-    /// Mean distance of the junctions from the surface, ACC-J.
-    pub junction_accuracy: Option<f64>,
-    /// Mean distance of the segments from the surface, ACC-L.
-    pub segment_accuracy: Option<f64>,
-    /// PSNR of rendered views, in decibels.
-    pub psnr: Option<f64>,
-    /// Share of the pixels outside of all attraction regions, "MR".
-    pub mask_ratio: Option<f64>,
-}
-
 /// Runs every variant, each in a folder of its own in `options.out`, and returns
 /// one row for each, in the order of [`variants`].
 ///
-/// Variants that are finished already are not run again: an ablation that was
-/// interrupted continues.
+/// The folder must be new or empty, or hold what this ablation has left before,
+/// which then continues: finished variants are not trained again;
+/// `options.existing` is not looked at. A variant that changes nothing in the
+/// configuration takes over the numbers of the unchanged run, and one that fails
+/// becomes a row with its reason. `ablation.md` and `ablation.csv` are written after
+/// every row.
 ///
 /// # Errors
-/// If a run fails, see [`reconstruct`].
+/// If the folder holds something else, the unchanged run fails, see [`reconstruct`],
+/// or a table cannot be written; [`PipelineError::AblationInterrupted`] once
+/// `cancelled` is set.
 pub fn ablate(
     options: &RunOptions,
     truth: &Truth,
     cancelled: &AtomicBool,
     on_event: OnEvent<'_>,
 ) -> Result<Vec<Row>, PipelineError> {
-    file::create_dir(&options.out)?;
-    let base = run_variant(&variants::BASE, options, cancelled, on_event)?;
-    let all = variants(base.config.distill.back_end);
-    let mut rows = Vec::with_capacity(all.len());
+    // Once: looking for GPUs takes a while.
+    let options = &RunOptions {
+        backend: options.backend.resolve(),
+        ..options.clone()
+    };
+    folder::claim(options)?;
+    let expected = variants(options.config.distill.back_end).len();
+    let base = run_variant(&variants::BASE, options, cancelled, on_event)
+        .map_err(|error| interrupted(error, 0, expected))?;
+    let config = settled(&options.config, &base.config);
+    let all = variants(config.distill.back_end);
+    let mut rows: Vec<Row> = Vec::with_capacity(all.len());
     for (index, variant) in all.iter().enumerate() {
+        if cancelled.load(Ordering::Relaxed) {
+            return Err(PipelineError::AblationInterrupted {
+                done: index,
+                all: all.len(),
+            });
+        }
         on_event(Event::Note(format!(
             "variant {} of {}: {}",
             index + 1,
             all.len(),
             variant.name
         )));
-        let trained = match (variant.trains, *variant == variants::BASE) {
-            (true, false) => Some(run_variant(variant, options, cancelled, on_event)?),
-            _ => None,
+        let measured = match rows.first() {
+            None => measure(variant, &base, options, truth),
+            Some(row) if variant.is_base(&config)? => Ok(Row {
+                note: row.note.clone().or(Some(Note::SameAsBase)),
+                ..row.clone()
+            }),
+            Some(_) if variant.trains => run_variant(variant, options, cancelled, on_event)
+                .and_then(|run| measure(variant, &run, options, truth)),
+            Some(_) => measure(variant, &base, options, truth),
         };
-        let run = trained.as_ref().unwrap_or(&base);
-        let config = changed(&run.config, variant)?;
-        let start = Instant::now();
-        let distilled = distill(&run.scene, &run.field, &config, &mut |_| ())?;
-        let seconds = start.elapsed().as_secs_f64();
-        let wireframe = write_wireframe(options, variant, &run.scene, &distilled)?;
-        rows.push(row(variant, run, &config, &wireframe, truth, seconds)?);
+        let row = match measured {
+            Err(error @ PipelineError::Interrupted { .. }) => {
+                return Err(interrupted(error, index, all.len()));
+            }
+            Err(error) => {
+                let reason = with_causes(&error);
+                on_event(Event::Warning(format!("{}: {reason}", variant.name)));
+                Row {
+                    note: Some(Note::Failed(reason)),
+                    ..Row::default()
+                }
+            }
+            Ok(row) => row,
+        };
+        rows.push(Row {
+            table: variant.table.to_owned(),
+            variant: variant.name.to_owned(),
+            ..row
+        });
+        folder::write_tables(&options.out, &rows)?;
     }
     Ok(rows)
 }
 
-/// The configuration with what the variant changes.
-fn changed(config: &Config, variant: &Variant) -> Result<Config, PipelineError> {
-    let overrides: Vec<String> = variant.overrides.iter().map(ToString::to_string).collect();
-    // They are part of the program, and a test applies them all.
-    apply_overrides(config, &overrides).map_err(PipelineError::Override)
+/// What an interrupted training means for the ablation that it is part of.
+fn interrupted(error: PipelineError, done: usize, all: usize) -> PipelineError {
+    match error {
+        PipelineError::Interrupted { .. } => PipelineError::AblationInterrupted { done, all },
+        error => error,
+    }
+}
+
+/// The configuration of a run as it is asked for now. What its scene has decided
+/// stays: the background with all that follows, and the back end for
+/// [`BackEnd::Auto`].
+fn settled(asked: &Config, run: &Config) -> Config {
+    let mut config = run.clone();
+    config.distill.clone_from(&asked.distill);
+    if asked.distill.back_end == BackEnd::Auto {
+        config.distill.back_end = run.distill.back_end;
+    }
+    config
+}
+
+impl Variant {
+    /// `config` with what the variant changes.
+    fn apply(&self, config: &Config) -> Result<Config, PipelineError> {
+        let overrides: Vec<String> = self.overrides.iter().map(ToString::to_string).collect();
+        // They are part of the program, and a test applies them all.
+        apply_overrides(config, &overrides).map_err(PipelineError::Override)
+    }
+
+    /// Whether the variant leaves `config` as it is.
+    fn is_base(&self, config: &Config) -> Result<bool, PipelineError> {
+        Ok(self.apply(config)? == *config)
+    }
 }
 
 /// Trains a variant, unless that has been done, and opens its run.
@@ -132,15 +165,12 @@ fn run_variant(
     on_event: OnEvent<'_>,
 ) -> Result<OpenedRun, PipelineError> {
     let out = options.out.join(variant.slug);
-    let config = changed(&options.config, variant)?;
-    let finished = RunDir::open(&out)
-        .and_then(|dir| dir.manifest())
-        .is_ok_and(|manifest| manifest.status == Status::Finished && manifest.seed == options.seed);
-    if !finished {
+    if !folder::is_finished(&out) {
         let options = RunOptions {
             out: out.clone(),
+            // The folder is a part of this ablation.
             existing: Existing::Overwrite,
-            config,
+            config: variant.apply(&options.config)?,
             ..options.clone()
         };
         reconstruct(&options, cancelled, on_event)?;
@@ -160,25 +190,43 @@ fn run_variant(
     )
 }
 
-/// Writes the variant's `wireframe.json`; returns the wireframe in the frame of the
-/// user's files.
+/// Distils a variant from the field of `run` and measures the result. If it has no
+/// run of its own, its wireframe is written.
+fn measure(
+    variant: &Variant,
+    run: &OpenedRun,
+    options: &RunOptions,
+    truth: &Truth,
+) -> Result<Row, PipelineError> {
+    let config = variant.apply(&settled(&options.config, &run.config))?;
+    let start = Instant::now();
+    let distilled = distill(&run.scene, &run.field, &config, &mut |_| ())?;
+    let seconds = start.elapsed().as_secs_f64();
+    let original_from_world = &run.scene.original_from_world;
+    let wireframe = (distilled.wireframe).map(|point| original_from_world.apply(point));
+    if !variant.trains {
+        write_wireframe(options, variant, &run.scene, &distilled, &wireframe)?;
+    }
+    row(variant, run, &config, &wireframe, truth, seconds)
+}
+
+/// Writes the variant's `wireframe.json`, in the frame of the user's files.
 fn write_wireframe(
     options: &RunOptions,
     variant: &Variant,
     scene: &Scene,
     distilled: &Distilled,
-) -> Result<Wireframe3d, PipelineError> {
-    let original_from_world = &scene.original_from_world;
-    let wireframe = (distilled.wireframe).map(|point| original_from_world.apply(point));
-    let mut document = WireframeDocument::from(&wireframe);
+    wireframe: &Wireframe3d,
+) -> Result<(), PipelineError> {
+    let mut document = WireframeDocument::from(wireframe);
     let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
-    (distilled.confidence).fill(&mut document, &names, original_from_world);
+    (distilled.confidence).fill(&mut document, &names, &scene.original_from_world);
     let folder = options.out.join(variant.slug);
     file::create_dir(&folder)?;
-    write_json(&folder.join("wireframe.json"), &document)?;
-    Ok(wireframe)
+    Ok(write_json(&folder.join("wireframe.json"), &document)?)
 }
 
+/// Everything but the names of the variant.
 fn row(
     variant: &Variant,
     run: &OpenedRun,
@@ -211,14 +259,12 @@ fn row(
         })
         .transpose()?;
     Ok(Row {
-        table: variant.table.to_owned(),
-        variant: variant.name.to_owned(),
         training_seconds: (variant.trains)
             .then(|| run.manifest.seconds.get(&Stage::Train).copied())
             .flatten(),
-        distillation_seconds,
-        junctions: wireframe.junctions.len(),
-        segments: wireframe.edges.len(),
+        distillation_seconds: Some(distillation_seconds),
+        junctions: Some(wireframe.junctions.len()),
+        segments: Some(wireframe.edges.len()),
         junction_precision: junctions.map(|scores| scores.precision),
         junction_recall: junctions.map(|scores| scores.recall),
         segment_precision: segments.map(|scores| scores.precision),
@@ -232,6 +278,7 @@ fn row(
         mask_ratio: (variant.trains)
             .then(|| masked_out(&run.scene, config))
             .flatten(),
+        ..Row::default()
     })
 }
 
@@ -263,140 +310,64 @@ fn masked_out(scene: &Scene, config: &Config) -> Option<f64> {
     (pixels > 0).then(|| 1.0 - inside as f64 / pixels as f64)
 }
 
-/// The table for people. Columns that no row has are left out.
-pub fn to_markdown(rows: &[Row]) -> String {
-    let columns = shown_columns(rows);
-    let mut text = String::new();
-    let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
-    text.push_str(&line(columns.iter().map(|c| c.name.to_owned()).collect()));
-    let rule = columns.iter().map(|c| if c.number { "--:" } else { "---" });
-    text.push_str(&line(rule.map(str::to_owned).collect()));
-    for row in rows {
-        let cells = columns.iter().map(|column| (column.cell)(row));
-        let cells = cells.map(|cell| cell.unwrap_or_else(|| "-".to_owned()));
-        text.push_str(&line(cells.collect()));
-    }
-    text
-}
-
-/// The table for programs: comma-separated, texts in quotes.
-pub fn to_csv(rows: &[Row]) -> String {
-    let mut text = String::new();
-    let names: Vec<&str> = COLUMNS.iter().map(|column| column.name).collect();
-    // Writing to a string cannot fail.
-    let _ = writeln!(text, "{}", names.join(","));
-    for row in rows {
-        let cells: Vec<String> = COLUMNS
-            .iter()
-            .map(|column| {
-                let cell = (column.cell)(row).unwrap_or_default();
-                if column.number {
-                    cell
-                } else {
-                    format!("\"{}\"", cell.replace('"', "\"\""))
-                }
-            })
-            .collect();
-        let _ = writeln!(text, "{}", cells.join(","));
-    }
-    text
-}
-
-/// A column of the table.
-struct Column {
-    name: &'static str,
-    number: bool,
-    cell: fn(&Row) -> Option<String>,
-}
-
-const fn number(name: &'static str, cell: fn(&Row) -> Option<String>) -> Column {
-    Column {
-        name,
-        number: true,
-        cell,
-    }
-}
-
-const fn words(name: &'static str, cell: fn(&Row) -> Option<String>) -> Column {
-    Column {
-        name,
-        number: false,
-        cell,
-    }
-}
-
-const COLUMNS: [Column; 14] = [
-    words("table", |row| Some(row.table.clone())),
-    words("variant", |row| Some(row.variant.clone())),
-    number("train s", |row| fixed(row.training_seconds, 1)),
-    number("distil s", |row| fixed(Some(row.distillation_seconds), 2)),
-    number("junctions", |row| Some(row.junctions.to_string())),
-    number("segments", |row| Some(row.segments.to_string())),
-    number("J precision", |row| fixed(row.junction_precision, 3)),
-    number("J recall", |row| fixed(row.junction_recall, 3)),
-    number("S precision", |row| fixed(row.segment_precision, 3)),
-    number("S recall", |row| fixed(row.segment_recall, 3)),
-    number("ACC-J", |row| fixed(row.junction_accuracy, 5)),
-    number("ACC-L", |row| fixed(row.segment_accuracy, 5)),
-    number("PSNR dB", |row| fixed(row.psnr, 2)),
-    number("mask ratio", |row| fixed(row.mask_ratio, 3)),
-];
-
-fn fixed(value: Option<f64>, digits: usize) -> Option<String> {
-    value.map(|value| format!("{value:.digits$}"))
-}
-
-fn shown_columns(rows: &[Row]) -> Vec<&'static Column> {
-    let has_cells = |column: &&Column| rows.iter().any(|row| (column.cell)(row).is_some());
-    COLUMNS.iter().filter(has_cells).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::background::Background;
+    use crate::preset::Preset;
 
-    fn row() -> Row {
-        Row {
-            table: "paper, table 2".into(),
-            variant: "a \"b\"".into(),
-            training_seconds: None,
-            distillation_seconds: 0.5,
-            junctions: 12,
-            segments: 18,
-            junction_precision: Some(1.0),
-            junction_recall: None,
-            segment_precision: None,
-            segment_recall: None,
-            junction_accuracy: None,
-            segment_accuracy: None,
-            psnr: None,
-            mask_ratio: Some(0.9),
+    #[test]
+    fn what_the_scene_has_decided_stays() {
+        let mut asked = Preset::Fast.config();
+        let mut run = asked.clone();
+        run.data.background = Some(Background::Photo);
+        run.train.loss.mask = 0.0;
+        run.distill.back_end = BackEnd::Tracks;
+        asked.distill.rays_per_segment = 3;
+        let config = settled(&asked, &run);
+        assert_eq!(config.distill.back_end, BackEnd::Tracks);
+        assert_eq!(config.distill.rays_per_segment, 3);
+        assert_eq!((&config.data, &config.train), (&run.data, &run.train));
+
+        asked.distill.back_end = BackEnd::Paper;
+        assert_eq!(settled(&asked, &run).distill, asked.distill);
+    }
+
+    #[test]
+    fn variants_that_change_nothing_are_known() {
+        let same = |preset: Preset, back_end| {
+            let mut config = preset.config();
+            config.distill.back_end = back_end;
+            let all = variants(back_end).into_iter();
+            all.filter(|variant| variant.is_base(&config).unwrap())
+                .map(|variant| variant.slug)
+                .collect::<Vec<_>>()
+        };
+        for back_end in [BackEnd::Fast, BackEnd::Tracks] {
+            assert_eq!(
+                same(Preset::Fast, back_end),
+                ["base", "direction-no-clustering", "attraction-10"]
+            );
+        }
+        assert_eq!(
+            same(Preset::PaperAbc, BackEnd::Paper),
+            ["base", "direction-clustering", "attraction-10", "paper"]
+        );
+        for preset in [Preset::PaperDtu, Preset::PaperBlendedmvs] {
+            assert_eq!(
+                same(preset, BackEnd::Paper),
+                ["base", "direction-clustering", "attraction-5", "paper"]
+            );
         }
     }
 
     #[test]
-    fn columns_without_numbers_are_left_out_of_the_table_for_people() {
-        let text = to_markdown(&[row()]);
-        assert_eq!(
-            text.lines().next(),
-            Some(
-                "| table | variant | distil s | junctions | segments | J precision | mask ratio |"
-            )
-        );
-        assert!(
-            text.ends_with("| 0.50 | 12 | 18 | 1.000 | 0.900 |\n"),
-            "{text}"
-        );
-    }
-
-    #[test]
-    fn the_table_for_programs_has_all_columns_and_quotes_texts() {
-        let text = to_csv(&[row()]);
-        let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines[0].split(',').count(), COLUMNS.len());
-        assert_eq!(
-            lines[1],
-            "\"paper, table 2\",\"a \"\"b\"\"\",,0.50,12,18,1.000,,,,,,,0.900"
-        );
+    fn an_interrupted_training_interrupts_the_ablation() {
+        let training = PipelineError::Interrupted {
+            step: 1,
+            checkpoint: "base/checkpoints".into(),
+        };
+        let error = interrupted(training, 2, 20);
+        assert_eq!(error.to_string(), "interrupted: 2 of 20 variants are done");
     }
 }

@@ -11,6 +11,7 @@ use neat_report::ReportError;
 use neat_tensor::BackendError;
 use neat_tensor::checkpoint::CheckpointError;
 use neat_wireframe::export::ExportError;
+use std::error::Error;
 use std::path::PathBuf;
 
 /// Why a run did not finish.
@@ -65,6 +66,22 @@ pub enum PipelineError {
         /// The checkpoint that was written.
         checkpoint: PathBuf,
     },
+    /// A person stopped an ablation.
+    #[error("interrupted: {done} of {all} variants are done")]
+    AblationInterrupted {
+        /// So many variants have a row in the table …
+        done: usize,
+        /// … of so many.
+        all: usize,
+    },
+    /// The folder of an ablation holds something else.
+    #[error("{out} holds {what}: choose another folder, or remove it")]
+    OtherAblation {
+        /// The folder.
+        out: PathBuf,
+        /// What is in it.
+        what: String,
+    },
 }
 
 impl PipelineError {
@@ -84,6 +101,7 @@ impl PipelineError {
             | Self::Evaluation(_)
             | Self::Detector(_)
             | Self::Override(_)
+            | Self::OtherAblation { .. }
             | Self::NotReady(_) => true,
             Self::Train(error) => matches!(
                 error,
@@ -92,11 +110,30 @@ impl PipelineError {
                     | TrainError::Parameters(_)
                     | TrainError::Checkpoint(_)
             ),
-            Self::Distill(_) | Self::Export(_) | Self::Report(_) | Self::Interrupted { .. } => {
-                false
-            }
+            Self::Distill(_)
+            | Self::Export(_)
+            | Self::Report(_)
+            | Self::Interrupted { .. }
+            | Self::AblationInterrupted { .. } => false,
         }
     }
+}
+
+/// The message of an error and what caused it, in one sentence.
+pub fn with_causes(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        let message = error.to_string();
+        // Some libraries repeat their cause in their own message.
+        if !text.contains(&message) {
+            text.push_str(" (");
+            text.push_str(&message);
+            text.push(')');
+        }
+        cause = error.source();
+    }
+    text
 }
 
 fn is_write_error(error: &SceneError) -> bool {

@@ -7,10 +7,10 @@ use crate::progress::Progress;
 use crate::scene_arguments::SceneArgs;
 use crate::{interrupt, output};
 use clap::Args;
-use neat_core::file;
 use neat_core::ground_truth::read_wireframe;
 use neat_core::point_cloud::read_ply;
-use neat_pipeline::ablate::{Truth, ablate, to_csv, to_markdown};
+use neat_pipeline::ablate::table::to_markdown;
+use neat_pipeline::ablate::{Truth, ablate};
 use neat_pipeline::event::Event;
 use neat_pipeline::reconstruct::RunOptions;
 use neat_pipeline::run_dir::Existing;
@@ -24,7 +24,9 @@ use std::path::PathBuf;
 /// with times, counts, precision and recall (with --gt), distances from a surface (with
 /// --points), PSNR and the share of pixels that were not used.
 ///
-/// An ablation that was interrupted continues: finished variants are not trained again.
+/// After Ctrl-C the same command continues: finished variants are not trained again. A variant
+/// that changes nothing in the configuration takes over the numbers of the first row, and one that
+/// fails is a row with the reason (exit code 1).
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -34,7 +36,8 @@ pub struct AblateArgs {
     /// Folder of the scene
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
-    /// Folder for all variants and the tables
+    /// Folder for all variants and the tables: new, empty, or with what this ablation has left
+    /// before
     #[arg(long, value_name = "OUT")]
     out: PathBuf,
     /// True wireframe, for precision and recall
@@ -70,8 +73,8 @@ impl AblateArgs {
         config.data = self.scene_args.apply(config.data);
         let options = RunOptions {
             scene: self.scene,
-            out: self.out.clone(),
-            existing: Existing::Overwrite,
+            out: self.out,
+            existing: Existing::default(),
             config,
             preset: self.method.name(),
             backend: self.compute.backend.backend,
@@ -90,9 +93,13 @@ impl AblateArgs {
             }
         })?;
         drop(progress);
-        let table = to_markdown(&rows);
-        file::write_atomically(&self.out.join("ablation.md"), table.as_bytes())?;
-        file::write_atomically(&self.out.join("ablation.csv"), to_csv(&rows).as_bytes())?;
-        output::print(&table)
+        output::print(&to_markdown(&rows))?;
+        match rows.iter().filter(|row| row.failed()).count() {
+            0 => Ok(()),
+            failed => Err(CliError::VariantsFailed {
+                failed,
+                all: rows.len(),
+            }),
+        }
     }
 }

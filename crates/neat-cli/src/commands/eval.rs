@@ -77,9 +77,9 @@ pub struct EvalArgs {
     /// of the truth has (emap, curve-gaussian, edge-gaussians)
     #[arg(long, value_name = "S", value_parser = positive)]
     truth_scale: Option<f64>,
-    /// Seed of what is random: the thinning of neat-dtu and the volumes of hss
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
+    /// Seed of what is random, 0 by default: the thinning of neat-dtu and the volumes of hss
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
     #[command(flatten)]
     cache: CacheArgs,
     /// How to print
@@ -204,6 +204,21 @@ impl EvalArgs {
         let without_thresholds =
             |p: &Protocol| surfaces.contains(p) || matches!(p, Protocol::Hss | Protocol::Wed);
         for (option, given, is_used) in [
+            (
+                "--gt",
+                self.gt.is_some(),
+                protocols.iter().any(|p| !p.needs_surface()),
+            ),
+            (
+                "--points",
+                self.points.is_some(),
+                protocols.iter().any(|p| p.needs_surface()),
+            ),
+            (
+                "--seed",
+                self.seed.is_some(),
+                any(&[Protocol::NeatDtu, Protocol::Hss]),
+            ),
             ("--before", self.before.is_some(), any(&[Protocol::NeatAbc])),
             ("--scene", self.scene.is_some(), any(&[Protocol::NeatAbc])),
             (
@@ -306,7 +321,7 @@ impl EvalArgs {
             }
             Protocol::Hss => {
                 let hss = StructureScore {
-                    seed: self.seed,
+                    seed: self.seed.unwrap_or_default(),
                     ..StructureScore::default()
                 };
                 Scores::Hss(hss.evaluate(predicted, truth)?)
@@ -360,7 +375,7 @@ impl EvalArgs {
     fn surface_protocol(&self, published: NeatSurface) -> NeatSurface {
         NeatSurface {
             max_distance: self.max_distance.unwrap_or(published.max_distance),
-            seed: self.seed,
+            seed: self.seed.unwrap_or_default(),
             ..published
         }
     }

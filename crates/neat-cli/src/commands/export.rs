@@ -1,6 +1,6 @@
 //! `neat export`.
 
-use crate::arguments::{BackendArg, positive};
+use crate::arguments::BackendArg;
 use crate::cache::CacheArgs;
 use crate::error::CliError;
 use crate::output;
@@ -14,12 +14,25 @@ use neat_export::{
 };
 use neat_pipeline::event::{Event, Stage};
 use neat_pipeline::reconstruct::open_run;
+use neat_pipeline::run_dir::RunDir;
 use neat_wireframe::export::read_json;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A trained distance changes by somewhat more than 1 over a unit of length; blocks
 /// of the grid that are farther from the surface than this allows are passed over.
 const MAX_SLOPE: f64 = 2.0;
+
+/// Options that --mesh and all that belongs to it exclude. Both have to be said: clap does
+/// not ask for a required option that another one excludes.
+const OF_WIREFRAMES: [&str; 6] = [
+    "format",
+    "min_probability",
+    "min_views",
+    "view",
+    "width",
+    "unit",
+];
 
 /// Write a wireframe for other programs
 ///
@@ -34,40 +47,46 @@ Examples:
   neat export RUN --out house.svg --view top
   neat export RUN --format colmap --out colmap
   neat export RUN/wireframe.json --format glb
-  neat export RUN --mesh --out house.ply --resolution 512")]
+  neat export RUN --mesh --out house.ply --resolution 512",
+    // Only a mesh is computed; of the shared arguments clap knows the names.
+    mut_arg("backend", |arg| arg.requires("mesh").conflicts_with_all(OF_WIREFRAMES)),
+    mut_arg("no_cache", |arg| arg.requires("mesh").conflicts_with_all(OF_WIREFRAMES))
+)]
 pub struct ExportArgs {
     /// Folder of a run, or a wireframe.json
     #[arg(value_name = "RUN")]
     run: PathBuf,
-    /// File to write (for colmap and limap a folder); RUN/wireframe.FORMAT by default
+    /// File to write (for colmap and limap a folder); by default RUN/wireframe.FORMAT, or
+    /// RUN/wireframe-filtered.FORMAT if edges are left out. What the run itself has written is not
+    /// replaced unless named here, and the input never
     #[arg(long, value_name = "FILE", required_unless_present_any = ["format", "mesh"])]
     out: Option<PathBuf>,
     /// Format; by default what the ending of --out says
-    #[arg(long, value_name = "FORMAT", value_parser = format_parser(), conflicts_with = "mesh")]
+    #[arg(long, value_name = "FORMAT", value_parser = format_parser())]
     format: Option<Format>,
     /// Only edges that exist with at least this probability
-    #[arg(long, value_name = "P", value_parser = positive)]
+    #[arg(long, value_name = "P", value_parser = probability)]
     min_probability: Option<f64>,
     /// Only edges that at least so many views support
     #[arg(long, value_name = "N")]
     min_views: Option<u32>,
-    /// From where svg and png look; +z is up
-    #[arg(long, value_enum, default_value_t, value_name = "FROM")]
-    view: ViewArg,
-    /// Width of svg and png in pixels
-    #[arg(long, value_name = "N", default_value_t = ExportOptions::default().width)]
-    width: u32,
-    /// The unit of your files, which step has to name; numbers stay as they are
-    #[arg(long, value_enum, default_value_t)]
-    unit: UnitArg,
-    /// Write the learned surface of a run as a triangle mesh (PLY) instead
-    #[arg(long, conflicts_with_all = ["min_probability", "min_views"])]
+    /// From where svg and png look, isometric by default; +z is up
+    #[arg(long, value_enum, value_name = "FROM")]
+    view: Option<ViewArg>,
+    /// Width of svg and png in pixels, 1600 by default
+    #[arg(long, value_name = "N")]
+    width: Option<u32>,
+    /// The unit of your files, which step has to name, mm by default; numbers stay as they are
+    #[arg(long, value_enum)]
+    unit: Option<UnitArg>,
+    /// Write the learned surface of a run as a triangle mesh (PLY) instead; RUN/mesh.ply by default
+    #[arg(long, conflicts_with_all = OF_WIREFRAMES)]
     mesh: bool,
     /// Number of cubes of the mesh along the diameter of the scene sphere
-    #[arg(long, value_name = "N", default_value_t = 256, requires = "mesh")]
+    #[arg(long, value_name = "N", default_value_t = 256, requires = "mesh", conflicts_with_all = OF_WIREFRAMES)]
     resolution: usize,
     /// Folder of the scene, if it is not where the run found it (for --mesh)
-    #[arg(long, value_name = "SCENE", requires = "mesh")]
+    #[arg(long, value_name = "SCENE", requires = "mesh", conflicts_with_all = OF_WIREFRAMES)]
     scene: Option<PathBuf>,
     #[command(flatten)]
     backend: BackendArg,
@@ -76,7 +95,7 @@ pub struct ExportArgs {
 }
 
 /// From where a drawing looks.
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum ViewArg {
     /// Along +y
     Front,
@@ -85,20 +104,47 @@ enum ViewArg {
     /// Along -x
     Side,
     /// From a corner
-    #[default]
     Isometric,
 }
 
+impl From<ViewArg> for ViewDirection {
+    fn from(view: ViewArg) -> Self {
+        match view {
+            ViewArg::Front => Self::Front,
+            ViewArg::Top => Self::Top,
+            ViewArg::Side => Self::Side,
+            ViewArg::Isometric => Self::Isometric,
+        }
+    }
+}
+
 /// A unit of length.
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum)]
 enum UnitArg {
     /// Millimetres
-    #[default]
     Mm,
     /// Centimetres
     Cm,
     /// Metres
     M,
+}
+
+impl From<UnitArg> for LengthUnit {
+    fn from(unit: UnitArg) -> Self {
+        match unit {
+            UnitArg::Mm => Self::Millimetre,
+            UnitArg::Cm => Self::Centimetre,
+            UnitArg::M => Self::Metre,
+        }
+    }
+}
+
+/// Takes a number from 0 to 1.
+fn probability(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(x) if (0.0..=1.0).contains(&x) => Ok(x),
+        _ => Err("must be a number from 0 to 1".to_owned()),
+    }
 }
 
 /// Takes the name of a format, with its explanation in the help.
@@ -117,32 +163,25 @@ impl ExportArgs {
         } else {
             self.run.clone()
         };
-        let document = read_json(&json).map_err(ExportError::from)?;
         let format = match (self.format, &self.out) {
             (Some(format), _) => format,
             (None, Some(out)) => Format::from_path(out)?,
             // clap asks for one of them.
             (None, None) => Format::Json,
         };
-        let out = self.out.unwrap_or_else(|| default_path(&json, format));
-        let options = ExportOptions {
-            filter: EdgeFilter {
-                min_probability: self.min_probability,
-                min_views: self.min_views,
-            },
-            direction: match self.view {
-                ViewArg::Front => ViewDirection::Front,
-                ViewArg::Top => ViewDirection::Top,
-                ViewArg::Side => ViewDirection::Side,
-                ViewArg::Isometric => ViewDirection::Isometric,
-            },
-            width: self.width,
-            unit: match self.unit {
-                UnitArg::Mm => LengthUnit::Millimetre,
-                UnitArg::Cm => LengthUnit::Centimetre,
-                UnitArg::M => LengthUnit::Metre,
-            },
+        self.check(format)?;
+        let options = self.options();
+        let out = match self.out {
+            Some(out) => out,
+            None => default_path(&json, format, options.filter)?,
         };
+        if is_same_file(&out, &json) {
+            return Err(CliError::Usage(format!(
+                "{} is what is exported: give another path with --out",
+                out.display()
+            )));
+        }
+        let document = read_json(&json).map_err(ExportError::from)?;
         let written = export(&document, &out, format, &options)?;
         for sentence in &written.left_out {
             output::note(&format!("warning: {sentence}"));
@@ -155,7 +194,48 @@ impl ExportArgs {
         ))
     }
 
+    /// Refuses options that the format does not look at.
+    fn check(&self, format: Format) -> Result<(), CliError> {
+        let is_drawing = matches!(format, Format::Svg | Format::Png);
+        for (option, given, is_used) in [
+            ("--view", self.view.is_some(), is_drawing),
+            ("--width", self.width.is_some(), is_drawing),
+            ("--unit", self.unit.is_some(), format == Format::Step),
+        ] {
+            if given && !is_used {
+                let name = format.name();
+                return Err(CliError::Usage(format!(
+                    "{option} has no meaning for {name}"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn options(&self) -> ExportOptions {
+        let default = ExportOptions::default();
+        ExportOptions {
+            filter: EdgeFilter {
+                min_probability: self.min_probability,
+                min_views: self.min_views,
+            },
+            direction: self.view.map_or(default.direction, ViewDirection::from),
+            width: self.width.unwrap_or(default.width),
+            unit: self.unit.map_or(default.unit, LengthUnit::from),
+        }
+    }
+
     fn write_mesh(self, quiet: bool) -> Result<(), CliError> {
+        if let Some(out) = &self.out
+            && !out
+                .extension()
+                .is_some_and(|e| e.eq_ignore_ascii_case("ply"))
+        {
+            return Err(CliError::Usage(format!(
+                "{} cannot hold a mesh, which is written as PLY: end its name with .ply",
+                out.display()
+            )));
+        }
         let mut progress = Progress::new(quiet);
         let opened = open_run(
             &self.run,
@@ -200,10 +280,96 @@ impl ExportArgs {
     }
 }
 
-/// Beside the JSON, with the first ending of the format, or as a folder of its name.
-fn default_path(json: &Path, format: Format) -> PathBuf {
-    match format.endings().first() {
-        Some(ending) => json.with_extension(ending),
-        None => json.with_file_name(format.name()),
+/// Beside the JSON, with the first ending of the format, or as a folder of its name; a
+/// part of the wireframe is not called like the whole.
+///
+/// # Errors
+/// If a run has written that file itself, or it is the JSON.
+fn default_path(json: &Path, format: Format, filter: EdgeFilter) -> Result<PathBuf, CliError> {
+    let name = |stem: &str| match format.endings().first() {
+        Some(ending) => format!("{stem}.{ending}"),
+        None => stem.to_owned(),
+    };
+    let stem = match format.is_folder() {
+        true => format.name().into(),
+        false => json.file_stem().unwrap_or_default().to_string_lossy(),
+    };
+    if filter != EdgeFilter::default() {
+        return Ok(json.with_file_name(name(&format!("{stem}-filtered"))));
+    }
+    let path = json.with_file_name(name(&stem));
+    let run = json.parent().and_then(|folder| RunDir::open(folder).ok());
+    let is_of_run = run.is_some_and(|run| {
+        let mut results = ["json", "obj", "ply", "png"].iter();
+        results.any(|extension| run.wireframe(extension) == path)
+    });
+    if is_of_run || path == json {
+        return Err(CliError::Usage(format!(
+            "without --out this would replace {}: name another file with --out",
+            path.display()
+        )));
+    }
+    Ok(path)
+}
+
+/// Whether two paths lead to one file that exists.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    match (fs::canonicalize(a), fs::canonicalize(b)) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALL: EdgeFilter = EdgeFilter {
+        min_probability: None,
+        min_views: None,
+    };
+    const SOME: EdgeFilter = EdgeFilter {
+        min_probability: Some(0.0),
+        min_views: None,
+    };
+
+    #[test]
+    fn results_of_a_run_are_not_replaced_by_default() {
+        let run = tempfile::tempdir().unwrap();
+        let json = run.path().join("wireframe.json");
+        for name in ["config.toml", "wireframe.json"] {
+            fs::write(run.path().join(name), "").unwrap();
+        }
+        for format in [Format::Json, Format::Obj, Format::Ply, Format::Png] {
+            let error = default_path(&json, format, ALL).unwrap_err().to_string();
+            assert!(error.contains("--out"), "{error}");
+        }
+        let name = |format, filter| {
+            let path = default_path(&json, format, filter).unwrap();
+            path.strip_prefix(run.path()).unwrap().to_owned()
+        };
+        assert_eq!(name(Format::Dxf, ALL), Path::new("wireframe.dxf"));
+        assert_eq!(name(Format::Limap, ALL), Path::new("limap"));
+        assert_eq!(
+            name(Format::Json, SOME),
+            Path::new("wireframe-filtered.json")
+        );
+        assert_eq!(name(Format::Limap, SOME), Path::new("limap-filtered"));
+        let filtered = run.path().join("wireframe-filtered.json");
+        assert!(default_path(&filtered, Format::Obj, ALL).is_ok());
+
+        // A file that no run has written may stand beside others.
+        fs::remove_file(run.path().join("config.toml")).unwrap();
+        assert_eq!(name(Format::Obj, ALL), Path::new("wireframe.obj"));
+        assert!(default_path(&json, Format::Json, ALL).is_err());
+    }
+
+    #[test]
+    fn probabilities_reach_from_0_to_1() {
+        assert_eq!(probability("0"), Ok(0.0));
+        assert_eq!(probability("1"), Ok(1.0));
+        for text in ["-0.1", "1.5", "NaN", "much"] {
+            assert!(probability(text).is_err(), "{text}");
+        }
     }
 }

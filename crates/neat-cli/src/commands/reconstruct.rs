@@ -35,8 +35,8 @@ impl ReconstructArgs {
         let options = self.run.options()?;
         let interrupted = interrupt::flag()?;
         let mut progress = Progress::new(quiet);
-        let reconstruction =
-            reconstruct(&options, &interrupted, &mut |event| progress.show(event))?;
+        let reconstruction = reconstruct(&options, &interrupted, &mut |event| progress.show(event))
+            .map_err(CliError::of_resumable)?;
         drop(progress);
         output::print(&summary(&reconstruction))
     }

@@ -109,7 +109,8 @@ impl TrainArgs {
         let options = self.run.options()?;
         let interrupted = interrupt::flag()?;
         let mut progress = Progress::new(quiet);
-        let run = train(&options, &interrupted, &mut |event| progress.show(event))?;
+        let run = train(&options, &interrupted, &mut |event| progress.show(event))
+            .map_err(CliError::of_resumable)?;
         drop(progress);
         output::print(&format!("trained: {}", run.latest_checkpoint()?.display()))
     }

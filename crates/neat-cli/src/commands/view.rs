@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 /// Open the report of a run in the browser
 ///
-/// The report is one file without network access: RUN/report.html. Where no browser can be
-/// started, copy it to a machine that has one.
+/// The report is one file without network access: RUN/report.html. Its path is printed: where
+/// no browser can be started, copy it to a machine that has one.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -37,12 +37,15 @@ impl ViewArgs {
                 .into(),
             ));
         }
+        let path = report.display().to_string();
         if self.print_path {
-            return output::print(&report.display().to_string());
+            return output::print(&path);
         }
         open::that_detached(&report).map_err(|error| CliError::Browser {
-            report: report.display().to_string(),
+            report: path.clone(),
             reason: error.to_string(),
-        })
+        })?;
+        // The program that opens files may have nothing to show it with, and not say so.
+        output::print(&format!("opened {path}"))
     }
 }
