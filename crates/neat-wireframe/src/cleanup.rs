@@ -360,7 +360,10 @@ mod tests {
             .map(|edge| (edge.junctions, edge))
             .collect();
         let candidates: Vec<usize> = (0..150).rev().filter(|i| i % 7 != 0).collect();
-        let config = CleanupConfig::default();
+        let config = CleanupConfig {
+            collinear_distance: 0.03,
+            ..CleanupConfig::default()
+        };
         let (mut fast, mut scanned) = (edges.clone(), edges.clone());
         resolve_collinear(&mut fast, &junctions, &candidates, &config);
         resolve_by_scan(&mut scanned, &junctions, &candidates, &config);
