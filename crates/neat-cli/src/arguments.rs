@@ -24,6 +24,7 @@ Start here:
   neat demo --out demo                   make a scene, reconstruct it, and measure the result
   neat info SCENE                        what is in a folder of photographs
   neat reconstruct SCENE --out RUN       from the photographs to RUN/wireframe.json
+  neat view RUN                          the result in your browser
   neat eval --pred RUN/wireframe.json --gt SCENE/gt_wireframe.json
 
 Exit codes:

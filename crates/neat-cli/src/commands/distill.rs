@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 /// Take the wireframe out of a trained run, and write all results
 ///
-/// The wireframe files, the picture and the overlays in RUN are replaced.
+/// The wireframe files, the pictures and the report in RUN are replaced.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

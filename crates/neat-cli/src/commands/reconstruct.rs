@@ -9,9 +9,9 @@ use neat_pipeline::reconstruct::{Reconstruction, reconstruct};
 
 /// Turn a scene into a 3D wireframe: train, distil, and write all results
 ///
-/// RUN then holds config.toml, manifest.json, metrics.jsonl, checkpoints/, the wireframe as
-/// .json, .obj and .ply in the frame of the scene's files, a picture of it, and overlays/ on
-/// some of the photographs.
+/// RUN then holds report.html to open first (`neat view RUN`), the wireframe as .json, .obj and
+/// .ply in the frame of the scene's files, a picture of it, overlays/ on some of the photographs,
+/// and config.toml, manifest.json, metrics.jsonl, junctions.jsonl and checkpoints/.
 ///
 /// Ctrl-C ends training after the current step and leaves a checkpoint (exit code 130).
 #[derive(Debug, Args)]
