@@ -94,6 +94,8 @@ fn a_trained_run_can_be_distilled_rendered_and_continued() {
         let path = scene.file(&format!("run/renders/image_0002-{kind}.png"));
         assert_eq!(image::open(path).unwrap().width(), 12);
     }
+    let comparison = scene.file("run/renders/image_0002-comparison.png");
+    assert_eq!(image::open(comparison).unwrap().width(), 24);
     let unknown = neat(&["render", &run, "--view", "nowhere"])
         .assert()
         .code(2);

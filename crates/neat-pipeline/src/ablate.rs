@@ -45,7 +45,7 @@ pub struct Truth {
 }
 
 /// Runs every variant, each in a folder of its own in `options.out`, and returns
-/// one row for each, in the order of [`variants`].
+/// one row for each, in the order of [`variants()`].
 ///
 /// The folder must be new or empty, or hold what this ablation has left before,
 /// which then continues: finished variants are not trained again;

@@ -6,6 +6,7 @@ use crate::error::CliError;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
+use image::{RgbImage, imageops};
 use neat_core::{View, file};
 use neat_eval::image_colouring::{DepthColors, color_image, depth_image, normal_image};
 use neat_eval::image_quality::psnr;
@@ -16,7 +17,8 @@ use std::path::{Path, PathBuf};
 
 /// Render colour, depth and normals of views of a trained run
 ///
-/// Prints the PSNR of the colours against the photographs.
+/// A comparison shows each rendering beside its photograph. Prints the PSNR of the colours
+/// against the photographs.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -89,8 +91,11 @@ fn render(
         &mut |fraction| progress.show_part(&view.name, fraction),
     );
     let (width, height) = (rendered.width, rendered.height);
+    let color = color_image(width, height, &rendered.color);
+    let photo = every_nth_pixel(&view.image, downscale);
     let images = [
-        ("color", color_image(width, height, &rendered.color)),
+        ("comparison", side_by_side(&color, &photo)),
+        ("color", color),
         (
             "depth",
             depth_image(width, height, &rendered.depth, DepthColors::Gray),
@@ -100,11 +105,15 @@ fn render(
     for (kind, image) in images {
         write_png(&out.join(format!("{}-{kind}.png", view.name)), &image)?;
     }
-    Ok(psnr(
-        &rendered.color,
-        &every_nth_pixel(&view.image, downscale),
-        None,
-    ))
+    Ok(psnr(&rendered.color, &photo, None))
+}
+
+/// Two images of one height, the first on the left.
+fn side_by_side(left: &RgbImage, right: &RgbImage) -> RgbImage {
+    let mut both = RgbImage::new(left.width() + right.width(), left.height());
+    imageops::replace(&mut both, left, 0, 0);
+    imageops::replace(&mut both, right, i64::from(left.width()), 0);
+    both
 }
 
 /// The views of these names, in the order of the scene.
