@@ -5,7 +5,7 @@ pub mod table;
 pub mod variants;
 
 use crate::config::{BackEnd, Config};
-use crate::distill::{Distilled, distill};
+use crate::distill::distill;
 use crate::error::{PipelineError, with_causes};
 use crate::event::{Event, OnEvent, Stage};
 use crate::field::TrainedField;
@@ -20,7 +20,7 @@ use neat_core::{Scene, Wireframe3d, file};
 use neat_eval::image_quality::psnr;
 use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
 use neat_field::attraction_region::AttractionRegions;
-use neat_wireframe::export::{WireframeDocument, write_json};
+use neat_wireframe::export::write_json;
 use neat_wireframe::metrics::PrecisionRecall;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -202,28 +202,13 @@ fn measure(
     let start = Instant::now();
     let distilled = distill(&run.scene, &run.field, &config, &mut |_| ())?;
     let seconds = start.elapsed().as_secs_f64();
-    let original_from_world = &run.scene.original_from_world;
-    let wireframe = (distilled.wireframe).map(|point| original_from_world.apply(point));
+    let document = distilled.document(&run.scene);
     if !variant.trains {
-        write_wireframe(options, variant, &run.scene, &distilled, &wireframe)?;
+        let folder = options.out.join(variant.slug);
+        file::create_dir(&folder)?;
+        write_json(&folder.join("wireframe.json"), &document)?;
     }
-    row(variant, run, &config, &wireframe, truth, seconds)
-}
-
-/// Writes the variant's `wireframe.json`, in the frame of the user's files.
-fn write_wireframe(
-    options: &RunOptions,
-    variant: &Variant,
-    scene: &Scene,
-    distilled: &Distilled,
-    wireframe: &Wireframe3d,
-) -> Result<(), PipelineError> {
-    let mut document = WireframeDocument::from(wireframe);
-    let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
-    (distilled.confidence).fill(&mut document, &names, &scene.original_from_world);
-    let folder = options.out.join(variant.slug);
-    file::create_dir(&folder)?;
-    Ok(write_json(&folder.join("wireframe.json"), &document)?)
+    row(variant, run, &config, &document.wireframe(), truth, seconds)
 }
 
 /// Everything but the names of the variant.

@@ -9,6 +9,8 @@ use neat_core::{Camera, LineSegment3, Scene, Wireframe3d};
 use neat_field::attraction_region::AttractionRegions;
 use neat_sdf::RayBundle;
 use neat_wireframe::confidence::{Confidence, assess};
+use neat_wireframe::curved_rims::curved_chains;
+use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::fast_back_end;
 use neat_wireframe::line_tracks;
 use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
@@ -44,6 +46,27 @@ pub struct Distilled {
     pub confidence: Confidence,
     /// What each step kept and removed.
     pub report: serde_json::Value,
+}
+
+impl Distilled {
+    /// The wireframe in the frame of the user's files, with what is known about its
+    /// parts; `scene` is the one that it is of.
+    pub fn document(&self, scene: &Scene) -> WireframeDocument {
+        let original_from_world = &scene.original_from_world;
+        let original = (self.wireframe).map(|point| original_from_world.apply(point));
+        let mut document = WireframeDocument::from(&original);
+        let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
+        self.confidence
+            .fill(&mut document, &names, original_from_world);
+        let curved = curved_chains(&self.wireframe);
+        if curved.contains(&true) {
+            let curved = curved.into_iter().map(|is| f64::from(u8::from(is)));
+            document
+                .edge_fields
+                .insert("curved".into(), curved.collect());
+        }
+        document
+    }
 }
 
 /// Queries the thin regions of all views and assembles the wireframe.

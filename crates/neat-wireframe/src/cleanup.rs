@@ -4,6 +4,7 @@
 use crate::edge_support::SupportedEdge;
 use crate::point_grid::GrowingPointGrid;
 use crate::point_index::PointIndex;
+use crate::used_junctions::UsedJunctions;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};
@@ -218,20 +219,12 @@ fn drop_isolated(
     edges: impl Iterator<Item = SupportedEdge>,
 ) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
     let mut edges: Vec<SupportedEdge> = edges.collect();
-    let mut used = vec![false; junctions.len()];
-    for junction in edges.iter().flat_map(|edge| edge.junctions) {
-        used[junction] = true;
-    }
-    let mut kept = Vec::new();
-    let mut new_index = vec![0; junctions.len()];
-    for (old, position) in junctions.iter().enumerate() {
-        if used[old] {
-            new_index[old] = kept.len();
-            kept.push(*position);
-        }
-    }
+    let pairs = edges.iter().map(|edge| &edge.junctions);
+    let used = UsedJunctions::new(junctions.len(), pairs);
+    let mut kept = junctions.to_vec();
+    used.retain(&mut kept);
     for edge in &mut edges {
-        edge.junctions = edge.junctions.map(|junction| new_index[junction]);
+        edge.junctions = used.renamed(edge.junctions);
     }
     (kept, edges)
 }

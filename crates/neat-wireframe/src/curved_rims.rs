@@ -5,6 +5,7 @@
 //! graph, and results ought to say so.
 
 use crate::Wireframe3d;
+use crate::disjoint_sets::DisjointSets;
 use nalgebra::Vector3;
 
 /// Pieces of a curve turn by at least this angle …
@@ -47,7 +48,7 @@ pub fn curved_chains(wireframe: &Wireframe3d) -> Vec<bool> {
             turns_of[*edge].push((index, place));
         }
     }
-    let mut runs: Vec<usize> = (0..turns.len()).collect();
+    let mut runs = DisjointSets::new(turns.len());
     for of_edge in &turns_of {
         let [(first, i), (second, j)] = of_edge[..] else {
             continue;
@@ -56,31 +57,22 @@ pub fn curved_chains(wireframe: &Wireframe3d) -> Vec<bool> {
         // other as its first; a turn walked backwards has the opposite axis.
         let sign = if i == j { -1.0 } else { 1.0 };
         if sign * turns[first].axis.dot(&turns[second].axis) >= MIN_AXIS_COSINE {
-            let [a, b] = [first, second].map(|turn| root(&runs, turn));
-            runs[a.max(b)] = a.min(b);
+            runs.join(first, second);
         }
     }
     let mut count = vec![0; turns.len()];
     for turn in 0..turns.len() {
-        count[root(&runs, turn)] += 1;
+        count[runs.first(turn)] += 1;
     }
     let mut curved = vec![false; wireframe.edges.len()];
     for (index, turn) in turns.iter().enumerate() {
-        if count[root(&runs, index)] >= MIN_TURNS {
+        if count[runs.first(index)] >= MIN_TURNS {
             for edge in turn.edges {
                 curved[edge] = true;
             }
         }
     }
     curved
-}
-
-/// The smallest member of a run of turns.
-fn root(runs: &[usize], mut turn: usize) -> usize {
-    while runs[turn] != turn {
-        turn = runs[turn];
-    }
-    turn
 }
 
 /// Two edges that meet under the angle of a curve.

@@ -41,11 +41,14 @@ pub mod visibility;
 
 mod alignments;
 mod block_cholesky;
+mod disjoint_sets;
 mod evidence;
+mod interval_cover;
 mod point_grid;
 mod point_index;
 mod pulls;
 mod segment_grid;
+mod used_junctions;
 
 pub use neat_core::Wireframe3d;
 pub use observation::ViewObservation;

@@ -5,6 +5,7 @@ use crate::attraction::{AttractionConfig, attract};
 use crate::junction_refinement::{JunctionRefinementConfig, RefinementError, refine_junctions};
 use crate::junction_voting::{JunctionVotingConfig, vote_for_junctions};
 use crate::neat_lines::{NeatLine, NeatLineConfig, RenderedSegment, neat_lines};
+use crate::used_junctions::UsedJunctions;
 use crate::visibility::{VisibilityConfig, visible_views};
 use crate::{SignedDistance, ViewObservation, Wireframe3d};
 use nalgebra::Vector3;
@@ -218,26 +219,13 @@ impl PaperWireframe {
     /// Removes junctions without an edge; the order of the others stays.
     fn drop_isolated_junctions(&mut self) {
         let Wireframe3d { junctions, edges } = &mut self.wireframe;
-        let mut used = vec![false; junctions.len()];
-        edges.iter().flatten().for_each(|end| used[*end] = true);
-        let mut new_index = Vec::with_capacity(used.len());
-        let mut count = 0;
-        for keep in &used {
-            new_index.push(count);
-            count += usize::from(*keep);
+        let used = UsedJunctions::new(junctions.len(), edges.iter());
+        for edge in edges {
+            *edge = used.renamed(*edge);
         }
-        edges
-            .iter_mut()
-            .flatten()
-            .for_each(|end| *end = new_index[*end]);
-        retain_marked(junctions, &used);
-        retain_marked(&mut self.junction_votes, &used);
+        used.retain(junctions);
+        used.retain(&mut self.junction_votes);
     }
-}
-
-fn retain_marked<T>(items: &mut Vec<T>, marks: &[bool]) {
-    let mut marks = marks.iter();
-    items.retain(|_| marks.next().copied().unwrap_or(false));
 }
 
 /// Sorted by x, y and z. Of junctions at one place the one with most votes stays:

@@ -9,8 +9,10 @@
 //! Visibility is not asked for, so a hidden edge counts where detections happen to
 //! lie on its projection: the yardstick is too strict there, never too lenient.
 
+use crate::interval_cover::covered_length;
 use crate::projection::project_in_front;
 use crate::segment_matching::match_segment;
+use crate::used_junctions::UsedJunctions;
 use crate::{ViewObservation, Wireframe3d};
 use nalgebra::{Vector2, Vector3};
 use neat_core::LineSegment2;
@@ -70,7 +72,13 @@ pub fn supported_truth(
         .filter(|[a, b]| a != b)
         .collect();
     let edges = dissolve_straight(&truth.junctions, edges, config);
-    only_used(&truth.junctions, &edges)
+    let used = UsedJunctions::new(truth.junctions.len(), edges.iter());
+    let mut junctions = truth.junctions.clone();
+    used.retain(&mut junctions);
+    Wireframe3d {
+        junctions,
+        edges: edges.into_iter().map(|edge| used.renamed(edge)).collect(),
+    }
 }
 
 fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
@@ -92,7 +100,7 @@ fn is_covered(
         return false;
     };
     let edge = LineSegment2::new(start, end);
-    let mut covered: Vec<[f64; 2]> = view
+    let covered = view
         .segments
         .iter()
         .map(|detection| &detection.segment)
@@ -107,13 +115,7 @@ fn is_covered(
             [t.min(u), t.max(u)]
         })
         .collect();
-    covered.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let (mut share, mut reached) = (0.0, 0.0);
-    for [from, to] in covered {
-        share += (to - f64::max(from, reached)).max(0.0);
-        reached = f64::max(reached, to);
-    }
-    share >= config.min_coverage
+    covered_length(covered, [0.0, 1.0]) >= config.min_coverage
 }
 
 /// For every junction the first one that stands for itself and from which no image
@@ -176,19 +178,6 @@ fn dissolve_straight(
         }
     }
     edges
-}
-
-fn only_used(junctions: &[Vector3<f64>], edges: &BTreeSet<[usize; 2]>) -> Wireframe3d {
-    let used: BTreeSet<usize> = edges.iter().flatten().copied().collect();
-    let used: Vec<usize> = used.into_iter().collect();
-    let new_index = |old: &usize| used.partition_point(|index| index < old);
-    Wireframe3d {
-        junctions: used.iter().map(|index| junctions[*index]).collect(),
-        edges: edges
-            .iter()
-            .map(|[a, b]| [new_index(a), new_index(b)])
-            .collect(),
-    }
 }
 
 /// A result without its pieces of curved rims.

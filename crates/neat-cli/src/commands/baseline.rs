@@ -1,5 +1,6 @@
 //! `neat baseline`.
 
+use super::reconstruct::in_words;
 use crate::arguments::MethodArgs;
 use crate::cache::CacheArgs;
 use crate::error::CliError;
@@ -112,14 +113,8 @@ impl Line3dArgs {
         write_obj(&path("obj"), &wireframe).map_err(failed)?;
         write_ply(&path("ply"), &wireframe).map_err(failed)?;
         let mut text = format!("line3d: {} segments in {seconds:.1} s", segments.len());
-        let agreement = agreement(scene, &config, &in_world).and_then(|agreement| {
-            let share = agreement.explained_length_share?;
-            Some((share, agreement.mean_reprojection_error_in_pixels?))
-        });
-        if let Some((share, error)) = agreement {
-            let percent = 100.0 * share;
-            text +=
-                &format!(", on {percent:.0} % of the length of all 2D segments, {error:.2} px off");
+        if let Some(agreement) = agreement(scene, &config, &in_world) {
+            text += &in_words(&agreement);
         }
         output::print(&format!("{text}: {}", path("json").display()))
     }

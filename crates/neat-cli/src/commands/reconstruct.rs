@@ -6,6 +6,7 @@ use crate::progress::Progress;
 use crate::{interrupt, output};
 use clap::Args;
 use neat_pipeline::reconstruct::{Reconstruction, reconstruct};
+use neat_wireframe::metrics::ImageEvidence;
 
 /// Turn a scene into a 3D wireframe: train, distil, and write all results
 ///
@@ -50,13 +51,19 @@ pub fn summary(reconstruction: &Reconstruction) -> String {
         wireframe.junctions.len(),
         wireframe.edges.len(),
     );
-    let agreement = reconstruction.agreement.and_then(|agreement| {
-        let share = agreement.explained_length_share?;
-        Some((share, agreement.mean_reprojection_error_in_pixels?))
-    });
-    if let Some((share, error)) = agreement {
-        let percent = 100.0 * share;
-        text += &format!(", on {percent:.0} % of the length of all 2D segments, {error:.2} px off");
+    if let Some(agreement) = &reconstruction.agreement {
+        text += &in_words(agreement);
     }
     text + &format!(": {}", reconstruction.run.wireframe("json").display())
+}
+
+/// How well a wireframe agrees with the images, to follow its size; empty where there
+/// are no 2D segments or none is explained.
+pub fn in_words(agreement: &ImageEvidence) -> String {
+    let share = agreement.explained_length_share;
+    let figures = share.zip(agreement.mean_reprojection_error_in_pixels);
+    figures.map_or_else(String::new, |(share, error)| {
+        let percent = 100.0 * share;
+        format!(", on {percent:.0} % of the length of all 2D segments, {error:.2} px off")
+    })
 }

@@ -10,7 +10,6 @@ use crate::field::TrainedField;
 use crate::image_io::write_png;
 use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe, spread_views};
 use neat_core::{Wireframe3d, file};
-use neat_wireframe::curved_rims::curved_chains;
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::metrics::ImageEvidence;
 use rayon::prelude::*;
@@ -73,21 +72,11 @@ impl Session<'_> {
         agreement: Option<ImageEvidence>,
     ) -> Result<(Wireframe3d, WireframeDocument), PipelineError> {
         let in_world = &distilled.wireframe;
-        let original = in_world.map(|point| self.scene.original_from_world.apply(point));
-        let mut document = WireframeDocument {
+        let document = WireframeDocument {
             metadata: self.metadata(distilled, agreement),
-            ..WireframeDocument::from(&original)
+            ..distilled.document(&self.scene)
         };
-        let names: Vec<String> = self.scene.views.iter().map(|v| v.name.clone()).collect();
-        let original_from_world = &self.scene.original_from_world;
-        (distilled.confidence).fill(&mut document, &names, original_from_world);
-        let curved = curved_chains(in_world);
-        if curved.contains(&true) {
-            let curved = curved.into_iter().map(|is| f64::from(u8::from(is)));
-            document
-                .edge_fields
-                .insert("curved".into(), curved.collect());
-        }
+        let original = document.wireframe();
         let [json, obj, ply, png] =
             ["json", "obj", "ply", "png"].map(|extension| self.dir.wireframe(extension));
         write_json(&json, &document)?;

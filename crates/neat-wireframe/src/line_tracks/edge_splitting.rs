@@ -6,6 +6,7 @@ use super::clustering::view_count;
 use super::junction_graph::{GraphEdge, JunctionGraph};
 use super::line_refinement::{LineRefinementConfig, shown_interval};
 use super::view_segments::{SegmentId, TrackView};
+use crate::disjoint_sets::DisjointSets;
 use crate::projection::project_in_front;
 use nalgebra::Vector2;
 use neat_core::{LineSegment2, LineSegment3};
@@ -81,7 +82,7 @@ pub(super) fn split_edges(
     splits.sort_unstable();
     splits.dedup();
 
-    let mut same = SameJunctions::new(graph.junctions.len());
+    let mut same = DisjointSets::new(graph.junctions.len());
     let mut pieces: Vec<GraphEdge> = Vec::new();
     let mut cut = 0;
     let mut rest = splits.as_slice();
@@ -199,7 +200,7 @@ fn inner_places(
     line: &CertainLine,
     splits: &[Split],
     config: &EdgeSplittingConfig,
-    same: &mut SameJunctions,
+    same: &mut DisjointSets,
 ) -> Vec<usize> {
     let mut places: Vec<(f64, usize)> = splits
         .iter()
@@ -257,28 +258,6 @@ fn cut_edge(
         })
         .filter(|piece| view_count(&piece.supports) >= min_views)
         .collect()
-}
-
-/// Which junctions have become one.
-struct SameJunctions(Vec<usize>);
-
-impl SameJunctions {
-    fn new(count: usize) -> Self {
-        Self((0..count).collect())
-    }
-
-    /// The junction that stands for all of its group.
-    fn first(&self, mut junction: usize) -> usize {
-        while self.0[junction] != junction {
-            junction = self.0[junction];
-        }
-        junction
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let [a, b] = [self.first(a), self.first(b)];
-        self.0[a.max(b)] = a.min(b);
-    }
 }
 
 #[cfg(test)]

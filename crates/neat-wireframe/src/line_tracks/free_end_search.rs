@@ -7,6 +7,7 @@ use super::junction_graph::JunctionGraph;
 use super::line_refinement::{LineRefinementConfig, shown_interval};
 use super::projected_line::ProjectedLine;
 use super::view_segments::{SegmentId, TrackView, segment_of};
+use crate::interval_cover::covered_length;
 use crate::projection::project_in_front;
 use nalgebra::Vector3;
 use neat_core::LineSegment2;
@@ -286,7 +287,7 @@ impl<'a> Search<'a> {
         else {
             return false;
         };
-        let mut shown: Vec<[f64; 2]> = prepared
+        let shown: Vec<[f64; 2]> = prepared
             .index
             .near(&LineSegment2::new(start, end))
             .into_iter()
@@ -296,16 +297,7 @@ impl<'a> Search<'a> {
             })
             .filter_map(|id| shown_interval(self.views, id, &line.line))
             .collect();
-        shown.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        let (mut covered, mut reached) = (0.0, low);
-        for [from, to] in shown {
-            let (from, to) = (from.max(reached), to.min(high));
-            if to > from {
-                covered += to - from;
-                reached = to;
-            }
-        }
-        covered >= self.config.min_covered_share * (high - low)
+        covered_length(shown, [low, high]) >= self.config.min_covered_share * (high - low)
     }
 }
 

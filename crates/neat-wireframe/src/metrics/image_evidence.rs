@@ -2,6 +2,7 @@
 //! measured on photographs, where no true wireframe is known.
 
 use super::{MetricsError, PointCloud};
+use crate::interval_cover::covered_length;
 use crate::validity::check_wireframe;
 use crate::{ViewObservation, Wireframe3d};
 use nalgebra::Vector3;
@@ -144,14 +145,8 @@ fn view_evidence(
                 }),
         );
         // Pieces of a line that was cut explain together what no piece does alone.
-        fits.sort_by(|(_, a), (_, b)| a.covered[0].total_cmp(&b.covered[0]));
-        let (mut covered, mut reached) = (0.0, 0.0);
-        for (_, fit) in &fits {
-            let [from, to] = fit.covered;
-            covered += (to - f64::max(from, reached)).max(0.0);
-            reached = f64::max(reached, to);
-        }
-        if covered >= config.min_overlap {
+        let covered = fits.iter().map(|(_, fit)| fit.covered).collect();
+        if !fits.is_empty() && covered_length(covered, [0.0, 1.0]) >= config.min_overlap {
             for (edge, _) in &fits {
                 evidence.shows[*edge] = true;
             }
