@@ -1,5 +1,6 @@
 //! Parameters of a module by name: reading, writing, counting.
 
+use crate::fused::is_fused;
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::{DType, Tensor, TensorData};
@@ -91,32 +92,46 @@ pub fn named_gradients<M: Module>(
     reader.values
 }
 
-struct GradientSums<'a> {
+struct FiniteGradients<'a> {
     gradients: &'a GradientsParams,
+    finite: bool,
+    /// Sums of gradients that lie on a device, which no NaN and no infinity leaves
+    /// finite.
     sums: Vec<Tensor<1>>,
 }
 
-impl ModuleVisitor for GradientSums<'_> {
+impl ModuleVisitor for FiniteGradients<'_> {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        if let Some(gradient) = self.gradients.get::<D>(param.id) {
+        let Some(gradient) = self.gradients.get::<D>(param.id) else {
+            return;
+        };
+        if !is_fused(&gradient.device()) {
             self.sums.push(gradient.sum());
+            return;
         }
+        // On the host a look at every value costs less than one tensor operation.
+        let data = gradient.into_data();
+        self.finite &= match data.as_slice::<f32>() {
+            Ok(values) => values.iter().fold(true, |finite, x| finite & x.is_finite()),
+            Err(_) => data.iter::<f64>().all(f64::is_finite),
+        };
     }
 }
 
-/// Whether all gradients of a module's parameters are numbers. One value is read
-/// from the device: the sum of all, which no NaN and no infinity leaves finite.
+/// Whether all gradients of a module's parameters are numbers. Of a GPU one value is
+/// read.
 pub fn gradients_are_finite<M: Module>(module: &M, gradients: &GradientsParams) -> bool {
-    let mut visitor = GradientSums {
+    let mut visitor = FiniteGradients {
         gradients,
+        finite: true,
         sums: Vec::new(),
     };
     module.visit(&mut visitor);
     if visitor.sums.is_empty() {
-        return true;
+        return visitor.finite;
     }
     let total = Tensor::cat(visitor.sums, 0).sum().into_data();
-    total.iter::<f64>().all(f64::is_finite)
+    visitor.finite && total.iter::<f64>().all(f64::is_finite)
 }
 
 /// Why parameters could not be put into a module.
