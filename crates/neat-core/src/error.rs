@@ -114,6 +114,18 @@ pub enum SceneError {
         /// What the codec said.
         source: image::ImageError,
     },
+    /// The temporary file that images lie in where memory is limited.
+    #[error(
+        "the image of view `{view}` cannot be kept in a temporary file in {dir}, or read back: check the space on that disk, give another folder for the cache, or allow more memory"
+    )]
+    ImageStore {
+        /// Name of the view.
+        view: String,
+        /// The folder of the file.
+        dir: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// A view that makes no sense.
     #[error("view `{view}` of {path}: {problem}")]
     View {

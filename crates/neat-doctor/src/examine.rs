@@ -62,13 +62,22 @@ fn examine_as(scene: &Scene, options: &ExamineOptions, mirrored: bool) -> Examin
         let findings = vec![explain(&error)];
         return Examination::new(&scene.name, scene.views.len(), findings);
     }
-    let working: Vec<_> = (scene.views.par_iter())
-        .map(|view| GrayImage::working_copy(&view.image))
-        .collect();
-    let mut findings = pose_findings(scene, &working, options, mirrored);
-    findings.extend(image_findings(scene, &working));
-    findings.extend(capture_findings(scene));
+    let findings = findings(scene, options, mirrored).unwrap_or_else(|error| vec![explain(&error)]);
     Examination::new(&scene.name, scene.views.len(), findings)
+}
+
+fn findings(
+    scene: &Scene,
+    options: &ExamineOptions,
+    mirrored: bool,
+) -> Result<Vec<Finding>, SceneError> {
+    let working = (scene.views.par_iter())
+        .map(|view| Ok(GrayImage::working_copy(&*view.image.read()?)))
+        .collect::<Result<Vec<_>, SceneError>>()?;
+    let mut findings = pose_findings(scene, &working, options, mirrored);
+    findings.extend(image_findings(scene, &working)?);
+    findings.extend(capture_findings(scene));
+    Ok(findings)
 }
 
 fn pose_findings(

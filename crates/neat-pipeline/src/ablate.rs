@@ -277,7 +277,8 @@ fn mean_psnr(scene: &Scene, field: &TrainedField) -> Option<f64> {
             let longer = view.camera.width.max(view.camera.height);
             let step = (longer / RENDERED_SIZE).max(1);
             let rendered = render_view(field, &view.camera, scene.pixel_center, step, &mut |_| ());
-            psnr(&rendered.color, &every_nth_pixel(&view.image, step), None)
+            let photograph = view.image.read().ok()?;
+            psnr(&rendered.color, &every_nth_pixel(&photograph, step), None)
         })
         .collect();
     let values = values.filter(|values| !values.is_empty())?;

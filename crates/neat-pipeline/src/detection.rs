@@ -6,6 +6,7 @@ pub use folder::{DetectOptions, Detected, SegmentSource, detect_folder};
 
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage};
+use image::RgbImage;
 use neat_core::file_cache::{CacheKey, FileCache};
 use neat_core::{Scene, SceneError, View, Wireframe2d, hawp_json};
 use neat_detect::{DetectorConfig, detect};
@@ -40,9 +41,9 @@ pub fn detect_wireframes(
     let mut done = 0;
     // Some at a time, so that progress can be told in between.
     for chunk in scene.views.chunks_mut(4 * rayon::current_num_threads()) {
-        let found: Vec<_> = (chunk.par_iter())
+        let found = (chunk.par_iter())
             .map(|view| detect_in(view, config, cache))
-            .collect();
+            .collect::<Result<Vec<_>, _>>()?;
         for (view, (mut wireframe, warning)) in chunk.iter_mut().zip(found) {
             for vertex in &mut wireframe.vertices {
                 *vertex = vertex.add_scalar(scene.pixel_center);
@@ -78,23 +79,27 @@ pub fn detect_wireframes(
 
 /// The wireframe of one image, with pixel centres at integers, and a warning if
 /// it could not be stored.
+///
+/// # Errors
+/// If the image lies in a file that cannot be read.
 fn detect_in(
     view: &View,
     config: &DetectorConfig,
     cache: Option<&FileCache>,
-) -> (Wireframe2d, Option<String>) {
+) -> Result<(Wireframe2d, Option<String>), SceneError> {
+    let image = view.image.read()?;
     let Some(cache) = cache else {
-        return (detect(&view.image, config), None);
+        return Ok((detect(&image, config), None));
     };
-    let key = key(view, config);
+    let key = key(&image, config);
     let name = Path::new("2D wireframe");
     let stored = cache
         .get(&key)
         .and_then(|bytes| hawp_json::parse(&bytes, DETECTED_WITH_PIXEL_CENTER, name).ok());
     if let Some(wireframe) = stored {
-        return (wireframe, None);
+        return Ok((wireframe, None));
     }
-    let wireframe = detect(&view.image, config);
+    let wireframe = detect(&image, config);
     let stored = cache.put(
         &key,
         &hawp_json::to_bytes(&wireframe, DETECTED_WITH_PIXEL_CENTER),
@@ -102,16 +107,16 @@ fn detect_in(
     let warning = stored
         .err()
         .map(|error| format!("detected 2D wireframes are not kept for the next run: {error}"));
-    (wireframe, warning)
+    Ok((wireframe, warning))
 }
 
-fn key(view: &View, config: &DetectorConfig) -> CacheKey {
-    let (width, height) = view.image.dimensions();
+fn key(image: &RgbImage, config: &DetectorConfig) -> CacheKey {
+    let (width, height) = image.dimensions();
     let settings = toml::to_string(config).expect("detection::key: settings can be written");
     let inputs = [
         &width.to_le_bytes(),
         &height.to_le_bytes(),
-        view.image.as_raw().as_slice(),
+        image.as_raw().as_slice(),
         settings.as_bytes(),
     ];
     CacheKey::new("wireframe2d", DETECTOR_VERSION, &inputs)
@@ -203,12 +208,14 @@ mod tests {
     #[test]
     fn views_without_segments_are_left_out() {
         let mut two = scene();
-        two.views[1].image.fill(0);
+        two.views[1].image = RgbImage::new(128, 128).into();
         let warnings = detected(&mut two, None).unwrap();
         assert_eq!(two.views.len(), 2);
         assert!(warnings[0].contains("image_0001"), "{warnings:?}");
         let mut none = scene();
-        none.views.iter_mut().for_each(|view| view.image.fill(0));
+        for view in &mut none.views {
+            view.image = RgbImage::new(128, 128).into();
+        }
         let error = detected(&mut none, None).unwrap_err();
         assert!(error.to_string().contains("none of the 3 views"));
     }

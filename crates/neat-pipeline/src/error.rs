@@ -137,5 +137,8 @@ pub fn with_causes(error: &dyn Error) -> String {
 }
 
 fn is_write_error(error: &SceneError) -> bool {
-    matches!(error, SceneError::Write { .. })
+    matches!(
+        error,
+        SceneError::Write { .. } | SceneError::ImageStore { .. }
+    )
 }

@@ -52,16 +52,13 @@ pub fn estimate(config: &Config, scene: &Scene, speed: f64) -> Estimate {
     } else {
         NARROW_SHARE
     };
-    let image_bytes: usize = (scene.views.iter())
-        .map(|view| view.image.as_raw().len())
-        .sum();
+    let image_bytes: u64 = (scene.views.iter()).map(|view| view.image.byte_len()).sum();
     let chunk = config.train.ray_chunk.unwrap_or(config.train.rays);
     let at_once = (chunk as f64 / config.train.rays as f64).min(1.0);
     Estimate {
         seconds: config.train.steps as f64 * flops / (speed * 1e9 * share),
-        // Images are held by the scene and by the training data.
         bytes: BASE_BYTES
-            + 2.0 * image_bytes as f64
+            + image_bytes as f64
             + at_once * rows.full as f64 * width as f64 * BYTES_PER_UNIT,
     }
 }

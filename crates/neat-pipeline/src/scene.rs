@@ -75,7 +75,7 @@ pub fn prepare_scene(
         radius: scene.original_from_world.scale * scene.sphere_radius,
         source: placed.map_or(loaded.sphere.source, |sphere| sphere.source),
     };
-    fit_background(config, &scene);
+    fit_background(config, &scene)?;
     on_event(Event::Note(format!("scene sphere: {sphere}")));
     if let (SphereChoice::Given { .. }, Some(radius)) =
         (config.data.scene_sphere, config.data.scene_radius)

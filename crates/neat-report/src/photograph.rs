@@ -71,7 +71,8 @@ impl Photograph {
 /// have one.
 ///
 /// # Errors
-/// If an image cannot be encoded; the message names the view.
+/// If an image cannot be encoded, or read where it lies in a file; the message names
+/// the view.
 pub fn photographs(
     scene: &Scene,
     config: &PhotographConfig,
@@ -85,9 +86,11 @@ pub fn photographs(
     }
     (scene.views.par_iter().zip(chosen))
         .map(|(view, chosen)| {
-            let photograph = chosen.then(|| Photograph::of_image(&view.image, config));
-            photograph
-                .transpose()
+            if !chosen {
+                return Ok(None);
+            }
+            Photograph::of_image(&*view.image.read()?, config)
+                .map(Some)
                 .map_err(|source| ReportError::Photograph {
                     view: view.name.clone(),
                     source,

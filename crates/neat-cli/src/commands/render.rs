@@ -92,7 +92,7 @@ fn render(
     );
     let (width, height) = (rendered.width, rendered.height);
     let color = color_image(width, height, &rendered.color);
-    let photo = every_nth_pixel(&view.image, downscale);
+    let photo = every_nth_pixel(&*view.image.read()?, downscale);
     let images = [
         ("comparison", side_by_side(&color, &photo)),
         ("color", color),

@@ -79,8 +79,9 @@ fn abc_scene(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
 
 fn write_images(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
     file::create_dir(dir)?;
-    (scene.views.par_iter())
-        .try_for_each(|view| file::write_png(&dir.join(image_name(&view.name)), &view.image))
+    (scene.views.par_iter()).try_for_each(|view| {
+        file::write_png(&dir.join(image_name(&view.name)), &*view.image.read()?)
+    })
 }
 
 fn write_wireframes(scene: &Scene, dir: &Path) -> Result<(), SceneError> {

@@ -122,7 +122,10 @@ pub fn write_scene(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
         file::create_dir(&hawp_dir)?;
     }
     scene.views.par_iter().try_for_each(|view| {
-        file::write_png(&images_dir.join(format!("{}.png", view.name)), &view.image)?;
+        file::write_png(
+            &images_dir.join(format!("{}.png", view.name)),
+            &*view.image.read()?,
+        )?;
         if !has_wireframes {
             return Ok(());
         }

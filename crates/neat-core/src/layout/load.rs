@@ -140,7 +140,7 @@ pub(super) fn load_posed(
             name: posed.name.clone(),
             camera: rectification.camera(),
             wireframe,
-            image: photograph.image,
+            image: photograph.image.into(),
         };
         view.validate()
             .map_err(|problem| poses::view_error(&hawp_dir, &view.name, problem))?;

@@ -178,7 +178,7 @@ pub fn generate(config: &SyntheticScene) -> Result<SyntheticData, SyntheticError
             name: format!("image_{index:04}"),
             camera,
             wireframe,
-            image: render(&solid, &camera, config.shading),
+            image: render(&solid, &camera, config.shading).into(),
         };
         (view, ViewTruth { visible, sources })
     })

@@ -212,7 +212,7 @@ mod tests {
                     .join(folder)
                     .join(format!("{}.{ending}", view.name))
             };
-            view.image.save(path("images", "png")).unwrap();
+            (view.image.read().unwrap().save(path("images", "png"))).unwrap();
             let mut text = String::new();
             let mut edges = RgbImage::new(128, 128);
             for scored in view.wireframe.segments(0.05) {

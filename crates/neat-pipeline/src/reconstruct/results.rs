@@ -96,7 +96,7 @@ impl Session<'_> {
         overlays.par_iter().try_for_each(|(view, path)| {
             let pixel_center = self.scene.pixel_center;
             let picture = match self.config.distill.overlay {
-                OverlayGround::Photo => draw_overlay(view, pixel_center, in_world),
+                OverlayGround::Photo => draw_overlay(view, pixel_center, in_world)?,
                 OverlayGround::Segments => {
                     let min_score = self.config.data.min_segment_score;
                     draw_sketch(view, pixel_center, min_score, in_world)
