@@ -32,7 +32,7 @@ def arguments():
     parser.add_argument("--width", type=int, default=4000)
     parser.add_argument("--height", type=int, default=3000)
     # A small object is quickly rendered, and memory does not depend on its size.
-    parser.add_argument("--distance", type=float, default=6.0, help="of the cameras")
+    parser.add_argument("--distance", type=float, default=20.0, help="of the cameras")
     parser.add_argument("--limit", default="8GiB", help="the memory limit")
     parser.add_argument("--steps", type=int, default=200)
     parser.add_argument("--preset", default="fast")

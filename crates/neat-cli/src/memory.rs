@@ -8,9 +8,9 @@ use neat_pipeline::machine_memory::default_limit;
 /// How much memory may be used.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct MemoryArgs {
-    /// Use at most so much memory (8GiB, 500MB) instead of three quarters of what there is:
-    /// images that need more go to a temporary file beside the cache, and fewer are worked on at
-    /// once; results do not depend on it
+    /// Use at most so much memory (8GiB, 500MB) instead of three quarters of what there is: images
+    /// that need more go to a temporary file in the folder of the cache, fewer are worked on at
+    /// once, and steps of training that need more are taken in several passes
     #[arg(long, value_name = "SIZE", value_parser = parse)]
     memory_limit: Option<MemoryLimit>,
 }

@@ -114,10 +114,10 @@ fn tell_of_images(scene: &Scene, on_event: OnEvent<'_>) {
     let in_file = scene.views.iter().filter(|view| view.image.is_in_file());
     let sizes: Vec<u64> = in_file.map(|view| view.image.byte_len()).collect();
     if !sizes.is_empty() {
-        let gib = sizes.iter().sum::<u64>() as f64 / 1024f64.powi(3);
+        let mib = sizes.iter().sum::<u64>().div_ceil(1 << 20);
         let views = sizes.len();
         on_event(Event::Note(format!(
-            "{views} images of {gib:.1} GiB together are kept in a temporary file, for the sake of memory"
+            "{views} images of {mib} MiB together are kept in a temporary file, for the sake of memory"
         )));
     }
 }

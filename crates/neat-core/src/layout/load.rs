@@ -1,7 +1,7 @@
 //! From a folder to a scene: poses, images and 2D wireframes, read alike for all
 //! layouts.
 
-use super::masks::{self, MaskFiles};
+use super::masks::{self, MaskFiles, Room};
 use super::photograph::{self, Photograph};
 use super::poses::{self, PosedImage, Poses};
 use super::rectify::Rectification;
@@ -188,7 +188,7 @@ pub(super) fn load_posed(
     };
     let mut kept = kept.into_iter();
     poses.views.retain(|_| kept.next() == Some(true));
-    let masks = masks::find(dir, &poses.views);
+    let masks = masks::find(dir, &poses.views, Room { limit, bytes_each });
     let sphere = Evidence {
         dir,
         masks: masks.as_ref(),
