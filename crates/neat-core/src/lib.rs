@@ -25,6 +25,7 @@ pub mod ground_truth;
 pub mod hawp_json;
 pub mod layout;
 pub mod line_segment;
+pub mod memory_limit;
 #[cfg(test)]
 mod mutation;
 pub mod npz;
@@ -33,6 +34,7 @@ pub mod scene;
 pub mod scene_sphere;
 pub mod synthetic;
 pub mod undistortion;
+pub mod view_image;
 pub mod wireframe2d;
 pub mod wireframe3d;
 
@@ -41,7 +43,9 @@ pub use distortion::Distortion;
 pub use error::{SceneError, ViewError};
 pub use layout::{LoadOptions, LoadedScene, load_scene};
 pub use line_segment::{LineSegment, LineSegment2, LineSegment3};
+pub use memory_limit::MemoryLimit;
 pub use scene::{Observation, Scene, Similarity, SparsePoint, View};
 pub use scene_sphere::{SceneSphere, SphereChoice};
+pub use view_image::{ImageStore, ViewImage};
 pub use wireframe2d::{ScoredSegment2, Wireframe2d, Wireframe2dError};
 pub use wireframe3d::Wireframe3d;

@@ -1,7 +1,6 @@
 //! A scene: posed images, each with its 2D wireframe.
 
-use crate::{Camera, SceneError, ViewError, Wireframe2d, scene_sphere};
-use image::RgbImage;
+use crate::{Camera, SceneError, ViewError, ViewImage, Wireframe2d, scene_sphere};
 use nalgebra::{Matrix4, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -53,7 +52,7 @@ pub struct View {
     /// Junctions and segments, in image coordinates.
     pub wireframe: Wireframe2d,
     /// The photograph.
-    pub image: RgbImage,
+    pub image: ViewImage,
 }
 
 /// A point of a sparse reconstruction, such as structure from motion finds.
@@ -249,6 +248,7 @@ pub(crate) fn check_names<'a>(
 mod tests {
     use super::*;
     use crate::Intrinsics;
+    use image::RgbImage;
 
     /// A view from `distance` along −z toward the origin.
     fn view(name: &str, distance: f64, width: u32, height: u32) -> View {
@@ -264,7 +264,7 @@ mod tests {
             name: name.into(),
             camera: Camera::from_matrices(intrinsics, &pose, width, height),
             wireframe: Wireframe2d::empty(width, height),
-            image: RgbImage::new(width, height),
+            image: RgbImage::new(width, height).into(),
         }
     }
 
@@ -339,7 +339,7 @@ mod tests {
             |views| views[1].camera.world_from_camera *= -1.0,
             |views| views[1].camera.center_in_world.x = f64::NAN,
             |views| views[1].wireframe.edges.push([0, 0]),
-            |views| views[1].image = RgbImage::new(3, 3),
+            |views| views[1].image = RgbImage::new(3, 3).into(),
             |views| views[0].name = "b".into(),
         ];
         for damage in damages {

@@ -49,7 +49,7 @@ fn view(index: u32) -> View {
             width: WIDTH,
             height: HEIGHT,
         },
-        image: RgbImage::from_fn(WIDTH, HEIGHT, |x, y| Rgb([x as u8, y as u8, index as u8])),
+        image: RgbImage::from_fn(WIDTH, HEIGHT, |x, y| Rgb([x as u8, y as u8, index as u8])).into(),
     }
 }
 
@@ -86,7 +86,7 @@ fn assert_same_views(found: &Scene, expected: &Scene, tolerance: f64) {
     assert_eq!(found.views.len(), expected.views.len());
     for (found, expected) in found.views.iter().zip(&expected.views) {
         assert_eq!(found.name, expected.name);
-        assert_eq!(found.image, expected.image);
+        assert_eq!(found.image.read().unwrap(), expected.image.read().unwrap());
         assert_eq!(found.wireframe, expected.wireframe);
         let (a, b) = (&found.camera, &expected.camera);
         assert!((a.intrinsics.matrix() - b.intrinsics.matrix()).amax() <= tolerance);

@@ -211,7 +211,7 @@ fn real_scenes_are_written_in_every_format_and_read_back() {
             };
             for (found, expected) in back.views.iter().zip(&scene.views) {
                 assert_eq!(found.name, expected.name);
-                assert_eq!(found.image, expected.image);
+                assert_eq!(found.image.read().unwrap(), expected.image.read().unwrap());
                 let shift = back.pixel_center - scene.pixel_center;
                 for pixel in [Vector2::zeros(), Vector2::new(100.0, 70.0)] {
                     let ray = expected.camera.ray_through(&pixel);
@@ -398,6 +398,7 @@ fn the_meta_data_of_emap_agree_with_the_cameras_made_from_them() {
 fn offset_of_edge(view: &View, middle: &Vector2<f64>, normal: &Vector2<f64>) -> Option<f64> {
     const REACH: i32 = 12;
     const STEP: f64 = 0.25;
+    let image = view.image.read().unwrap();
     let brightness = |at: Vector2<f64>| {
         // Between the centres of four pixels.
         let at = at.add_scalar(-0.5);
@@ -405,8 +406,7 @@ fn offset_of_edge(view: &View, middle: &Vector2<f64>, normal: &Vector2<f64>) -> 
         let (dx, dy) = (at.x - x, at.y - y);
         let pixel = |x: f64, y: f64| {
             let inside = x >= 0.0 && y >= 0.0;
-            let pixel = view
-                .image
+            let pixel = image
                 .get_pixel_checked(x as u32, y as u32)
                 .filter(|_| inside)?;
             Some(pixel.0.iter().map(|&c| f64::from(c)).sum::<f64>() / 3.0)

@@ -21,7 +21,8 @@ fn image(width: u32, height: u32) -> RgbImage {
     .expect("the configuration is valid");
     RgbImage::from_fn(width, height, |x, y| {
         let view = (x / side + 4 * (y / side)) as usize % data.scene.views.len();
-        let mut pixel = *data.scene.views[view].image.get_pixel(x % side, y % side);
+        let image = &data.scene.views[view].image;
+        let mut pixel = (image.pixel(x % side, y % side)).expect("the image is in memory");
         // A fixed pattern in the place of noise.
         let grain = (x.wrapping_mul(7919) ^ y.wrapping_mul(104_729)) % 5;
         pixel.0 = pixel.0.map(|value| value.saturating_add(grain as u8));

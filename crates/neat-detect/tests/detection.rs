@@ -124,7 +124,7 @@ fn the_same_image_gives_the_same_on_any_number_of_threads() {
         ..SyntheticScene::default()
     })
     .unwrap();
-    let image = &data.scene.views[0].image;
+    let image = &*data.scene.views[0].image.read().unwrap();
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -146,7 +146,7 @@ fn nearly_all_junctions_of_synthetic_solids_are_found() {
         })
         .unwrap();
         for (view, truth) in data.scene.views.iter().zip(&data.view_truths) {
-            let wireframe = detect(&view.image, &DetectorConfig::default());
+            let wireframe = detect(&view.image.read().unwrap(), &DetectorConfig::default());
             wireframe.validate().unwrap();
             for part in &truth.visible {
                 for (junction, end) in part.junctions.iter().zip(part.segment.ends()) {
@@ -247,7 +247,7 @@ fn the_toy_object_shows_what_hawp_is_sure_of() {
     let scene = load_scene(&dir, &LoadOptions::default()).unwrap().scene;
     let (mut found, mut all) = (0u32, 0u32);
     for view in scene.views.iter().step_by(10) {
-        let wireframe = detect(&view.image, &DetectorConfig::default());
+        let wireframe = detect(&view.image.read().unwrap(), &DetectorConfig::default());
         for sure in view.wireframe.segments(0.5) {
             let sure = sure.segment.map(|end| end.add_scalar(-scene.pixel_center));
             // Of the line, not of its ends: HAWP's are off by some pixels.

@@ -3,8 +3,9 @@
 
 use crate::examination::{Cause, Check, Finding, Level, counted, listed};
 use crate::gray_image::GrayImage;
-use neat_core::{Camera, Scene};
-use rayon::prelude::*;
+use crate::working_copies::WorkingCopies;
+use neat_core::{Camera, Scene, SceneError};
+use std::hash::{DefaultHasher, Hasher};
 
 /// What one image is like.
 #[derive(Clone, Copy, Debug)]
@@ -65,16 +66,26 @@ const BLUR_FACTOR: f32 = 0.35;
 const MIN_CONTRAST: f32 = 0.02;
 
 /// What is found about the images.
-pub(crate) fn image_findings(scene: &Scene, working: &[(GrayImage, u32)]) -> Vec<Finding> {
-    let statistics: Vec<ImageStatistics> = (working.par_iter())
-        .map(|(image, _)| ImageStatistics::new(image))
-        .collect();
+///
+/// # Errors
+/// If an image lies in a file that cannot be read.
+pub(crate) fn image_findings(
+    scene: &Scene,
+    working: &WorkingCopies<'_>,
+) -> Result<Vec<Finding>, SceneError> {
+    let views: Vec<usize> = (0..scene.views.len()).collect();
+    let looked = working.look_at(&views, |view| {
+        let image = scene.views[view].image.read()?;
+        let (copy, _) = GrayImage::working_copy(&image);
+        Ok((ImageStatistics::new(&copy), fingerprint(image.as_raw())))
+    })?;
+    let (statistics, fingerprints): (Vec<_>, Vec<_>) = looked.into_iter().unzip();
     let mut findings = vec![sizes(scene)];
     findings.extend(intrinsics(scene));
     findings.push(exposure(scene, &statistics));
     findings.push(sharpness(scene, &statistics));
-    findings.extend(duplicates(scene));
-    findings
+    findings.extend(duplicates(scene, &fingerprints)?);
+    Ok(findings)
 }
 
 /// Names of the views for which `holds` does.
@@ -255,17 +266,24 @@ fn sharpness(scene: &Scene, statistics: &[ImageStatistics]) -> Finding {
         .of_views(blurred)
 }
 
-/// Images that are equal to the last bit.
-fn duplicates(scene: &Scene) -> Option<Finding> {
+/// Images that are equal to the last bit; equal ones have equal `fingerprints`.
+///
+/// # Errors
+/// If an image lies in a file that cannot be read.
+fn duplicates(scene: &Scene, fingerprints: &[u64]) -> Result<Option<Finding>, SceneError> {
     let mut order: Vec<usize> = (0..scene.views.len()).collect();
-    let pixels = |view: usize| scene.views[view].image.as_raw();
-    order.sort_by(|&a, &b| pixels(a).cmp(pixels(b)).then(a.cmp(&b)));
-    let mut twice: Vec<usize> = (order.windows(2))
-        .filter(|pair| pixels(pair[0]) == pixels(pair[1]))
-        .map(|pair| pair[1])
-        .collect();
+    order.sort_by_key(|&view| (fingerprints[view], view));
+    let mut twice = Vec::new();
+    for pair in order.windows(2) {
+        let [a, b] = [pair[0], pair[1]].map(|view| &scene.views[view].image);
+        // Different images of one fingerprint are as good as impossible; of equal ones
+        // there are few.
+        if fingerprints[pair[0]] == fingerprints[pair[1]] && a.read()? == b.read()? {
+            twice.push(pair[1]);
+        }
+    }
     if twice.is_empty() {
-        return None;
+        return Ok(None);
     }
     twice.sort_unstable();
     let names: Vec<String> = twice.iter().map(|&v| scene.views[v].name.clone()).collect();
@@ -277,5 +295,12 @@ fn duplicates(scene: &Scene) -> Option<Finding> {
     let finding = Finding::new(Check::Duplicates, Level::Warning, message)
         .because(Cause::Other)
         .remedied_by("keep one image of each and its pose");
-    Some(finding.of_views(names))
+    Ok(Some(finding.of_views(names)))
+}
+
+/// The same for equal pixels, and hardly for others.
+fn fingerprint(pixels: &[u8]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(pixels);
+    hasher.finish()
 }

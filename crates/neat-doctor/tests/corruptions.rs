@@ -269,7 +269,8 @@ fn images_without_anything_to_see_are_no_false_alarm() {
             let [x, y] = [(x, width), (y, height)]
                 .map(|(at, extent)| f64::from(at) / f64::from(extent) - 0.5);
             image::Rgb([(255.0 * (-8.0 * (x * x + y * y)).exp()) as u8; 3])
-        });
+        })
+        .into();
     }
     let examination = examine(&scene, &ExamineOptions::default());
     let poses = examination
@@ -299,7 +300,8 @@ fn images_of_half_size_with_sizes_in_the_file_are_repaired_by_a_flag() {
         let file = format!("images/{}.png", view.name);
         let (width, height) = view.image.dimensions();
         let filter = image::imageops::FilterType::Triangle;
-        let half = image::imageops::resize(&view.image, width / 2, height / 2, filter);
+        let half =
+            image::imageops::resize(&*view.image.read().unwrap(), width / 2, height / 2, filter);
         half.save(dir.path().join(&file)).unwrap();
         let rows = |m: &dyn Fn(usize, usize) -> f64, side: usize| -> Vec<Vec<f64>> {
             (0..side)
@@ -388,7 +390,8 @@ fn synthetic_frame(width: u32, height: u32, texture: u32, views: usize) -> Scene
                 .wrapping_add(texture)
                 .wrapping_mul(2_654_435_761);
             image::Rgb([(mixed >> 24) as u8; 3])
-        });
+        })
+        .into();
         scene.views.push(view);
     }
     scene

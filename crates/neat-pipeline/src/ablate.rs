@@ -14,12 +14,13 @@ use crate::overlay::spread_views;
 use crate::overrides::apply_overrides;
 use crate::reconstruct::{OpenedRun, RunOptions, open_run, reconstruct};
 use crate::render::render_view;
+use crate::resources::Resources;
 use crate::run_dir::Existing;
 use nalgebra::Vector3;
 use neat_core::{Scene, Wireframe3d, file};
 use neat_eval::image_quality::psnr;
 use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
-use neat_field::attraction_region::AttractionRegions;
+use neat_field::region_pixels::RegionPixels;
 use neat_wireframe::export::write_json;
 use neat_wireframe::metrics::PrecisionRecall;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -179,7 +180,11 @@ fn run_variant(
         &out,
         Some(&options.scene),
         options.backend,
-        options.cache.as_ref(),
+        Resources {
+            cache: options.cache.as_ref(),
+            memory_limit: options.memory_limit,
+            cancelled: None,
+        },
         Ok,
         &mut |event| {
             // What the scene is like has been told by the run.
@@ -277,7 +282,8 @@ fn mean_psnr(scene: &Scene, field: &TrainedField) -> Option<f64> {
             let longer = view.camera.width.max(view.camera.height);
             let step = (longer / RENDERED_SIZE).max(1);
             let rendered = render_view(field, &view.camera, scene.pixel_center, step, &mut |_| ());
-            psnr(&rendered.color, &every_nth_pixel(&view.image, step), None)
+            let photograph = view.image.read().ok()?;
+            psnr(&rendered.color, &every_nth_pixel(&photograph, step), None)
         })
         .collect();
     let values = values.filter(|values| !values.is_empty())?;
@@ -287,9 +293,8 @@ fn mean_psnr(scene: &Scene, field: &TrainedField) -> Option<f64> {
 /// Share of the pixels of all views that no attraction region holds.
 fn masked_out(scene: &Scene, config: &Config) -> Option<f64> {
     let data = &config.data;
-    let regions =
-        AttractionRegions::of_scene(scene, data.min_segment_score, data.attraction_distance);
-    let inside: usize = regions.iter().map(AttractionRegions::len).sum();
+    let regions = RegionPixels::of_scene(scene, data.min_segment_score, data.attraction_distance);
+    let inside: usize = regions.iter().map(RegionPixels::len).sum();
     let sizes = scene.views.iter().map(|view| view.image.dimensions());
     let pixels: u64 = sizes.map(|(w, h)| u64::from(w) * u64::from(h)).sum();
     (pixels > 0).then(|| 1.0 - inside as f64 / pixels as f64)

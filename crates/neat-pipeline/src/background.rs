@@ -2,7 +2,7 @@
 
 use crate::config::{BackEnd, Config};
 use image::RgbImage;
-use neat_core::Scene;
+use neat_core::{MemoryLimit, Scene, SceneError};
 use serde::{Deserialize, Serialize};
 
 /// What lies behind the object.
@@ -31,10 +31,17 @@ const SPHERE_SLOPE: f64 = 20.0;
 /// for a photograph puts the border of the sphere behind the scene and drops the
 /// silhouette term; and [`BackEnd::Auto`]. A configuration without
 /// `data.background` stays as it is.
-pub(crate) fn fit_background(config: &mut Config, scene: &Scene) {
+///
+/// # Errors
+/// If an image lies in a file that cannot be read.
+pub(crate) fn fit_background(
+    config: &mut Config,
+    scene: &Scene,
+    memory_limit: MemoryLimit,
+) -> Result<(), SceneError> {
     let background = match config.data.background {
-        None => return,
-        Some(Background::Auto) if is_black(scene) => Background::Black,
+        None => return Ok(()),
+        Some(Background::Auto) if is_black(scene, memory_limit)? => Background::Black,
         Some(Background::Auto) => Background::Photo,
         Some(known) => known,
     };
@@ -51,13 +58,16 @@ pub(crate) fn fit_background(config: &mut Config, scene: &Scene) {
             config.model.implicit.bounding_sphere_slope = SPHERE_SLOPE;
         }
     }
+    Ok(())
 }
 
-fn is_black(scene: &Scene) -> bool {
-    let black = (scene.views.iter())
-        .filter(|view| black_border(&view.image) >= BLACK_BORDER)
-        .count();
-    black as f64 >= BLACK_VIEWS * scene.views.len() as f64
+fn is_black(scene: &Scene, memory_limit: MemoryLimit) -> Result<bool, SceneError> {
+    let bytes_each = scene.views.iter().map(|view| view.image.byte_len()).max();
+    let black = memory_limit.try_map(&scene.views, bytes_each.unwrap_or(0), |view| {
+        Ok(black_border(&*view.image.read()?) >= BLACK_BORDER)
+    })?;
+    let black = black.into_iter().filter(|is_black| *is_black).count();
+    Ok(black as f64 >= BLACK_VIEWS * scene.views.len() as f64)
 }
 
 /// The share of the outermost pixels that are black.
@@ -95,29 +105,31 @@ mod tests {
         let preset = Preset::Fast.config();
 
         let mut config = preset.clone();
-        fit_background(&mut config, &scene);
+        fit_background(&mut config, &scene, MemoryLimit::NONE).unwrap();
         assert_eq!(config.data.background, Some(Background::Black));
         assert_eq!(config.distill.back_end, BackEnd::Fast);
         assert_eq!(config.train, preset.train);
         assert_eq!(config.model, preset.model);
 
         for view in &mut scene.views {
-            for pixel in view.image.pixels_mut() {
-                *pixel = image::Rgb(pixel.0.map(|c| c.max(90)));
+            let mut image = view.image.read().unwrap().into_owned();
+            for pixel in image.pixels_mut() {
+                pixel.0 = pixel.0.map(|c| c.max(90));
             }
+            view.image = image.into();
         }
         let mut config = preset.clone();
-        fit_background(&mut config, &scene);
+        fit_background(&mut config, &scene, MemoryLimit::NONE).unwrap();
         assert_eq!(config.data.background, Some(Background::Photo));
         assert_eq!(config.distill.back_end, BackEnd::Tracks);
         assert_eq!(config.train.loss.mask, 0.0);
         assert_eq!(config.model.implicit.bounding_sphere_slope, SPHERE_SLOPE);
         // A decided configuration stays, and so does a published one.
         let decided = config.clone();
-        fit_background(&mut config, &scene);
+        fit_background(&mut config, &scene, MemoryLimit::NONE).unwrap();
         assert_eq!(config, decided);
         let mut published = Preset::PaperDtu.config();
-        fit_background(&mut published, &scene);
+        fit_background(&mut published, &scene, MemoryLimit::NONE).unwrap();
         assert_eq!(published, Preset::PaperDtu.config());
     }
 }

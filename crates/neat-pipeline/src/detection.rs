@@ -6,15 +6,19 @@ pub use folder::{DetectOptions, Detected, SegmentSource, detect_folder};
 
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage};
+use crate::resources::Resources;
+use image::RgbImage;
 use neat_core::file_cache::{CacheKey, FileCache};
 use neat_core::{Scene, SceneError, View, Wireframe2d, hawp_json};
 use neat_detect::{DetectorConfig, detect};
-use rayon::prelude::*;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Files and detectors have pixel centres at integers.
 const DETECTED_WITH_PIXEL_CENTER: f64 = 0.0;
+/// What detection takes, in bytes for each pixel of the image. Of 12 megapixels, 30 were
+/// measured; a picture of the detections takes some more.
+const BYTES_PER_PIXEL: u64 = 40;
+const DETECTING: &str = "detecting segments in an image";
 /// Raised when the detector finds something else in the same image.
 const DETECTOR_VERSION: u32 = 1;
 
@@ -27,28 +31,30 @@ const DETECTOR_VERSION: u32 = 1;
 ///
 /// # Errors
 /// If the configuration is out of range, or no view has a segment;
-/// [`PipelineError::InterruptedIn`] once `cancelled` is set.
+/// [`PipelineError::InterruptedIn`] once that is wanted.
 pub fn detect_wireframes(
     scene: &mut Scene,
     dir: &Path,
     config: &DetectorConfig,
     min_segment_score: f64,
-    cache: Option<&FileCache>,
-    cancelled: &AtomicBool,
+    resources: Resources<'_>,
     on_event: OnEvent<'_>,
 ) -> Result<Vec<String>, PipelineError> {
     config.validate()?;
+    let memory_limit = resources.memory_limit;
     let mut warnings = Vec::new();
     let views = scene.views.len();
     let mut done = 0;
+    let sizes = scene.views.iter().map(|view| view.image.dimensions());
+    let bytes_each = memory_limit.bytes_each(sizes, BYTES_PER_PIXEL, DETECTING, dir)?;
     // Some at a time, so that progress can be told in between.
     for chunk in scene.views.chunks_mut(4 * rayon::current_num_threads()) {
-        if cancelled.load(Ordering::Relaxed) {
+        if resources.is_cancelled() {
             return Err(PipelineError::InterruptedIn(Stage::Detect));
         }
-        let found: Vec<_> = (chunk.par_iter())
-            .map(|view| detect_in(view, config, cache))
-            .collect();
+        let cache = resources.cache;
+        let found =
+            memory_limit.try_map(chunk, bytes_each, |view| detect_in(view, config, cache))?;
         for (view, (mut wireframe, warning)) in chunk.iter_mut().zip(found) {
             for vertex in &mut wireframe.vertices {
                 *vertex = vertex.add_scalar(scene.pixel_center);
@@ -84,23 +90,27 @@ pub fn detect_wireframes(
 
 /// The wireframe of one image, with pixel centres at integers, and a warning if
 /// it could not be stored.
+///
+/// # Errors
+/// If the image lies in a file that cannot be read.
 fn detect_in(
     view: &View,
     config: &DetectorConfig,
     cache: Option<&FileCache>,
-) -> (Wireframe2d, Option<String>) {
+) -> Result<(Wireframe2d, Option<String>), SceneError> {
+    let image = view.image.read()?;
     let Some(cache) = cache else {
-        return (detect(&view.image, config), None);
+        return Ok((detect(&image, config), None));
     };
-    let key = key(view, config);
+    let key = key(&image, config);
     let name = Path::new("2D wireframe");
     let stored = cache
         .get(&key)
         .and_then(|bytes| hawp_json::parse(&bytes, DETECTED_WITH_PIXEL_CENTER, name).ok());
     if let Some(wireframe) = stored {
-        return (wireframe, None);
+        return Ok((wireframe, None));
     }
-    let wireframe = detect(&view.image, config);
+    let wireframe = detect(&image, config);
     let stored = cache.put(
         &key,
         &hawp_json::to_bytes(&wireframe, DETECTED_WITH_PIXEL_CENTER),
@@ -108,16 +118,16 @@ fn detect_in(
     let warning = stored
         .err()
         .map(|error| format!("detected 2D wireframes are not kept for the next run: {error}"));
-    (wireframe, warning)
+    Ok((wireframe, warning))
 }
 
-fn key(view: &View, config: &DetectorConfig) -> CacheKey {
-    let (width, height) = view.image.dimensions();
+fn key(image: &RgbImage, config: &DetectorConfig) -> CacheKey {
+    let (width, height) = image.dimensions();
     let settings = toml::to_string(config).expect("detection::key: settings can be written");
     let inputs = [
         &width.to_le_bytes(),
         &height.to_le_bytes(),
-        view.image.as_raw().as_slice(),
+        image.as_raw().as_slice(),
         settings.as_bytes(),
     ];
     CacheKey::new("wireframe2d", DETECTOR_VERSION, &inputs)
@@ -141,6 +151,13 @@ mod tests {
         scene
     }
 
+    fn with(cache: Option<&FileCache>) -> Resources<'_> {
+        Resources {
+            cache,
+            ..Resources::default()
+        }
+    }
+
     fn detected(
         scene: &mut Scene,
         cache: Option<&FileCache>,
@@ -150,8 +167,7 @@ mod tests {
             Path::new("scene"),
             &DetectorConfig::default(),
             0.05,
-            cache,
-            &AtomicBool::new(false),
+            with(cache),
             &mut |_| {},
         )
     }
@@ -191,8 +207,7 @@ mod tests {
             Path::new("scene"),
             &config,
             0.05,
-            Some(&cache),
-            &AtomicBool::new(false),
+            with(Some(&cache)),
             &mut |_| {},
         )
         .unwrap();
@@ -211,12 +226,14 @@ mod tests {
     #[test]
     fn views_without_segments_are_left_out() {
         let mut two = scene();
-        two.views[1].image.fill(0);
+        two.views[1].image = RgbImage::new(128, 128).into();
         let warnings = detected(&mut two, None).unwrap();
         assert_eq!(two.views.len(), 2);
         assert!(warnings[0].contains("image_0001"), "{warnings:?}");
         let mut none = scene();
-        none.views.iter_mut().for_each(|view| view.image.fill(0));
+        for view in &mut none.views {
+            view.image = RgbImage::new(128, 128).into();
+        }
         let error = detected(&mut none, None).unwrap_err();
         assert!(error.to_string().contains("none of the 3 views"));
     }

@@ -198,5 +198,8 @@ fn is_full_disk(error: &SceneError) -> bool {
 }
 
 fn is_write_error(error: &SceneError) -> bool {
-    matches!(error, SceneError::Write { .. })
+    matches!(
+        error,
+        SceneError::Write { .. } | SceneError::ImageStore { .. }
+    )
 }

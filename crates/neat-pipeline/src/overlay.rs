@@ -8,7 +8,7 @@ pub use picture::draw_wireframe;
 use image::{Rgb, RgbImage};
 use line_drawing::{Pen, draw_disc, draw_segment};
 use nalgebra::Vector2;
-use neat_core::{Camera, LineSegment2, LineSegment3, View, Wireframe2d, Wireframe3d};
+use neat_core::{Camera, LineSegment2, LineSegment3, SceneError, View, Wireframe2d, Wireframe3d};
 
 /// Line width relative to the larger side of the image.
 const WIDTH_PER_SIZE: f64 = 1.0 / 400.0;
@@ -20,8 +20,21 @@ const JUNCTION_COLOR: [f64; 3] = [32.0, 200.0, 255.0];
 /// cut off.
 ///
 /// `pixel_center` is [`neat_core::Scene::pixel_center`].
-pub fn draw_overlay(view: &View, pixel_center: f64, wireframe: &Wireframe3d) -> RgbImage {
-    draw_projected(view.image.clone(), &view.camera, pixel_center, wireframe)
+///
+/// # Errors
+/// If the photograph lies in a file that cannot be read.
+pub fn draw_overlay(
+    view: &View,
+    pixel_center: f64,
+    wireframe: &Wireframe3d,
+) -> Result<RgbImage, SceneError> {
+    let photograph = view.image.read()?.into_owned();
+    Ok(draw_projected(
+        photograph,
+        &view.camera,
+        pixel_center,
+        wireframe,
+    ))
 }
 
 /// The same on the 2D segments of the view instead of the photograph, for who may
@@ -187,7 +200,7 @@ mod tests {
     fn lines_lie_on_the_projected_edges() {
         let data = scene();
         let view = &data.scene.views[3];
-        let image = draw_overlay(view, data.scene.pixel_center, &data.truth);
+        let image = draw_overlay(view, data.scene.pixel_center, &data.truth).unwrap();
         for segment in data.truth.segments() {
             let middle = view.camera.project(&segment.point_at(0.5)).pixel;
             // The index of the pixel that holds a point: its centre is at +0.5.
@@ -213,7 +226,7 @@ mod tests {
             )
         };
         let before = sketch(&data);
-        data.scene.views[3].image.fill(77);
+        data.scene.views[3].image = RgbImage::from_pixel(64, 64, Rgb([77; 3])).into();
         assert_eq!(sketch(&data), before);
         assert_ne!(before, RgbImage::from_pixel(64, 64, Rgb([255; 3])));
     }

@@ -11,8 +11,8 @@ use crate::training_data::{Batch, TrainingData};
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
-use neat_core::Scene;
 use neat_core::assignment::AssignmentError;
+use neat_core::{Scene, SceneError};
 use neat_gjp::candidates::JunctionView;
 use neat_sdf::density::BetaSchedule;
 use neat_sdf::ray_sampler::{RaySampler, RaySamples, Seeded};
@@ -70,6 +70,9 @@ pub enum TrainError {
         /// What the assignment said.
         source: AssignmentError,
     },
+    /// An image that lies in a file cannot be read.
+    #[error(transparent)]
+    Image(#[from] SceneError),
     /// The checkpoint belongs to another model.
     #[error("the checkpoint does not fit this configuration: {0}")]
     Parameters(#[from] ParameterError),
@@ -405,7 +408,7 @@ impl Trainer {
                 gradients,
             });
         };
-        let (prepared, start) = (self.prepare(schedule), Instant::now());
+        let (prepared, start) = (self.prepare(schedule)?, Instant::now());
         let views = self.junction_views();
         let input = prepared.input(&views, self.junctions_due());
         let result = chunked_step(
@@ -429,7 +432,7 @@ impl Trainer {
 
     /// The loss of the next iteration, all rays at once.
     fn whole_loss(&mut self, schedule: f64) -> Result<StepLoss, TrainError> {
-        let (prepared, start) = (self.prepare(schedule), Instant::now());
+        let (prepared, start) = (self.prepare(schedule)?, Instant::now());
         let views = self.junction_views();
         let input = prepared.input(&views, self.junctions_due());
         let beta = self.beta_tensor(schedule);
@@ -478,27 +481,27 @@ impl Trainer {
     }
 
     /// Draws and places everything random of the next iteration.
-    fn prepare(&mut self, schedule: f64) -> Prepared {
+    fn prepare(&mut self, schedule: f64) -> Result<Prepared, TrainError> {
         let density = &self.config.model.density;
         self.beta = match density.schedule {
             BetaSchedule::Learned => f64::from(host_vec(self.beta_tensor(schedule))[0]),
             BetaSchedule::Annealed => f64::from(density.annealed_beta(schedule) as f32),
         };
         let start = Instant::now();
-        let batch = self.data.batch(&self.config, self.seed, self.iteration);
+        let batch = (self.data).batch(&self.config, self.seed, self.iteration)?;
         self.timings.batch = start.elapsed();
         let start = Instant::now();
         let distances = self.model.implicit_network.distances(&self.device);
         let (samples, asked) = self.sample(&batch, &distances);
         self.timings.sampler = start.elapsed();
         let eikonal_points = self.eikonal_points(&batch, &samples);
-        Prepared {
+        Ok(Prepared {
             batch,
             samples,
             distances,
             eikonal_points,
             asked,
-        }
+        })
     }
 
     /// The signed distance network as it is now.

@@ -2,10 +2,9 @@
 //! and the pixels to draw rays through.
 
 use crate::config::{BatchViews, Config};
-use image::RgbImage;
 use nalgebra::Vector2;
-use neat_core::{Camera, Scene, ScoredSegment2};
-use neat_field::attraction_region::AttractionRegions;
+use neat_core::{Camera, Scene, SceneError, ScoredSegment2, ViewImage};
+use neat_field::region_pixels::RegionPixels;
 use neat_sdf::RayBundle;
 use neat_tensor::random::{Purpose, stream};
 use rand::{Rng, RngExt};
@@ -23,8 +22,8 @@ pub struct TrainingView {
     pub segments: Vec<ScoredSegment2>,
     /// All detected junctions, in image coordinates.
     pub junctions: Vec<Vector2<f64>>,
-    regions: AttractionRegions,
-    image: RgbImage,
+    regions: RegionPixels,
+    image: ViewImage,
 }
 
 /// All views, and where each view's region pixels begin in the sequence of all.
@@ -57,7 +56,7 @@ impl TrainingData {
     pub fn new(scene: &Scene, config: &Config) -> Self {
         let data = &config.data;
         let regions =
-            AttractionRegions::of_scene(scene, data.min_segment_score, data.attraction_distance);
+            RegionPixels::of_scene(scene, data.min_segment_score, data.attraction_distance);
         let views: Vec<TrainingView> = scene
             .views
             .iter()
@@ -88,7 +87,10 @@ impl TrainingData {
     }
 
     /// The rays of iteration `iteration`.
-    pub fn batch(&self, config: &Config, seed: u64, iteration: u64) -> Batch {
+    ///
+    /// # Errors
+    /// If an image lies in a file that cannot be read.
+    pub fn batch(&self, config: &Config, seed: u64, iteration: u64) -> Result<Batch, SceneError> {
         let train = &config.train;
         let mut rng = stream(seed, Purpose::Rays, iteration);
         let background = (train.rays as f64 * train.background_share) as usize;
@@ -99,7 +101,7 @@ impl TrainingData {
                 for _ in 0..through_regions {
                     let pixel = rng.random_range(0..self.region_pixels());
                     let view = self.first_region_pixel.partition_point(|f| *f <= pixel) - 1;
-                    self.push_region_ray(&mut batch, view, pixel - self.first_region_pixel[view]);
+                    self.push_region_ray(&mut batch, view, pixel - self.first_region_pixel[view])?;
                 }
             }
             BatchViews::One => {
@@ -108,12 +110,12 @@ impl TrainingData {
                 if train.with_replacement {
                     for _ in 0..through_regions {
                         let entry = rng.random_range(0..available);
-                        self.push_region_ray(&mut batch, view, entry);
+                        self.push_region_ray(&mut batch, view, entry)?;
                     }
                 } else {
                     let wanted = through_regions.min(available);
                     for entry in rand::seq::index::sample(&mut rng, available, wanted) {
-                        self.push_region_ray(&mut batch, view, entry);
+                        self.push_region_ray(&mut batch, view, entry)?;
                     }
                 }
             }
@@ -123,9 +125,9 @@ impl TrainingData {
                 BatchViews::All => rng.random_range(0..self.views.len()),
                 BatchViews::One => self.view_of_iteration(seed, iteration),
             };
-            self.push_any_ray(&mut batch, view, &mut rng);
+            self.push_any_ray(&mut batch, view, &mut rng)?;
         }
-        batch
+        Ok(batch)
     }
 
     /// Every view once per epoch, in an order drawn for the epoch; views without
@@ -142,27 +144,37 @@ impl TrainingData {
         order[(iteration % views) as usize]
     }
 
-    fn push_region_ray(&self, batch: &mut Batch, view: usize, entry: usize) {
+    fn push_region_ray(
+        &self,
+        batch: &mut Batch,
+        view: usize,
+        entry: usize,
+    ) -> Result<(), SceneError> {
         let from = &self.views[view];
-        let pixel = from.regions.pixels[entry];
-        let label = from.regions.labels[entry] as usize;
+        let (pixel, label) = from.regions.get(entry);
         let width = from.camera.width;
-        self.push_pixel(batch, view, pixel % width, pixel / width);
+        self.push_pixel(batch, view, pixel % width, pixel / width)?;
         batch.view_of_ray.push(view);
-        batch.segment_of_ray.push(from.segments[label]);
+        batch.segment_of_ray.push(from.segments[label as usize]);
+        Ok(())
     }
 
-    fn push_any_ray(&self, batch: &mut Batch, view: usize, rng: &mut impl Rng) {
+    fn push_any_ray(
+        &self,
+        batch: &mut Batch,
+        view: usize,
+        rng: &mut impl Rng,
+    ) -> Result<(), SceneError> {
         let camera = &self.views[view].camera;
         let x = rng.random_range(0..camera.width);
         let y = rng.random_range(0..camera.height);
-        self.push_pixel(batch, view, x, y);
+        self.push_pixel(batch, view, x, y)
     }
 
-    fn push_pixel(&self, batch: &mut Batch, view: usize, x: u32, y: u32) {
+    fn push_pixel(&self, batch: &mut Batch, view: usize, x: u32, y: u32) -> Result<(), SceneError> {
         let view = &self.views[view];
         push_ray(&mut batch.rays, &view.camera, self.pixel_center, x, y);
-        let color = view.image.get_pixel(x, y).0.map(|c| f32::from(c) / 255.0);
+        let color = view.image.pixel(x, y)?.0.map(|c| f32::from(c) / 255.0);
         let largest = color.into_iter().fold(0.0, f32::max);
         batch.colors.push(color);
         batch.silhouette.push(if largest > SILHOUETTE_THRESHOLD {
@@ -170,6 +182,7 @@ impl TrainingData {
         } else {
             0.0
         });
+        Ok(())
     }
 }
 

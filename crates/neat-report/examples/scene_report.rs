@@ -39,9 +39,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let loaded = load_scene(folder, &options)?;
     let mut scene = loaded.scene;
     if detected {
-        (scene.views.par_iter_mut()).for_each(|view| {
-            view.wireframe = detect(&view.image, &DetectorConfig::default());
-        });
+        (scene.views.par_iter_mut()).try_for_each(|view| {
+            view.wireframe = detect(&*view.image.read()?, &DetectorConfig::default());
+            Ok::<(), neat_core::SceneError>(())
+        })?;
     }
     let observations = ViewObservation::from_scene(&scene, MIN_SCORE);
     let in_world = match given {

@@ -51,7 +51,8 @@ fn a_page_of_rough_photographs_is_small() {
         view.image = RgbImage::from_fn(800, 600, |x, y| {
             let at = (index * 600 + y as usize) * 800 + x as usize;
             Rgb([0, 1, 2].map(|c| (96.0 + 64.0 * scrambled(3 * at + c)) as u8))
-        });
+        })
+        .into();
         view.wireframe = Wireframe2d::empty(800, 600);
     }
     let mut document = WireframeDocument {

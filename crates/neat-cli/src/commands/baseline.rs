@@ -10,12 +10,13 @@ use crate::scene_arguments::SceneArgs;
 use clap::{Args, Subcommand};
 use neat_core::file;
 use neat_pipeline::distill::agreement;
+use neat_pipeline::machine_memory::default_limit;
+use neat_pipeline::resources::Resources;
 use neat_pipeline::scene::prepare_scene;
 use neat_wireframe::ViewObservation;
 use neat_wireframe::export::{ExportError, WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::line_tracks::{Line3dConfig, line3d, wireframe_of_segments};
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Reconstruct with the method of somebody else, on the same 2D wireframes
@@ -79,8 +80,11 @@ impl Line3dArgs {
             &self.scene,
             &mut config,
             None,
-            cache.as_ref(),
-            &AtomicBool::new(false),
+            Resources {
+                cache: cache.as_ref(),
+                memory_limit: default_limit(),
+                ..Resources::default()
+            },
             &mut |event| {
                 progress.show(event);
             },

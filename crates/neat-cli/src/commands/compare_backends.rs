@@ -9,12 +9,13 @@ use clap::Args;
 use neat_core::file;
 use neat_pipeline::compare_backends::compare_backends;
 use neat_pipeline::event::Event;
+use neat_pipeline::machine_memory::default_limit;
 use neat_pipeline::reconstruct::software_warning;
+use neat_pipeline::resources::Resources;
 use neat_pipeline::run_dir::RunDir;
 use neat_pipeline::scene::prepare_scene;
 use neat_tensor::Backend;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 
 /// Enough to see the speed; losses of different backends drift apart later anyway.
 const DEFAULT_STEPS: u64 = 50;
@@ -72,8 +73,11 @@ impl CompareBackendsArgs {
             &self.scene,
             &mut config,
             None,
-            cache.as_ref(),
-            &AtomicBool::new(false),
+            Resources {
+                cache: cache.as_ref(),
+                memory_limit: default_limit(),
+                ..Resources::default()
+            },
             &mut |event| {
                 progress.show(event);
             },

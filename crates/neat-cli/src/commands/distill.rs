@@ -4,11 +4,13 @@ use super::reconstruct::summary;
 use crate::arguments::BackendArg;
 use crate::cache::CacheArgs;
 use crate::error::CliError;
+use crate::memory::MemoryArgs;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
 use neat_pipeline::overrides::apply_overrides;
 use neat_pipeline::reconstruct::{distill_run, open_run};
+use neat_pipeline::resources::Resources;
 use std::path::PathBuf;
 
 /// Take the wireframe out of a trained run, and write all results
@@ -33,6 +35,8 @@ pub struct DistillArgs {
     #[command(flatten)]
     backend: BackendArg,
     #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
     cache: CacheArgs,
 }
 
@@ -43,7 +47,11 @@ impl DistillArgs {
             &self.run,
             self.scene.as_deref(),
             self.backend.backend,
-            self.cache.open().as_ref(),
+            Resources {
+                cache: self.cache.open().as_ref(),
+                memory_limit: self.memory.limit(),
+                cancelled: None,
+            },
             |config| Ok::<_, CliError>(apply_overrides(&config, &self.set)?),
             &mut |event| progress.show(event),
         )?;

@@ -14,14 +14,15 @@ use neat_eval::{
     LimapLength, NeatAbc, NeatSurface, ObservationMask, Protocol, ScannedSurface, Scores,
     StructureScore, foreign,
 };
+use neat_pipeline::machine_memory::default_limit;
 use neat_pipeline::preset::Preset;
+use neat_pipeline::resources::Resources;
 use neat_pipeline::scene::prepare_scene;
 use neat_wireframe::ViewObservation;
 use neat_wireframe::edge_support::EdgeSupportConfig;
 use neat_wireframe::metrics::Matching;
 use neat_wireframe::supported_truth::{SupportedTruthConfig, supported_truth, without_curves};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
 /// Measure a wireframe against the truth or a scanned surface, by a published protocol
 ///
@@ -339,9 +340,12 @@ impl EvalArgs {
     ) -> Result<EvaluationReport, CliError> {
         let mut config = Preset::default().config();
         let cache = self.cache.open();
-        let never = AtomicBool::new(false);
-        let cache = cache.as_ref();
-        let prepared = prepare_scene(scene, &mut config, None, cache, &never, &mut |_| ())?;
+        let resources = Resources {
+            cache: cache.as_ref(),
+            memory_limit: default_limit(),
+            ..Resources::default()
+        };
+        let prepared = prepare_scene(scene, &mut config, None, resources, &mut |_| ())?;
         let views = ViewObservation::from_scene(&prepared.scene, config.data.min_segment_score);
         let required = EdgeSupportConfig::default().required_views(views.len());
         let world_from_original = prepared.scene.original_from_world.inverse();

@@ -3,6 +3,7 @@
 use crate::arguments::BackendArg;
 use crate::cache::CacheArgs;
 use crate::error::CliError;
+use crate::memory::MemoryArgs;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
@@ -13,6 +14,7 @@ use neat_eval::image_quality::psnr;
 use neat_pipeline::image_io::{every_nth_pixel, write_png};
 use neat_pipeline::reconstruct::{OpenedRun, open_run};
 use neat_pipeline::render::render_view;
+use neat_pipeline::resources::Resources;
 use std::path::{Path, PathBuf};
 
 /// Render colour, depth and normals of views of a trained run
@@ -44,6 +46,8 @@ pub struct RenderArgs {
     #[command(flatten)]
     backend: BackendArg,
     #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
     cache: CacheArgs,
 }
 
@@ -54,7 +58,11 @@ impl RenderArgs {
             &self.run,
             self.scene.as_deref(),
             self.backend.backend,
-            self.cache.open().as_ref(),
+            Resources {
+                cache: self.cache.open().as_ref(),
+                memory_limit: self.memory.limit(),
+                cancelled: None,
+            },
             Ok::<_, CliError>,
             &mut |event| progress.show(event),
         )?;
@@ -92,7 +100,7 @@ fn render(
     );
     let (width, height) = (rendered.width, rendered.height);
     let color = color_image(width, height, &rendered.color);
-    let photo = every_nth_pixel(&view.image, downscale);
+    let photo = every_nth_pixel(&*view.image.read()?, downscale);
     let images = [
         ("comparison", side_by_side(&color, &photo)),
         ("color", color),

@@ -27,7 +27,7 @@ pub(super) fn write(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
     let observed = observations_by_view(scene);
     file::write_atomically(&path, images_text(scene, &cameras, &observed).as_bytes())?;
 
-    let points = points_text(scene, &observed);
+    let points = points_text(scene, &observed, &points::colors(scene)?);
     file::write_atomically(&model_dir.join("points3D.txt"), points.as_bytes())?;
     write_images(scene, &dir.join(IMAGES_DIR))
 }
@@ -144,7 +144,11 @@ fn images_text(scene: &Scene, cameras: &[Lens], observed: &[Vec<(usize, Vector2<
     text
 }
 
-fn points_text(scene: &Scene, observed: &[Vec<(usize, Vector2<f64>)>]) -> String {
+fn points_text(
+    scene: &Scene,
+    observed: &[Vec<(usize, Vector2<f64>)>],
+    colors: &[[u8; 3]],
+) -> String {
     // The places of a point in the lists of the views.
     let mut tracks = vec![Vec::new(); scene.sparse_points.len()];
     for (view, observed) in observed.iter().enumerate() {
@@ -154,8 +158,8 @@ fn points_text(scene: &Scene, observed: &[Vec<(usize, Vector2<f64>)>]) -> String
     }
     let mut text = String::from("# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n");
     let positions = points_in_original_frame(scene);
-    for (index, (point, track)) in scene.sparse_points.iter().zip(tracks).enumerate() {
-        let (p, [r, g, b]) = (positions[index], points::color(scene, point));
+    for (index, track) in tracks.into_iter().enumerate() {
+        let (p, [r, g, b]) = (positions[index], colors[index]);
         let error = reprojection_error(scene, index);
         let _ = write!(
             text,

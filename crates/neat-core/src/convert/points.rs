@@ -7,20 +7,31 @@ use std::path::Path;
 /// Where no view says which colour a point has.
 const GRAY: [u8; 3] = [128; 3];
 
+/// The colour of every point.
+///
+/// # Errors
+/// If an image that lies in a file cannot be read.
+pub(super) fn colors(scene: &Scene) -> Result<Vec<[u8; 3]>, SceneError> {
+    let points = scene.sparse_points.iter();
+    points.map(|point| color(scene, point)).collect()
+}
+
 /// The colour of the pixel in which the first view saw the point.
-pub(super) fn color(scene: &Scene, point: &SparsePoint) -> [u8; 3] {
-    let first = point.observations.first();
-    let pixel = first.and_then(|seen| {
-        let index = seen.pixel.add_scalar(0.5 - scene.pixel_center);
-        // Coordinates below zero become 0, beyond the image they find no pixel.
-        let (column, row) = (index.x as u32, index.y as u32);
-        scene
-            .views
-            .get(seen.view)?
-            .image
-            .get_pixel_checked(column, row)
-    });
-    pixel.map_or(GRAY, |rgb| rgb.0)
+fn color(scene: &Scene, point: &SparsePoint) -> Result<[u8; 3], SceneError> {
+    let Some(seen) = point.observations.first() else {
+        return Ok(GRAY);
+    };
+    let Some(view) = scene.views.get(seen.view) else {
+        return Ok(GRAY);
+    };
+    let index = seen.pixel.add_scalar(0.5 - scene.pixel_center);
+    // Coordinates below zero become 0, beyond the image they find no pixel.
+    let (column, row) = (index.x as u32, index.y as u32);
+    let (width, height) = view.image.dimensions();
+    match column < width && row < height {
+        true => Ok(view.image.pixel(column, row)?.0),
+        false => Ok(GRAY),
+    }
 }
 
 /// Writes the points as a PLY file in the user's frame, if there are any.
@@ -28,10 +39,5 @@ pub(super) fn write_if_any(scene: &Scene, path: &Path) -> Result<(), SceneError>
     if scene.sparse_points.is_empty() {
         return Ok(());
     }
-    let colors: Vec<_> = scene
-        .sparse_points
-        .iter()
-        .map(|point| color(scene, point))
-        .collect();
-    point_cloud::write_ply(path, &points_in_original_frame(scene), &colors)
+    point_cloud::write_ply(path, &points_in_original_frame(scene), &colors(scene)?)
 }

@@ -63,7 +63,10 @@ fn synthetic(solid: Solid, degradation: &Degradation, config: &DetectorConfig) -
             )
         });
         let truth = ViewTruth::new(parts, data.scene.pixel_center);
-        let image = degradation.apply(&view.image, index as u64);
+        let image = degradation.apply(
+            &view.image.read().expect("the image is in memory"),
+            index as u64,
+        );
         tally.add(&truth, &confident(&detect(&image, config)));
     }
     tally
@@ -82,8 +85,9 @@ fn real(dir: &Path, config: &DetectorConfig) -> Result<(), Box<dyn Error>> {
         .map(|view| {
             let parts = mesh.visible_parts(&wireframe, &view.camera);
             let truth = ViewTruth::new(parts.into_iter(), scene.pixel_center);
+            let image = view.image.read().expect("the image is in memory");
             let mut tallies = [Tally::default(), Tally::default()];
-            tallies[0].add(&truth, &confident(&detect(&view.image, config)));
+            tallies[0].add(&truth, &confident(&detect(&image, config)));
             tallies[1].add(
                 &truth,
                 &shifted(confident(&view.wireframe), -scene.pixel_center),

@@ -144,7 +144,7 @@ impl Corruption {
             };
             let ending = image.extension().unwrap().to_str().unwrap();
             let target = images_dir.join(format!("{}.{ending}", base.scene.views[named].name));
-            let pixels = &base.scene.views[view].image;
+            let pixels = &*base.scene.views[view].image.read().unwrap();
             match self {
                 Self::HalfSizeImages => half(pixels).save(target.with_extension("png")).unwrap(),
                 Self::MirroredImages => image::imageops::flip_horizontal(pixels)

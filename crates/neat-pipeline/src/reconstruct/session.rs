@@ -4,14 +4,15 @@ use super::RunOptions;
 use crate::changes::Belonging;
 use crate::config::Config;
 use crate::error::PipelineError;
+use crate::estimate::fit_memory;
 use crate::event::{Event, OnEvent, Stage, timed};
 use crate::field::TrainedField;
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
+use crate::resources::Resources;
 use crate::run_dir::{Existing, RunDir, RunDirError, RunLock};
 use crate::scene::{examine_quickly, prepare_scene};
 use crate::trainer::TrainError;
 use burn::tensor::Device;
-use neat_core::file_cache::FileCache;
 use neat_core::{Scene, SceneError, file, hawp_json};
 use neat_tensor::Backend;
 use neat_tensor::backend::software_driver;
@@ -64,15 +65,24 @@ impl<'a> Session<'a> {
         for warning in &warnings {
             on_event(Event::Warning(warning.clone()));
         }
-        let cache = options.cache.as_ref();
         let placed = earlier.as_ref().and_then(|e| e.manifest.sphere.as_ref());
         let mut config = options.config.clone();
-        let prepared = prepare_scene(&scene_dir, &mut config, placed, cache, cancelled, on_event)?;
+        let resources = Resources {
+            cache: options.cache.as_ref(),
+            memory_limit: options.memory_limit,
+            cancelled: Some(cancelled),
+        };
+        let prepared = prepare_scene(&scene_dir, &mut config, placed, resources, on_event)?;
+        let limit = options.memory_limit;
+        // A GPU has memory of its own.
+        if backend != Backend::Wgpu {
+            fit_memory(&mut config, limit, on_event);
+        }
         warnings.extend(prepared.warnings);
         let mut seconds = prepared.seconds;
         if options.examine && earlier.is_none() {
             let (found, time) = timed(on_event, Stage::Examine, |on_event| {
-                examine_quickly(&prepared.scene, &config.data, on_event)
+                examine_quickly(&prepared.scene, &config.data, limit, on_event)
             })?;
             warnings.extend(found);
             seconds.insert(Stage::Examine, time);
@@ -298,7 +308,7 @@ pub fn open_run<E>(
     run: &Path,
     scene: Option<&Path>,
     backend: Backend,
-    cache: Option<&FileCache>,
+    resources: Resources<'_>,
     configure: impl FnOnce(Config) -> Result<Config, E>,
     on_event: OnEvent<'_>,
 ) -> Result<OpenedRun, E>
@@ -307,7 +317,7 @@ where
 {
     let dir = RunDir::open(run).map_err(PipelineError::from)?;
     let config = configure(dir.config().map_err(PipelineError::from)?)?;
-    Ok(read_run(dir, config, scene, backend, cache, on_event)?)
+    Ok(read_run(dir, config, scene, backend, resources, on_event)?)
 }
 
 fn read_run(
@@ -315,7 +325,7 @@ fn read_run(
     mut config: Config,
     scene: Option<&Path>,
     backend: Backend,
-    cache: Option<&FileCache>,
+    resources: Resources<'_>,
     on_event: OnEvent<'_>,
 ) -> Result<OpenedRun, PipelineError> {
     let device = backend.device()?;
@@ -325,8 +335,7 @@ fn read_run(
     let manifest = dir.manifest()?;
     let scene_dir = scene.unwrap_or(&manifest.scene);
     let placed = manifest.sphere.as_ref();
-    let never = AtomicBool::new(false);
-    let prepared = prepare_scene(scene_dir, &mut config, placed, cache, &never, on_event)?;
+    let prepared = prepare_scene(scene_dir, &mut config, placed, resources, on_event)?;
     let no_checkpoint = || RunDirError::NoCheckpoint(dir.root().into());
     let usable = dir.usable_checkpoint()?.ok_or_else(no_checkpoint)?;
     for (_, error) in &usable.damaged {

@@ -33,7 +33,11 @@ fn overlay(
     wireframe: &Wireframe3d,
     views_per_edge: &[usize],
 ) -> RgbImage {
-    let mut image = view.image.clone();
+    let mut image = view
+        .image
+        .read()
+        .expect("the image is in memory")
+        .into_owned();
     for pixel in image.pixels_mut() {
         pixel.0 = pixel.0.map(|value| value / 2);
     }

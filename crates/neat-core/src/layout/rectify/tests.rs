@@ -113,6 +113,11 @@ fn try_load(
     load_posed(dir.path(), Layout::CamerasJson, poses, options)
 }
 
+/// The image of the first view.
+fn image_of(loaded: &LoadedScene) -> RgbImage {
+    loaded.scene.views[0].image.read().unwrap().into_owned()
+}
+
 fn scaled_to(max_image_size: u32) -> LoadOptions {
     LoadOptions {
         max_image_size: Some(max_image_size),
@@ -165,7 +170,7 @@ fn images_are_those_of_the_lens_and_the_smaller_size() {
     let photograph = RgbImage::from_fn(SIZE.0, SIZE.1, picture);
     let undistortion = Undistortion::new(&INTRINSICS, &BARREL, SIZE, 0.5).unwrap();
     let expected = undistortion.resample(&photograph);
-    assert_eq!(whole.scene.views[0].image, expected);
+    assert_eq!(image_of(&whole), expected);
     assert_eq!(
         whole.scene.views[0].camera.intrinsics,
         *undistortion.pinhole()
@@ -181,7 +186,7 @@ fn images_are_those_of_the_lens_and_the_smaller_size() {
 
     let small = load(&dir, BARREL, &scaled_to(48));
     let scaling = Downscaling::new(SIZE, 48, 0.5).unwrap();
-    assert_eq!(small.scene.views[0].image, scaling.resample(&expected));
+    assert_eq!(image_of(&small), scaling.resample(&expected));
     let scaled = SceneWarning::ScaledDown {
         max_image_size: 48,
         views: 2,
@@ -190,7 +195,7 @@ fn images_are_those_of_the_lens_and_the_smaller_size() {
 
     let plain = load(&dir, Distortion::None, &scaled_to(96));
     assert_eq!(plain.warnings, []);
-    assert_eq!(plain.scene.views[0].image, photograph);
+    assert_eq!(image_of(&plain), photograph);
     assert_eq!(plain.scene.views[0].camera.intrinsics, INTRINSICS);
 }
 
@@ -227,6 +232,27 @@ fn wireframes_of_the_smaller_size_are_used_as_they_are() {
 }
 
 #[test]
+fn the_same_is_read_with_little_memory() {
+    let dir = TempDir::new().unwrap();
+    let plenty = load(&dir, BARREL, &LoadOptions::default()).scene;
+    for cache_dir in [None, Some(dir.path().join("cache"))] {
+        let options = LoadOptions {
+            memory_limit: crate::MemoryLimit::of_bytes(120_000),
+            cache_dir,
+            ..LoadOptions::default()
+        };
+        let little = load(&dir, BARREL, &options).scene;
+        assert_eq!(little.views.len(), plenty.views.len());
+        for (little, plenty) in little.views.iter().zip(&plenty.views) {
+            assert!(little.image.is_in_file() && !plenty.image.is_in_file());
+            assert_eq!(little.image.read().unwrap(), plenty.image.read().unwrap());
+            assert_eq!(little.camera, plenty.camera);
+            assert_eq!(little.wireframe, plenty.wireframe);
+        }
+    }
+}
+
+#[test]
 fn the_second_time_images_come_from_the_cache() {
     let dir = tempfile::tempdir().unwrap();
     let cache = dir.path().join("cache");
@@ -235,7 +261,7 @@ fn the_second_time_images_come_from_the_cache() {
     load(&dir, Distortion::None, &cached_in(&cache));
     assert_eq!(entries(), 0);
 
-    let first = load(&dir, BARREL, &cached_in(&cache)).scene;
+    let first = image_of(&load(&dir, BARREL, &cached_in(&cache)));
     assert_eq!(entries(), 2);
     // The cache is what is read: another picture of the same key is believed.
     let forged = RgbImage::from_pixel(SIZE.0, SIZE.1, Rgb([1, 2, 3]));
@@ -252,17 +278,14 @@ fn the_second_time_images_come_from_the_cache() {
     store
         .put(&key, &super::super::photograph::png(&forged).unwrap())
         .unwrap();
-    assert_eq!(
-        load(&dir, BARREL, &cached_in(&cache)).scene.views[0].image,
-        forged
-    );
+    assert_eq!(image_of(&load(&dir, BARREL, &cached_in(&cache))), forged);
 
     // What cannot be a result is made again: no PNG, and one of another size.
     let small = super::super::photograph::png(&RgbImage::new(5, 5)).unwrap();
     for bad in [b"no image".as_slice(), &kept[..kept.len() / 2], &small] {
         store.put(&key, bad).unwrap();
         let again = load(&dir, BARREL, &cached_in(&cache));
-        assert_eq!(again.scene.views[0].image, first.views[0].image);
+        assert_eq!(image_of(&again), first);
         assert_eq!(store.get(&key).unwrap(), kept);
     }
     // Other lenses and sizes are other results.
@@ -277,7 +300,7 @@ fn a_cache_that_cannot_be_written_is_a_warning() {
     fs::write(&occupied, "a file").unwrap();
     let loaded = load(&dir, BARREL, &cached_in(&occupied));
     let without = load(&dir, BARREL, &LoadOptions::default());
-    assert_eq!(loaded.scene.views[0].image, without.scene.views[0].image);
+    assert_eq!(image_of(&loaded), image_of(&without));
     let [_, warning] = loaded.warnings.as_slice() else {
         panic!("two warnings: {:?}", loaded.warnings);
     };
