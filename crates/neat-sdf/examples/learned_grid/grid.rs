@@ -10,7 +10,7 @@
 use pulp::{Arch, Simd, WithSimd};
 
 /// Half the side of the cube that the grids cover.
-const EXTENT: f32 = 1.05;
+pub const EXTENT: f32 = 1.05;
 
 /// How features lie between corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +35,15 @@ pub struct GridShape {
     pub most_entries: usize,
     /// How features lie between corners.
     pub interpolation: Interpolation,
+}
+
+impl GridShape {
+    /// Cells along a side of level `level`, in geometric progression.
+    pub fn cells(&self, level: usize) -> usize {
+        let ratio = self.finest as f64 / self.coarsest as f64;
+        let share = level as f64 / (self.levels.max(2) - 1) as f64;
+        (self.coarsest as f64 * ratio.powf(share)).round() as usize
+    }
 }
 
 /// One grid.
@@ -119,18 +128,16 @@ fn difference<const F: usize>(a: [f32; F], b: [f32; F]) -> [f32; F] {
 impl<const F: usize> Grid<F> {
     /// Grids as `shape` wants them.
     pub fn new(shape: &GridShape) -> Self {
-        let ratio = shape.finest as f64 / shape.coarsest as f64;
         let mut entries = 0;
         let levels = (0..shape.levels)
             .map(|l| {
-                let share = l as f64 / (shape.levels.max(2) - 1) as f64;
-                let cells = (shape.coarsest as f64 * ratio.powf(share)).round() as u32;
-                let corners = (cells as usize + 1).pow(3);
+                let cells = shape.cells(l);
+                let corners = (cells + 1).pow(3);
                 let first = entries;
                 let hashed = corners > shape.most_entries;
                 entries += corners.min(shape.most_entries);
                 Level {
-                    cells,
+                    cells: cells as u32,
                     first,
                     mask: hashed.then(|| shape.most_entries as u32 - 1),
                 }

@@ -21,6 +21,8 @@ mod grid;
 mod grid_network;
 mod score;
 mod shape;
+#[cfg(test)]
+mod tests;
 
 use candidates::Candidate;
 use cost::Cost;
