@@ -280,7 +280,7 @@ impl<const F: usize> GridNetwork<F> {
     fn downwards(&mut self, packed: &Packed, first: &[f32], others: &[f32], tape: &BlockTape) {
         let hidden = self.hidden();
         let arch = self.arch;
-        let [_, adjoint, before, y] = &mut self.scratch;
+        let [to_input, adjoint, before, y] = &mut self.scratch;
         let (mut adjoint, mut before) = (adjoint.as_mut_slice(), before.as_mut_slice());
         let LayerShape { inputs, outputs } = self.layers[hidden];
         let (count, width, stride) = (outputs - 1, padded(outputs), padded(inputs));
@@ -322,9 +322,7 @@ impl<const F: usize> GridNetwork<F> {
             std::mem::swap(&mut adjoint, &mut before);
         }
         let size = BLOCK_ROWS * padded(self.layers[0].inputs);
-        let [to_input, one, other, _] = &mut self.scratch;
-        let result = if hidden % 2 == 0 { one } else { other };
-        to_input.as_mut_slice()[..size].copy_from_slice(&result.as_slice()[..size]);
+        to_input.as_mut_slice()[..size].copy_from_slice(&adjoint[..size]);
     }
 }
 

@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! cargo run --release -p neat-sdf --example learned_grid -- \
-//!     [--steps N] [--seeds N] [--shape NAME]... [--field NAME]... [--table-rate RATE]
+//!     [--steps N] [--seeds N] [--shape NAME]... [--field NAME]...
+//!     [--evidence exact|observed] [--table-rate RATE]
 //! ```
 //!
 //! Every field learns the distance from polyhedra with sharp edges, on one thread.
@@ -37,6 +38,7 @@ struct Options {
     seeds: u64,
     shapes: Vec<String>,
     fields: Vec<String>,
+    evidence: Vec<Evidence>,
     table_rate: Option<f32>,
 }
 
@@ -49,6 +51,7 @@ impl Options {
             seeds: 3,
             shapes: Vec::new(),
             fields: Vec::new(),
+            evidence: Vec::new(),
             table_rate: None,
         };
         while let Some(argument) = arguments.next() {
@@ -60,12 +63,17 @@ impl Options {
                 "--seeds" => options.seeds = value.parse()?,
                 "--shape" if shape::NAMES.contains(&value.as_str()) => options.shapes.push(value),
                 "--field" => options.fields.push(value),
+                "--evidence" if value == "exact" => options.evidence.push(Evidence::Exact),
+                "--evidence" if value == "observed" => options.evidence.push(Evidence::Observed),
                 "--table-rate" => options.table_rate = Some(value.parse()?),
                 _ => return Err(format!("{argument} {value}: no such option").into()),
             }
         }
         if options.shapes.is_empty() {
             options.shapes = shape::NAMES.map(String::from).to_vec();
+        }
+        if options.evidence.is_empty() {
+            options.evidence = vec![Evidence::Exact, Evidence::Observed];
         }
         Ok(options)
     }
@@ -89,8 +97,8 @@ fn compare(options: &Options) {
     }
     let costs = cost::measure(&mut candidates);
     print_costs(&candidates, &costs);
-    for evidence in [Evidence::Exact, Evidence::Observed] {
-        print_scores(&mut candidates, &costs, evidence, options);
+    for evidence in &options.evidence {
+        print_scores(&mut candidates, &costs, *evidence, options);
     }
 }
 

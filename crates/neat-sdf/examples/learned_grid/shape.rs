@@ -50,7 +50,7 @@ impl Prism {
             }
             "star" => {
                 let corner = |i: usize| {
-                    let radius = if i % 2 == 0 { 0.6 } else { 0.3 };
+                    let radius = [0.6, 0.3][i % 2];
                     let (sine, cosine) = (TAU * i as f64 / 10.0).sin_cos();
                     [radius * cosine, radius * sine]
                 };
