@@ -82,13 +82,16 @@ impl Options {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = Options::parse(std::env::args().skip(1))?;
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    one_thread.install(|| compare(&options));
-    Ok(())
+    Ok(one_thread.install(|| compare(&options))?)
 }
 
-fn compare(options: &Options) {
+fn compare(options: &Options) -> Result<(), String> {
     // The first is the present network, to which the others are compared.
     let mut candidates = candidates::all();
+    let is_known = |name: &String| candidates.iter().any(|c| c.name == name);
+    if let Some(name) = options.fields.iter().find(|name| !is_known(name)) {
+        return Err(format!("--field {name}: no such field"));
+    }
     candidates.retain(|c| {
         c.is_present || options.fields.is_empty() || options.fields.iter().any(|n| n == c.name)
     });
@@ -100,6 +103,7 @@ fn compare(options: &Options) {
     for evidence in &options.evidence {
         print_scores(&mut candidates, &costs, *evidence, options);
     }
+    Ok(())
 }
 
 fn print_costs(candidates: &[Candidate], costs: &[Cost]) {
