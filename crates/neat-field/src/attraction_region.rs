@@ -5,8 +5,7 @@
 //! *foreground*: from them NEAT draws its rays, and their labels say which
 //! segment a ray must render.
 
-use neat_core::{LineSegment2, Scene};
-use rayon::prelude::*;
+use neat_core::LineSegment2;
 
 /// Added to the squared length of a segment, so that a segment without length
 /// attracts like a disc (`linesegment.cu` of HAWP).
@@ -72,79 +71,21 @@ impl AttractionRegions {
         pixel_center: f64,
         threshold: f64,
     ) -> Self {
-        assert!(
-            width.checked_mul(height).is_some(),
-            "AttractionRegions::compute: a {width}×{height} image has too many pixels"
-        );
         let mut regions = Self::default();
-        if threshold.is_nan() || threshold < 0.0 {
-            return regions;
-        }
-        // Why visiting only the strips gives the minimum over all segments for
-        // every pixel that can be foreground: a pixel outside the strip of a
-        // segment is farther than the threshold from it. If a visited segment is
-        // within the threshold, no unvisited one can be nearer or equally near;
-        // if none is, the pixel is background whatever the others say.
-        let strips: Vec<Strip> = (0..)
-            .zip(segments)
-            .filter_map(|(label, segment)| Strip::new(segment, label, threshold))
-            .collect();
-        let mut nearest = vec![Attraction::NONE; width as usize];
-        for row in 0..height {
-            nearest.fill(Attraction::NONE);
-            let y = f64::from(row) + pixel_center;
-            for strip in &strips {
-                for column in strip.columns(y, width, pixel_center) {
-                    let x = f64::from(column) + pixel_center;
-                    let attraction = strip.attract([x, y]);
-                    let best = &mut nearest[column as usize];
-                    if attraction.squared_distance < best.squared_distance {
-                        *best = attraction;
-                    }
-                }
-            }
-            for (column, attraction) in (0..width).zip(&nearest) {
-                if !attraction.is_inside() {
-                    continue;
-                }
-                let distance = attraction.squared_distance.sqrt();
-                if within(distance, threshold) {
-                    let x = f64::from(column) + pixel_center;
-                    regions.pixels.push(row * width + column);
-                    regions.labels.push(attraction.label);
-                    regions.feet.push(attraction.foot([x, y]));
-                    regions.distances.push(distance);
-                    regions.parameters.push(attraction.parameter);
-                }
-            }
-        }
+        for_each_pixel(
+            segments,
+            (width, height),
+            pixel_center,
+            threshold,
+            |found| {
+                regions.pixels.push(found.pixel);
+                regions.labels.push(found.attraction.label);
+                regions.feet.push(found.attraction.foot(found.center));
+                regions.distances.push(found.distance);
+                regions.parameters.push(found.attraction.parameter);
+            },
+        );
         regions
-    }
-
-    /// The regions of every view of a scene. Labels index the view's
-    /// [`segments(min_score)`](neat_core::Wireframe2d::segments); the published
-    /// code trains with 0.05.
-    pub fn of_scene(scene: &Scene, min_score: f64, threshold: f64) -> Vec<Self> {
-        scene
-            .views
-            .par_iter()
-            .map(|view| {
-                let segments: Vec<LineSegment2> = view
-                    .wireframe
-                    .segments(min_score)
-                    .iter()
-                    .map(|scored| scored.segment)
-                    .collect();
-                let camera = &view.camera;
-                Self::compute(
-                    &segments,
-                    camera.width,
-                    camera.height,
-                    scene.pixel_center,
-                    threshold,
-                )
-            })
-            .collect()
     }
 
     /// The narrower regions of a smaller threshold: what [`Self::compute`] gives
@@ -173,6 +114,76 @@ impl AttractionRegions {
     }
 }
 
+/// A foreground pixel.
+pub(crate) struct Foreground {
+    /// `row · width + column`.
+    pub pixel: u32,
+    pub attraction: Attraction,
+    /// Of the pixel, in image coordinates.
+    center: [f64; 2],
+    /// From there to the foot, in pixels.
+    distance: f32,
+}
+
+/// Calls `visit` with every foreground pixel, in row-major order; the arguments are
+/// those of [`AttractionRegions::compute`].
+///
+/// # Panics
+/// If the image has more than `u32::MAX` pixels.
+pub(crate) fn for_each_pixel(
+    segments: &[LineSegment2],
+    (width, height): (u32, u32),
+    pixel_center: f64,
+    threshold: f64,
+    mut visit: impl FnMut(Foreground),
+) {
+    assert!(
+        width.checked_mul(height).is_some(),
+        "attraction regions: a {width}×{height} image has too many pixels"
+    );
+    if threshold.is_nan() || threshold < 0.0 {
+        return;
+    }
+    // Why visiting only the strips gives the minimum over all segments for
+    // every pixel that can be foreground: a pixel outside the strip of a
+    // segment is farther than the threshold from it. If a visited segment is
+    // within the threshold, no unvisited one can be nearer or equally near;
+    // if none is, the pixel is background whatever the others say.
+    let strips: Vec<Strip> = (0..)
+        .zip(segments)
+        .filter_map(|(label, segment)| Strip::new(segment, label, threshold))
+        .collect();
+    let mut nearest = vec![Attraction::NONE; width as usize];
+    for row in 0..height {
+        nearest.fill(Attraction::NONE);
+        let y = f64::from(row) + pixel_center;
+        for strip in &strips {
+            for column in strip.columns(y, width, pixel_center) {
+                let x = f64::from(column) + pixel_center;
+                let attraction = strip.attract([x, y]);
+                let best = &mut nearest[column as usize];
+                if attraction.squared_distance < best.squared_distance {
+                    *best = attraction;
+                }
+            }
+        }
+        for (column, attraction) in (0..width).zip(&nearest) {
+            if !attraction.is_inside() {
+                continue;
+            }
+            let distance = attraction.squared_distance.sqrt();
+            if within(distance, threshold) {
+                visit(Foreground {
+                    pixel: row * width + column,
+                    attraction: *attraction,
+                    center: [f64::from(column) + pixel_center, y],
+                    distance,
+                });
+            }
+        }
+    }
+}
+
 /// The one test of membership. It reads the stored precision, so that thinning
 /// agrees with computing anew to the last bit.
 fn within(distance: f32, threshold: f64) -> bool {
@@ -185,7 +196,7 @@ fn select<T: Copy>(values: &[T], indices: &[usize]) -> Vec<T> {
 
 /// Where a segment pulls a pixel.
 #[derive(Clone, Copy)]
-struct Attraction {
+pub(crate) struct Attraction {
     /// In single precision, as published: there the pixels on the bisector of two
     /// segments are ties, which the first wins, and not decided by rounding.
     squared_distance: f32,
@@ -193,7 +204,7 @@ struct Attraction {
     parameter: f32,
     /// From the pixel to the foot.
     offset: [f64; 2],
-    label: u32,
+    pub label: u32,
 }
 
 impl Attraction {

@@ -5,6 +5,7 @@
 pub mod attraction_network;
 pub mod attraction_region;
 pub mod host_segment_loss;
+pub mod region_pixels;
 pub mod segment_loss;
 pub mod segment_rendering;
 

@@ -8,6 +8,7 @@ use nalgebra::Vector2;
 use neat_core::LineSegment2;
 use neat_core::synthetic::{SyntheticScene, generate};
 use neat_field::attraction_region::AttractionRegions;
+use neat_field::region_pixels::RegionPixels;
 use proptest::prelude::*;
 
 const CASE: &str = "09_attraction_regions";
@@ -161,6 +162,10 @@ proptest! {
         thinner in 0.0..15.0,
     ) {
         let regions = AttractionRegions::compute(&segments, 40, 30, pixel_center, threshold);
+        let pixels = RegionPixels::compute(&segments, 40, 30, pixel_center, threshold);
+        let drawn: Vec<_> = (0..pixels.len()).map(|index| pixels.get(index)).collect();
+        let listed = regions.pixels.iter().copied().zip(regions.labels.iter().copied());
+        prop_assert_eq!(drawn, listed.collect::<Vec<_>>());
         let expected = all_pairs(&segments, 40, 30, pixel_center, threshold);
         prop_assert_eq!(&regions, &expected);
 
@@ -201,13 +206,13 @@ fn the_regions_of_a_scene_are_those_of_its_views() {
     };
     let scene = generate(&config).unwrap().scene;
     let min_score = 0.05;
-    let expected: Vec<AttractionRegions> = scene
+    let expected: Vec<RegionPixels> = scene
         .views
         .iter()
         .map(|view| {
             let scored = view.wireframe.segments(min_score);
             let segments: Vec<LineSegment2> = scored.iter().map(|s| s.segment).collect();
-            AttractionRegions::compute(&segments, 64, 64, scene.pixel_center, 5.0)
+            RegionPixels::compute(&segments, 64, 64, scene.pixel_center, 5.0)
         })
         .collect();
     assert!(expected.iter().all(|regions| !regions.is_empty()));
@@ -216,7 +221,7 @@ fn the_regions_of_a_scene_are_those_of_its_views() {
         let regions = pool
             .build()
             .unwrap()
-            .install(|| AttractionRegions::of_scene(&scene, min_score, 5.0));
+            .install(|| RegionPixels::of_scene(&scene, min_score, 5.0));
         assert_eq!(regions, expected);
     }
 }

@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 use neat_core::{Scene, Wireframe3d, file};
 use neat_eval::image_quality::psnr;
 use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
-use neat_field::attraction_region::AttractionRegions;
+use neat_field::region_pixels::RegionPixels;
 use neat_wireframe::export::write_json;
 use neat_wireframe::metrics::PrecisionRecall;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -288,9 +288,8 @@ fn mean_psnr(scene: &Scene, field: &TrainedField) -> Option<f64> {
 /// Share of the pixels of all views that no attraction region holds.
 fn masked_out(scene: &Scene, config: &Config) -> Option<f64> {
     let data = &config.data;
-    let regions =
-        AttractionRegions::of_scene(scene, data.min_segment_score, data.attraction_distance);
-    let inside: usize = regions.iter().map(AttractionRegions::len).sum();
+    let regions = RegionPixels::of_scene(scene, data.min_segment_score, data.attraction_distance);
+    let inside: usize = regions.iter().map(RegionPixels::len).sum();
     let sizes = scene.views.iter().map(|view| view.image.dimensions());
     let pixels: u64 = sizes.map(|(w, h)| u64::from(w) * u64::from(h)).sum();
     (pixels > 0).then(|| 1.0 - inside as f64 / pixels as f64)

@@ -4,7 +4,7 @@
 use crate::config::{BatchViews, Config};
 use nalgebra::Vector2;
 use neat_core::{Camera, Scene, SceneError, ScoredSegment2, ViewImage};
-use neat_field::attraction_region::AttractionRegions;
+use neat_field::region_pixels::RegionPixels;
 use neat_sdf::RayBundle;
 use neat_tensor::random::{Purpose, stream};
 use rand::{Rng, RngExt};
@@ -22,7 +22,7 @@ pub struct TrainingView {
     pub segments: Vec<ScoredSegment2>,
     /// All detected junctions, in image coordinates.
     pub junctions: Vec<Vector2<f64>>,
-    regions: AttractionRegions,
+    regions: RegionPixels,
     image: ViewImage,
 }
 
@@ -56,7 +56,7 @@ impl TrainingData {
     pub fn new(scene: &Scene, config: &Config) -> Self {
         let data = &config.data;
         let regions =
-            AttractionRegions::of_scene(scene, data.min_segment_score, data.attraction_distance);
+            RegionPixels::of_scene(scene, data.min_segment_score, data.attraction_distance);
         let views: Vec<TrainingView> = scene
             .views
             .iter()
@@ -151,12 +151,11 @@ impl TrainingData {
         entry: usize,
     ) -> Result<(), SceneError> {
         let from = &self.views[view];
-        let pixel = from.regions.pixels[entry];
-        let label = from.regions.labels[entry] as usize;
+        let (pixel, label) = from.regions.get(entry);
         let width = from.camera.width;
         self.push_pixel(batch, view, pixel % width, pixel / width)?;
         batch.view_of_ray.push(view);
-        batch.segment_of_ray.push(from.segments[label]);
+        batch.segment_of_ray.push(from.segments[label as usize]);
         Ok(())
     }
 
