@@ -1,5 +1,5 @@
-//! The image of a view: in memory, or in a temporary file that is read when it is
-//! wanted.
+//! The image of a view: in memory, in a temporary file that is read when it is wanted,
+//! or made then.
 //!
 //! Three hundred photographs of twelve megapixels are ten gigabytes, and a step of
 //! training looks at some hundred pixels of them. An [`ImageStore`] decides where
@@ -8,6 +8,7 @@
 use crate::{MemoryLimit, SceneError};
 use image::{Rgb, RgbImage};
 use std::borrow::Cow;
+use std::fmt;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -17,7 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Red, green and blue: one byte each.
 const CHANNELS: u64 = 3;
 
-/// An image that is cheap to clone and may lie in a file.
+/// An image that is cheap to clone and need not be in memory.
 ///
 /// # Example
 /// ```
@@ -33,10 +34,24 @@ const CHANNELS: u64 = 3;
 #[derive(Clone, Debug)]
 pub struct ViewImage(Pixels);
 
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 enum Pixels {
     InMemory(Arc<RgbImage>),
     InFile(Arc<Stretch>),
+    OnDemand {
+        size: (u32, u32),
+        make: Arc<dyn Fn() -> RgbImage + Send + Sync>,
+    },
+}
+
+impl fmt::Debug for Pixels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::InMemory(image) => write!(f, "InMemory({:?})", image.dimensions()),
+            Self::InFile(stretch) => write!(f, "InFile({:?})", stretch.size),
+            Self::OnDemand { size, .. } => write!(f, "OnDemand({size:?})"),
+        }
+    }
 }
 
 /// An image in the file of its store: rows one after the other, three bytes a pixel.
@@ -56,11 +71,22 @@ impl From<RgbImage> for ViewImage {
 }
 
 impl ViewImage {
+    /// An image of this width and height that `make` makes, the same one whenever it is
+    /// wanted: for images that are written once, such as those of synthetic scenes.
+    pub fn on_demand(
+        size: (u32, u32),
+        make: impl Fn() -> RgbImage + Send + Sync + 'static,
+    ) -> Self {
+        let make = Arc::new(make);
+        Self(Pixels::OnDemand { size, make })
+    }
+
     /// Width and height in pixels.
     pub fn dimensions(&self) -> (u32, u32) {
         match &self.0 {
             Pixels::InMemory(image) => image.dimensions(),
             Pixels::InFile(stretch) => stretch.size,
+            Pixels::OnDemand { size, .. } => *size,
         }
     }
 
@@ -95,10 +121,11 @@ impl ViewImage {
                 stretch.read(CHANNELS * index, &mut rgb)?;
                 Ok(Rgb(rgb))
             }
+            Pixels::OnDemand { make, .. } => Ok(*make().get_pixel(x, y)),
         }
     }
 
-    /// The whole image: borrowed where it is in memory, else read.
+    /// The whole image: borrowed where it is in memory, else read or made.
     ///
     /// # Errors
     /// If the temporary file cannot be read.
@@ -111,6 +138,7 @@ impl ViewImage {
                 stretch.read(0, &mut image)?;
                 Ok(Cow::Owned(image))
             }
+            Pixels::OnDemand { make, .. } => Ok(Cow::Owned(make())),
         }
     }
 }
@@ -294,6 +322,18 @@ mod tests {
         assert_eq!(
             std::fs::read_dir(dir.path().join("new")).unwrap().count(),
             0
+        );
+    }
+
+    #[test]
+    fn images_on_demand_are_made_whenever_they_are_wanted() {
+        let image = ViewImage::on_demand((7, 5), || picture(3, 7, 5));
+        assert_eq!((image.dimensions(), image.byte_len()), ((7, 5), 105));
+        assert!(!image.is_in_file());
+        assert_eq!(*image.read().unwrap(), picture(3, 7, 5));
+        assert_eq!(
+            image.pixel(6, 4).unwrap(),
+            *picture(3, 7, 5).get_pixel(6, 4)
         );
     }
 

@@ -4,7 +4,8 @@
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::layout::abc::write_scene;
 use neat_core::synthetic::{
-    Frustum, PlanarFace, Solid, SyntheticData, SyntheticScene, generate, render, visible_parts,
+    Frustum, PlanarFace, Solid, SyntheticData, SyntheticScene, generate, generate_on_demand,
+    render, visible_parts,
 };
 use neat_core::{Camera, Intrinsics, LineSegment2, LoadOptions, Ray, Similarity, load_scene};
 use rand::{RngExt, SeedableRng};
@@ -538,11 +539,50 @@ fn the_same_configuration_gives_the_same_scene_on_any_number_of_threads() {
 }
 
 #[test]
+fn images_on_demand_are_the_same() {
+    let config = SyntheticScene {
+        views: 3,
+        ..small(Solid::LPrism)
+    };
+    let later = generate_on_demand(&config).unwrap();
+    assert_scenes_equal(&later, &data(&config));
+}
+
+#[test]
+fn images_need_not_be_square() {
+    let square = SyntheticScene {
+        camera_distance: 4.0,
+        ..small(Solid::LPrism)
+    };
+    let flat = SyntheticScene {
+        image_height: Some(96),
+        ..square.clone()
+    };
+    let (square, flat) = (data(&square), data(&flat));
+    flat.scene.validate().unwrap();
+    for (square, flat) in square.scene.views.iter().zip(&flat.scene.views) {
+        assert_eq!(flat.image.dimensions(), (128, 96));
+        // The same picture without its uppermost and lowest rows.
+        let (square, flat) = (square.image.read().unwrap(), flat.image.read().unwrap());
+        for (x, y, rgb) in flat.enumerate_pixels() {
+            assert_eq!(rgb, square.get_pixel(x, y + 16));
+        }
+    }
+    // Too near for its height alone.
+    let config = SyntheticScene {
+        image_height: Some(16),
+        ..small(Solid::LPrism)
+    };
+    assert_eq!(generate(&config).unwrap_err().field, "camera_distance");
+}
+
+#[test]
 fn impossible_configurations_are_named() {
     type Change = fn(&mut SyntheticScene);
-    let cases: [(&str, Change); 7] = [
+    let cases: [(&str, Change); 8] = [
         ("views", |c| c.views = 0),
         ("image_size", |c| c.image_size = 0),
+        ("image_height", |c| c.image_height = Some(9000)),
         ("camera_distance", |c| c.camera_distance = 0.5),
         ("noise_in_pixels", |c| c.noise_in_pixels = f64::NAN),
         ("detection_rate", |c| c.detection_rate = 1.5),

@@ -8,7 +8,7 @@ use crate::run_dir::{Existing, RunDir};
 use neat_core::SceneError;
 use neat_core::ground_truth::{GroundTruth, write_ground_truth};
 use neat_core::layout::abc;
-use neat_core::synthetic::{SyntheticScene, generate};
+use neat_core::synthetic::{SyntheticScene, generate_on_demand};
 use neat_eval::{EvaluationReport, NeatAbc, Scores};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ pub fn synthesise(config: &SyntheticScene, dir: &Path) -> Result<GroundTruth, Pi
     {
         return Err(PipelineError::SceneDirNotEmpty(dir.into()));
     }
-    let data = generate(config)?;
+    let data = generate_on_demand(config)?;
     let truth = GroundTruth {
         wireframe: data.truth,
         curves: Vec::new(),

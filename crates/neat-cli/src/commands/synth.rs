@@ -38,9 +38,12 @@ pub struct SceneArgs {
     /// Number of images
     #[arg(long, value_name = "N", default_value_t = SyntheticScene::default().views)]
     views: usize,
-    /// Width and height of the images, in pixels
+    /// Width of the images, in pixels, and their height unless --image-height is given
     #[arg(long, value_name = "N", default_value_t = SyntheticScene::default().image_size)]
     image_size: u32,
+    /// Height of the images, in pixels, where they are not square
+    #[arg(long, value_name = "N")]
+    image_height: Option<u32>,
     /// Distance of the cameras; the object has about unit size
     #[arg(long, value_name = "D", default_value_t = SyntheticScene::default().camera_distance)]
     distance: f64,
@@ -62,6 +65,7 @@ impl SceneArgs {
             solid: self.solid,
             views: self.views,
             image_size: self.image_size,
+            image_height: self.image_height,
             camera_distance: self.distance,
             seed,
             noise_in_pixels: self.noise,

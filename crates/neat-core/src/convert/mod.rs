@@ -79,8 +79,12 @@ fn abc_scene(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
 
 fn write_images(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
     file::create_dir(dir)?;
-    (scene.views.par_iter()).try_for_each(|view| {
-        file::write_png(&dir.join(image_name(&view.name)), &*view.image.read()?)
+    // No more than this at once: some images are read only now.
+    let mut chunks = scene.views.chunks(rayon::current_num_threads());
+    chunks.try_for_each(|views| {
+        (views.par_iter()).try_for_each(|view| {
+            file::write_png(&dir.join(image_name(&view.name)), &*view.image.read()?)
+        })
     })
 }
 

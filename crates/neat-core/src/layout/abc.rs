@@ -17,7 +17,7 @@ use super::poses::{
     view_error, wrong_shape,
 };
 use crate::npz::{NpyArray, NpzReader, write_npz};
-use crate::{Distortion, Scene, SceneError, Similarity, ViewError, file, hawp_json};
+use crate::{Distortion, Scene, SceneError, Similarity, View, ViewError, file, hawp_json};
 use nalgebra::{Matrix3, Matrix4, SMatrix};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -121,17 +121,19 @@ pub fn write_scene(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
     if has_wireframes {
         file::create_dir(&hawp_dir)?;
     }
-    scene.views.par_iter().try_for_each(|view| {
-        file::write_png(
-            &images_dir.join(format!("{}.png", view.name)),
-            &*view.image.read()?,
-        )?;
+    let write = |view: &View| {
+        let image = images_dir.join(format!("{}.png", view.name));
+        file::write_png(&image, &*view.image.read()?)?;
         if !has_wireframes {
             return Ok(());
         }
         let hawp = hawp_dir.join(format!("{}.json", view.name));
         hawp_json::write(&hawp, &view.wireframe, scene.pixel_center)
-    })?;
+    };
+    // No more than this at once: some images are read or made only now.
+    for views in scene.views.chunks(rayon::current_num_threads()) {
+        views.par_iter().try_for_each(write)?;
+    }
     write_cameras(scene, &dir.join(CAMERAS_NPZ))
 }
 

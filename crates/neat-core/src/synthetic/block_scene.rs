@@ -111,7 +111,7 @@ impl BlockScene {
     /// The first field outside its range, or not a number.
     pub fn validate(&self) -> Result<(), SyntheticError> {
         let size = f64::from(self.image_size);
-        let nearest = min_distance(1.0);
+        let nearest = min_distance(1.0, 1.0);
         let ranges = [
             ("blocks", self.blocks as f64, 1.0, 100_000.0),
             ("views", self.views as f64, 1.0, 10_000.0),
@@ -145,11 +145,16 @@ impl BlockScene {
     pub fn generate(&self) -> Result<BlockData, SyntheticError> {
         self.validate()?;
         let blocks = Blocks::new(self);
-        let views = viewpoints(self.views, self.camera_distance, self.image_size, self.seed)
-            .into_par_iter()
-            .enumerate()
-            .map(|(view, camera)| self.detect(&blocks, view, camera))
-            .collect();
+        let views = viewpoints(
+            self.views,
+            self.camera_distance,
+            (self.image_size, self.image_size),
+            self.seed,
+        )
+        .into_par_iter()
+        .enumerate()
+        .map(|(view, camera)| self.detect(&blocks, view, camera))
+        .collect();
         Ok(BlockData {
             truth: blocks.wireframe(),
             blocks,

@@ -28,10 +28,11 @@ pub(super) fn detect(
     let mut score = stream(config.seed, view, Purpose::Score);
     let mut clutter = stream(config.seed, view, Purpose::FalseSegment);
 
-    let size = f64::from(config.image_size);
+    let (width, height) = config.size();
+    let size = Vector2::new(f64::from(width), f64::from(height));
     let mut wireframe = Wireframe2d {
-        width: config.image_size,
-        height: config.image_size,
+        width,
+        height,
         ..Wireframe2d::default()
     };
     let mut sources = Vec::new();
@@ -49,7 +50,7 @@ pub(super) fn detect(
                 return *vertex;
             }
             let noisy = exact + gaussian_pair(&mut noise) * config.noise_in_pixels;
-            let inside = noisy.map(|coordinate| coordinate.clamp(0.0, size));
+            let inside = noisy.sup(&Vector2::zeros()).inf(&size);
             let vertex = push_vertex(&mut wireframe, inside, high_score(score.random()));
             junction_vertices.extend(junction.map(|junction| (junction, vertex)));
             vertex

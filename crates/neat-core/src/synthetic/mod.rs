@@ -27,6 +27,8 @@ pub use blocks::Blocks;
 pub use frustum::Frustum;
 pub use planar_face::PlanarFace;
 pub use rendering::render;
-pub use scene::{SyntheticData, SyntheticError, SyntheticScene, ViewTruth, generate};
+pub use scene::{
+    SyntheticData, SyntheticError, SyntheticScene, ViewTruth, generate, generate_on_demand,
+};
 pub use solid::Solid;
 pub use visible_edges::{VisiblePart, visible_parts};

@@ -5,10 +5,11 @@ use super::viewpoints::{min_distance, viewpoints};
 use super::visible_edges::{VisiblePart, visible_parts};
 use super::{Frustum, Solid, render};
 use crate::scene_sphere::visible_radius;
-use crate::{Scene, Similarity, View, Wireframe3d};
+use crate::{Camera, Scene, Similarity, View, ViewImage, Wireframe3d};
 use nalgebra::Vector2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// What to generate.
 ///
@@ -33,8 +34,11 @@ pub struct SyntheticScene {
     pub solid: Solid,
     /// Number of views.
     pub views: usize,
-    /// Width and height of the images, in pixels.
+    /// Width of the images, in pixels, and their height unless [`Self::image_height`]
+    /// says otherwise.
     pub image_size: u32,
+    /// Height of the images, in pixels, where they are not square.
+    pub image_height: Option<u32>,
     /// Distance of the cameras from the origin, the object's centre.
     pub camera_distance: f64,
     /// Seed of all randomness.
@@ -59,6 +63,7 @@ impl Default for SyntheticScene {
             solid: Solid::default(),
             views: 100,
             image_size: 512,
+            image_height: None,
             camera_distance: 2.0,
             seed: 0,
             noise_in_pixels: 0.5,
@@ -85,16 +90,25 @@ pub struct SyntheticError {
 }
 
 impl SyntheticScene {
+    /// Width and height of the images, in pixels.
+    pub fn size(&self) -> (u32, u32) {
+        let height = self.image_height.unwrap_or(self.image_size);
+        (self.image_size, height)
+    }
+
     /// Checks every field against its range.
     ///
     /// # Errors
     /// The first field outside its range, or not a number.
     pub fn validate(&self) -> Result<(), SyntheticError> {
-        let size = f64::from(self.image_size);
-        let nearest = min_distance(Solid::BOUNDING_RADIUS);
+        let (width, height) = self.size();
+        let size = f64::from(width);
+        let aspect = f64::from(height) / size;
+        let nearest = min_distance(Solid::BOUNDING_RADIUS, aspect.min(1.0));
         let ranges = [
             ("views", self.views as f64, 1.0, 10_000.0),
             ("image_size", size, 16.0, 8192.0),
+            ("image_height", f64::from(height), 16.0, 8192.0),
             ("camera_distance", self.camera_distance, nearest, 100.0),
             ("noise_in_pixels", self.noise_in_pixels, 0.0, size),
             ("detection_rate", self.detection_rate, 0.0, 1.0),
@@ -158,12 +172,34 @@ pub struct ViewTruth {
 /// # Errors
 /// See [`SyntheticScene::validate`].
 pub fn generate(config: &SyntheticScene) -> Result<SyntheticData, SyntheticError> {
+    generate_with(config, |solid, camera| {
+        render(solid, camera, config.shading).into()
+    })
+}
+
+/// The same scene, its images made whenever they are wanted: for scenes that are written
+/// and are larger than the memory.
+///
+/// # Errors
+/// See [`SyntheticScene::validate`].
+pub fn generate_on_demand(config: &SyntheticScene) -> Result<SyntheticData, SyntheticError> {
+    let solid = Arc::new(config.solid.frustum());
+    generate_with(config, |_, camera| {
+        let (solid, camera, shading) = (solid.clone(), *camera, config.shading);
+        ViewImage::on_demand(config.size(), move || render(&solid, &camera, shading))
+    })
+}
+
+fn generate_with(
+    config: &SyntheticScene,
+    image: impl Fn(&Frustum, &Camera) -> ViewImage + Sync,
+) -> Result<SyntheticData, SyntheticError> {
     config.validate()?;
     let solid = config.solid.frustum();
     let (views, view_truths): (Vec<View>, Vec<ViewTruth>) = viewpoints(
         config.views,
         config.camera_distance,
-        config.image_size,
+        config.size(),
         config.seed,
     )
     .into_par_iter()
@@ -171,14 +207,18 @@ pub fn generate(config: &SyntheticScene) -> Result<SyntheticData, SyntheticError
     .map(|(index, camera)| {
         let mut visible = visible_parts(&solid, &camera);
         visible.retain(|part| part.segment.length() >= config.min_visible_length);
-        let whole_image = [0.0, f64::from(config.image_size)].map(|c| Vector2::new(c, c));
+        let (width, height) = config.size();
+        let whole_image = [
+            Vector2::zeros(),
+            Vector2::new(f64::from(width), f64::from(height)),
+        ];
         let bounds = solid.bounds_in_image(&camera).unwrap_or(whole_image);
         let (wireframe, sources) = detect(&visible, config, index, bounds);
         let view = View {
             name: format!("image_{index:04}"),
             camera,
             wireframe,
-            image: render(&solid, &camera, config.shading).into(),
+            image: image(&solid, &camera),
         };
         (view, ViewTruth { visible, sources })
     })

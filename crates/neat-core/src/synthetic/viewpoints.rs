@@ -9,14 +9,19 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 const FOCAL_PER_WIDTH: f64 = 560.0 / 512.0;
 
 /// From this distance on, a ball of the given radius around the origin lies
-/// within every image.
-pub(super) fn min_distance(radius: f64) -> f64 {
-    radius * (2.0 * FOCAL_PER_WIDTH).hypot(1.0)
+/// within every image whose shorter side is `aspect` of its width.
+pub(super) fn min_distance(radius: f64, aspect: f64) -> f64 {
+    radius * (2.0 * FOCAL_PER_WIDTH / aspect).hypot(1.0)
 }
 
 /// `count` cameras at `distance` from the origin, looking at it, spread evenly:
 /// a Fibonacci lattice in a random orientation.
-pub(super) fn viewpoints(count: usize, distance: f64, image_size: u32, seed: u64) -> Vec<Camera> {
+pub(super) fn viewpoints(
+    count: usize,
+    distance: f64,
+    image_size: (u32, u32),
+    seed: u64,
+) -> Vec<Camera> {
     let mut rng = stream(seed, 0, Purpose::Viewpoints);
     let (a, b) = (gaussian_pair(&mut rng), gaussian_pair(&mut rng));
     let orientation = UnitQuaternion::new_normalize(Quaternion::new(a.x, a.y, b.x, b.y));
@@ -34,7 +39,7 @@ pub(super) fn viewpoints(count: usize, distance: f64, image_size: u32, seed: u64
 
 /// The camera at `center_in_world` with the origin in the middle of its image
 /// and the world's z axis upwards (the y axis, where z is nearly the view).
-fn looking_at_origin(center_in_world: Vector3<f64>, image_size: u32) -> Camera {
+fn looking_at_origin(center_in_world: Vector3<f64>, (width, height): (u32, u32)) -> Camera {
     let forward = -center_in_world.normalize();
     let up = if forward.z.abs() < 0.99 {
         Vector3::z()
@@ -43,18 +48,18 @@ fn looking_at_origin(center_in_world: Vector3<f64>, image_size: u32) -> Camera {
     };
     let right = forward.cross(&up).normalize();
     let down = forward.cross(&right);
-    let size = f64::from(image_size);
+    let focal = FOCAL_PER_WIDTH * f64::from(width);
     Camera {
         intrinsics: Intrinsics {
-            fx: FOCAL_PER_WIDTH * size,
-            fy: FOCAL_PER_WIDTH * size,
-            cx: size / 2.0,
-            cy: size / 2.0,
+            fx: focal,
+            fy: focal,
+            cx: f64::from(width) / 2.0,
+            cy: f64::from(height) / 2.0,
             skew: 0.0,
         },
         world_from_camera: Matrix3::from_columns(&[right, down, forward]),
         center_in_world,
-        width: image_size,
-        height: image_size,
+        width,
+        height,
     }
 }
