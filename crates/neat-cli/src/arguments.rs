@@ -2,6 +2,7 @@
 
 use crate::commands::Command;
 use crate::error::CliError;
+use crate::memory::MemoryArgs;
 use crate::{duration, output};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser};
@@ -112,6 +113,8 @@ pub struct ComputeArgs {
     /// learning rate follows
     #[arg(long, value_name = "TIME", value_parser = duration::parse)]
     pub time_budget: Option<Duration>,
+    #[command(flatten)]
+    pub memory: MemoryArgs,
 }
 
 /// What computes.

@@ -6,6 +6,7 @@ mod commands;
 mod duration;
 mod error;
 mod interrupt;
+mod memory;
 mod output;
 mod progress;
 mod scene_arguments;

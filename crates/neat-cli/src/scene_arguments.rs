@@ -4,7 +4,7 @@ use crate::arguments::positive;
 use clap::Args;
 use neat_core::file_cache::FileCache;
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
-use neat_core::{LoadOptions, SphereChoice};
+use neat_core::{LoadOptions, MemoryLimit, SphereChoice};
 use neat_pipeline::config::DataConfig;
 use neat_pipeline::preset::Preset;
 use neat_pipeline::scene::load_options;
@@ -48,10 +48,18 @@ pub struct SceneArgs {
 impl SceneArgs {
     /// How a scene is read with what was given, by commands that need no 2D
     /// wireframes.
-    pub fn load_options(&self, cache: Option<&FileCache>) -> LoadOptions {
+    pub fn load_options(
+        &self,
+        cache: Option<&FileCache>,
+        memory_limit: MemoryLimit,
+    ) -> LoadOptions {
         LoadOptions {
             require_wireframes: false,
-            ..load_options(&self.apply(Preset::default().config().data), cache)
+            ..load_options(
+                &self.apply(Preset::default().config().data),
+                cache,
+                memory_limit,
+            )
         }
     }
 

@@ -126,6 +126,24 @@ pub enum SceneError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// Less memory than work on a single image takes.
+    #[error(
+        "{work} of {path} takes {needed_mib} MiB for {width}×{height} pixels, more than the memory limit of {limit_mib} MiB: allow more with --memory-limit, or scale images down with --max-image-size"
+    )]
+    MemoryLimit {
+        /// The image, or the scene that it belongs to.
+        path: PathBuf,
+        /// What is done with the image.
+        work: &'static str,
+        /// Width of the largest image.
+        width: u32,
+        /// Its height.
+        height: u32,
+        /// Mebibytes that it takes.
+        needed_mib: u64,
+        /// Mebibytes that there are.
+        limit_mib: u64,
+    },
     /// A view that makes no sense.
     #[error("view `{view}` of {path}: {problem}")]
     View {

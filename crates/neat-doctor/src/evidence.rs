@@ -6,9 +6,9 @@ use crate::corners::{corners, refined};
 use crate::descriptor::keypoints;
 use crate::gray_image::GrayImage;
 use crate::tracks::{ViewKeypoints, matching};
+use crate::working_copies::WorkingCopies;
 use nalgebra::Vector2;
-use neat_core::{Scene, View};
-use rayon::prelude::*;
+use neat_core::{Scene, SceneError, View};
 
 /// Images with more corners than this show texture, which tells points apart.
 const TEXTURE: usize = 120;
@@ -26,37 +26,46 @@ pub(crate) struct Gathered {
 }
 
 /// Whether most of the given views show texture.
-pub(crate) fn is_textured(working: &[(GrayImage, u32)], views: &[usize]) -> bool {
+///
+/// # Errors
+/// If an image lies in a file that cannot be read.
+pub(crate) fn is_textured(
+    working: &WorkingCopies<'_>,
+    views: &[usize],
+) -> Result<bool, SceneError> {
     // A few views tell; the first and the last are often the worst.
     let few: Vec<usize> = views.iter().copied().skip(1).step_by(6).collect();
-    let mut counts: Vec<usize> = (few.par_iter())
-        .map(|&view| corners(&working[view].0, TEXTURE + 1).len())
-        .collect();
+    let mut counts = working.look_at(&few, |view| {
+        let (image, _) = working.of(view)?;
+        Ok(corners(&image, TEXTURE + 1).len())
+    })?;
     counts.sort_unstable();
-    counts
-        .get(counts.len() / 2)
-        .is_some_and(|&count| count > TEXTURE)
+    let median = counts.get(counts.len() / 2);
+    Ok(median.is_some_and(|&count| count > TEXTURE))
 }
 
 /// Looks at the given views for points of texture or for corners.
+///
+/// # Errors
+/// If an image lies in a file that cannot be read.
 pub(crate) fn gather(
     scene: &Scene,
-    working: &[(GrayImage, u32)],
+    working: &WorkingCopies<'_>,
     views: Vec<usize>,
     textured: bool,
-) -> Gathered {
+) -> Result<Gathered, SceneError> {
     if textured {
-        let keypoints: Vec<_> = views
-            .par_iter()
-            .map(|&view| ViewKeypoints {
+        let keypoints = working.look_at(&views, |view| {
+            let (image, factor) = working.of(view)?;
+            Ok(ViewKeypoints {
                 view,
-                factor: f64::from(working[view].1),
+                factor: f64::from(factor),
                 pixel_center: scene.pixel_center,
-                keypoints: keypoints(&working[view].0),
+                keypoints: keypoints(&image),
             })
-            .collect();
+        })?;
         let matching = matching(&keypoints);
-        return Gathered {
+        return Ok(Gathered {
             views,
             evidence: Evidence::Tracks(matching.tracks),
             likeness: matching
@@ -64,36 +73,33 @@ pub(crate) fn gather(
                 .iter()
                 .map(|&n| (1.0 + n as f64).ln())
                 .collect(),
-        };
+        });
     }
-    let corners: Vec<_> = (views.par_iter())
-        .map(|&view| {
-            let (image, factor) = &working[view];
-            let gradients = image.blurred(1).gradients();
-            let full = |working: f32| {
-                (f64::from(working) + 0.5) * f64::from(*factor) - 0.5 + scene.pixel_center
-            };
-            let corners = corners(image, CANDIDATES)
-                .iter()
-                .filter_map(|corner| refined(&gradients, corner))
-                .take(MAX_CORNERS)
-                .map(|corner| Vector2::new(full(corner.x), full(corner.y)))
-                .collect();
-            ViewCorners::new(view, corners, larger_side(&scene.views[view]))
-        })
-        .collect();
-    let thumbnails: Vec<_> = (views.par_iter())
-        .map(|&view| Thumbnail::new(&working[view].0))
-        .collect();
+    let looked = working.look_at(&views, |view| {
+        let (image, factor) = working.of(view)?;
+        let gradients = image.blurred(1).gradients();
+        let full = |working: f32| {
+            (f64::from(working) + 0.5) * f64::from(factor) - 0.5 + scene.pixel_center
+        };
+        let corners = corners(&image, CANDIDATES)
+            .iter()
+            .filter_map(|corner| refined(&gradients, corner))
+            .take(MAX_CORNERS)
+            .map(|corner| Vector2::new(full(corner.x), full(corner.y)))
+            .collect();
+        let corners = ViewCorners::new(view, corners, larger_side(&scene.views[view]));
+        Ok((corners, Thumbnail::new(&image)))
+    })?;
+    let (corners, thumbnails): (Vec<_>, Vec<_>) = looked.into_iter().unzip();
     let likeness = (0..views.len())
         .flat_map(|i| (i + 1..views.len()).map(move |j| [i, j]))
         .map(|[i, j]| thumbnails[i].likeness(&thumbnails[j]))
         .collect();
-    Gathered {
+    Ok(Gathered {
         views,
         evidence: Evidence::Corners(CornerEvidence::new(corners)),
         likeness,
-    }
+    })
 }
 
 fn larger_side(view: &View) -> f64 {

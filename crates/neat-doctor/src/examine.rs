@@ -3,12 +3,13 @@
 use crate::capture_checks::capture_findings;
 use crate::evidence::{gather, is_textured};
 use crate::examination::{Check, Examination, Finding, Level, Repair};
-use crate::gray_image::GrayImage;
 use crate::image_checks::image_findings;
 use crate::load_failure::{explain, size_factor};
 use crate::pose_diagnosis::Diagnosis;
-use neat_core::{CameraError, LoadOptions, LoadedScene, Scene, SceneError, ViewError, load_scene};
-use rayon::prelude::*;
+use crate::working_copies::WorkingCopies;
+use neat_core::{
+    CameraError, LoadOptions, LoadedScene, MemoryLimit, Scene, SceneError, ViewError, load_scene,
+};
 use std::path::Path;
 
 /// How thoroughly to look.
@@ -29,6 +30,9 @@ pub struct ExamineOptions {
     pub depth: Depth,
     /// What the scene was read with: remedies name what to use instead.
     pub read_with: Repair,
+    /// How much memory may be used: views are looked at one after the other where it is
+    /// little. What is found does not depend on it.
+    pub memory_limit: MemoryLimit,
 }
 
 /// Views that are looked at: photographs, of which each is matched with all
@@ -71,10 +75,8 @@ fn findings(
     options: &ExamineOptions,
     mirrored: bool,
 ) -> Result<Vec<Finding>, SceneError> {
-    let working = (scene.views.par_iter())
-        .map(|view| Ok(GrayImage::working_copy(&*view.image.read()?)))
-        .collect::<Result<Vec<_>, SceneError>>()?;
-    let mut findings = pose_findings(scene, &working, options, mirrored);
+    let working = WorkingCopies::new(scene, options.memory_limit);
+    let mut findings = pose_findings(scene, &working, options, mirrored)?;
     findings.extend(image_findings(scene, &working)?);
     findings.extend(capture_findings(scene));
     Ok(findings)
@@ -82,12 +84,12 @@ fn findings(
 
 fn pose_findings(
     scene: &Scene,
-    working: &[(GrayImage, u32)],
+    working: &WorkingCopies<'_>,
     options: &ExamineOptions,
     mirrored: bool,
-) -> Vec<Finding> {
+) -> Result<Vec<Finding>, SceneError> {
     let count = scene.views.len();
-    let textured = is_textured(working, &evenly(count, QUICK_VIEWS));
+    let textured = is_textured(working, &evenly(count, QUICK_VIEWS))?;
     if options.depth == Depth::Quick {
         let views = if textured && count > 2 * QUICK_RUN {
             let second = count / 2;
@@ -95,10 +97,10 @@ fn pose_findings(
         } else {
             evenly(count, QUICK_VIEWS)
         };
-        let gathered = gather(scene, working, views, textured);
+        let gathered = gather(scene, working, views, textured)?;
         let diagnosis = Diagnosis::new(scene, &gathered, options.read_with, mirrored);
         if diagnosis.is_plainly_good() {
-            return diagnosis.agreeing_findings();
+            return Ok(diagnosis.agreeing_findings());
         }
     }
     let limit = if textured {
@@ -106,8 +108,8 @@ fn pose_findings(
     } else {
         FULL_VIEWS
     };
-    let gathered = gather(scene, working, evenly(count, limit), textured);
-    Diagnosis::new(scene, &gathered, options.read_with, mirrored).findings()
+    let gathered = gather(scene, working, evenly(count, limit), textured)?;
+    Ok(Diagnosis::new(scene, &gathered, options.read_with, mirrored).findings())
 }
 
 /// At most `limit` of `count` views, evenly spread.

@@ -3,8 +3,8 @@
 
 use crate::examination::{Cause, Check, Finding, Level, counted, listed};
 use crate::gray_image::GrayImage;
+use crate::working_copies::WorkingCopies;
 use neat_core::{Camera, Scene, SceneError};
-use rayon::prelude::*;
 use std::hash::{DefaultHasher, Hasher};
 
 /// What one image is like.
@@ -71,16 +71,20 @@ const MIN_CONTRAST: f32 = 0.02;
 /// If an image lies in a file that cannot be read.
 pub(crate) fn image_findings(
     scene: &Scene,
-    working: &[(GrayImage, u32)],
+    working: &WorkingCopies<'_>,
 ) -> Result<Vec<Finding>, SceneError> {
-    let statistics: Vec<ImageStatistics> = (working.par_iter())
-        .map(|(image, _)| ImageStatistics::new(image))
-        .collect();
+    let views: Vec<usize> = (0..scene.views.len()).collect();
+    let looked = working.look_at(&views, |view| {
+        let image = scene.views[view].image.read()?;
+        let (copy, _) = GrayImage::working_copy(&image);
+        Ok((ImageStatistics::new(&copy), fingerprint(image.as_raw())))
+    })?;
+    let (statistics, fingerprints): (Vec<_>, Vec<_>) = looked.into_iter().unzip();
     let mut findings = vec![sizes(scene)];
     findings.extend(intrinsics(scene));
     findings.push(exposure(scene, &statistics));
     findings.push(sharpness(scene, &statistics));
-    findings.extend(duplicates(scene)?);
+    findings.extend(duplicates(scene, &fingerprints)?);
     Ok(findings)
 }
 
@@ -262,14 +266,11 @@ fn sharpness(scene: &Scene, statistics: &[ImageStatistics]) -> Finding {
         .of_views(blurred)
 }
 
-/// Images that are equal to the last bit.
+/// Images that are equal to the last bit; equal ones have equal `fingerprints`.
 ///
 /// # Errors
 /// If an image lies in a file that cannot be read.
-fn duplicates(scene: &Scene) -> Result<Option<Finding>, SceneError> {
-    let fingerprints = (scene.views.par_iter())
-        .map(|view| Ok(fingerprint(view.image.read()?.as_raw())))
-        .collect::<Result<Vec<u64>, SceneError>>()?;
+fn duplicates(scene: &Scene, fingerprints: &[u64]) -> Result<Option<Finding>, SceneError> {
     let mut order: Vec<usize> = (0..scene.views.len()).collect();
     order.sort_by_key(|&view| (fingerprints[view], view));
     let mut twice = Vec::new();

@@ -30,6 +30,7 @@ mod load_failure;
 mod pose_diagnosis;
 mod pose_findings;
 mod tracks;
+mod working_copies;
 
 pub use examination::{Cause, Check, Examination, Finding, Level, Repair, Verdict};
 pub use examine::{Depth, ExamineOptions, examine, examine_folder, examine_loaded};

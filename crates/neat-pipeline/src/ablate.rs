@@ -180,6 +180,7 @@ fn run_variant(
         Some(&options.scene),
         options.backend,
         options.cache.as_ref(),
+        options.memory_limit,
         Ok,
         &mut |event| {
             // What the scene is like has been told by the run.

@@ -2,7 +2,7 @@
 
 use crate::config::{BackEnd, Config};
 use image::RgbImage;
-use neat_core::{Scene, SceneError};
+use neat_core::{MemoryLimit, Scene, SceneError};
 use serde::{Deserialize, Serialize};
 
 /// What lies behind the object.
@@ -34,10 +34,14 @@ const SPHERE_SLOPE: f64 = 20.0;
 ///
 /// # Errors
 /// If an image lies in a file that cannot be read.
-pub(crate) fn fit_background(config: &mut Config, scene: &Scene) -> Result<(), SceneError> {
+pub(crate) fn fit_background(
+    config: &mut Config,
+    scene: &Scene,
+    memory_limit: MemoryLimit,
+) -> Result<(), SceneError> {
     let background = match config.data.background {
         None => return Ok(()),
-        Some(Background::Auto) if is_black(scene)? => Background::Black,
+        Some(Background::Auto) if is_black(scene, memory_limit)? => Background::Black,
         Some(Background::Auto) => Background::Photo,
         Some(known) => known,
     };
@@ -57,11 +61,12 @@ pub(crate) fn fit_background(config: &mut Config, scene: &Scene) -> Result<(), S
     Ok(())
 }
 
-fn is_black(scene: &Scene) -> Result<bool, SceneError> {
-    let mut black = 0;
-    for view in &scene.views {
-        black += usize::from(black_border(&*view.image.read()?) >= BLACK_BORDER);
-    }
+fn is_black(scene: &Scene, memory_limit: MemoryLimit) -> Result<bool, SceneError> {
+    let bytes_each = scene.views.iter().map(|view| view.image.byte_len()).max();
+    let black = memory_limit.try_map(&scene.views, bytes_each.unwrap_or(0), |view| {
+        Ok(black_border(&*view.image.read()?) >= BLACK_BORDER)
+    })?;
+    let black = black.into_iter().filter(|is_black| *is_black).count();
     Ok(black as f64 >= BLACK_VIEWS * scene.views.len() as f64)
 }
 
@@ -100,7 +105,7 @@ mod tests {
         let preset = Preset::Fast.config();
 
         let mut config = preset.clone();
-        fit_background(&mut config, &scene).unwrap();
+        fit_background(&mut config, &scene, MemoryLimit::NONE).unwrap();
         assert_eq!(config.data.background, Some(Background::Black));
         assert_eq!(config.distill.back_end, BackEnd::Fast);
         assert_eq!(config.train, preset.train);
@@ -114,17 +119,17 @@ mod tests {
             view.image = image.into();
         }
         let mut config = preset.clone();
-        fit_background(&mut config, &scene).unwrap();
+        fit_background(&mut config, &scene, MemoryLimit::NONE).unwrap();
         assert_eq!(config.data.background, Some(Background::Photo));
         assert_eq!(config.distill.back_end, BackEnd::Tracks);
         assert_eq!(config.train.loss.mask, 0.0);
         assert_eq!(config.model.implicit.bounding_sphere_slope, SPHERE_SLOPE);
         // A decided configuration stays, and so does a published one.
         let decided = config.clone();
-        fit_background(&mut config, &scene).unwrap();
+        fit_background(&mut config, &scene, MemoryLimit::NONE).unwrap();
         assert_eq!(config, decided);
         let mut published = Preset::PaperDtu.config();
-        fit_background(&mut published, &scene).unwrap();
+        fit_background(&mut published, &scene, MemoryLimit::NONE).unwrap();
         assert_eq!(published, Preset::PaperDtu.config());
     }
 }

@@ -8,13 +8,16 @@ use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage};
 use image::RgbImage;
 use neat_core::file_cache::{CacheKey, FileCache};
-use neat_core::{Scene, SceneError, View, Wireframe2d, hawp_json};
+use neat_core::{MemoryLimit, Scene, SceneError, View, Wireframe2d, hawp_json};
 use neat_detect::{DetectorConfig, detect};
-use rayon::prelude::*;
 use std::path::Path;
 
 /// Files and detectors have pixel centres at integers.
 const DETECTED_WITH_PIXEL_CENTER: f64 = 0.0;
+/// What detection takes, in bytes for each pixel of the image. Of 12 megapixels, 30 were
+/// measured; a picture of the detections takes some more.
+const BYTES_PER_PIXEL: u64 = 40;
+const DETECTING: &str = "detecting segments in an image";
 /// Raised when the detector finds something else in the same image.
 const DETECTOR_VERSION: u32 = 1;
 
@@ -33,17 +36,19 @@ pub fn detect_wireframes(
     config: &DetectorConfig,
     min_segment_score: f64,
     cache: Option<&FileCache>,
+    memory_limit: MemoryLimit,
     on_event: OnEvent<'_>,
 ) -> Result<Vec<String>, PipelineError> {
     config.validate()?;
     let mut warnings = Vec::new();
     let views = scene.views.len();
     let mut done = 0;
+    let sizes = scene.views.iter().map(|view| view.image.dimensions());
+    let bytes_each = memory_limit.bytes_each(sizes, BYTES_PER_PIXEL, DETECTING, dir)?;
     // Some at a time, so that progress can be told in between.
     for chunk in scene.views.chunks_mut(4 * rayon::current_num_threads()) {
-        let found = (chunk.par_iter())
-            .map(|view| detect_in(view, config, cache))
-            .collect::<Result<Vec<_>, _>>()?;
+        let found =
+            memory_limit.try_map(chunk, bytes_each, |view| detect_in(view, config, cache))?;
         for (view, (mut wireframe, warning)) in chunk.iter_mut().zip(found) {
             for vertex in &mut wireframe.vertices {
                 *vertex = vertex.add_scalar(scene.pixel_center);
@@ -150,6 +155,7 @@ mod tests {
             &DetectorConfig::default(),
             0.05,
             cache,
+            MemoryLimit::NONE,
             &mut |_| {},
         )
     }

@@ -3,9 +3,10 @@
 
 use crate::benchmark::matrix_product_rate;
 use crate::config::Config;
+use crate::event::{Event, OnEvent};
 use crate::flops::{StepFlops, StepRows};
 use burn::tensor::Device;
-use neat_core::Scene;
+use neat_core::{MemoryLimit, Scene};
 use neat_sdf::RaySamplerConfig;
 use serde::Serialize;
 
@@ -52,14 +53,39 @@ pub fn estimate(config: &Config, scene: &Scene, speed: f64) -> Estimate {
     } else {
         NARROW_SHARE
     };
-    let image_bytes: u64 = (scene.views.iter()).map(|view| view.image.byte_len()).sum();
-    let chunk = config.train.ray_chunk.unwrap_or(config.train.rays);
-    let at_once = (chunk as f64 / config.train.rays as f64).min(1.0);
+    // Training shares the images of the scene; some may lie in a file.
+    let in_memory = (scene.views.iter()).filter(|view| !view.image.is_in_file());
+    let image_bytes: u64 = in_memory.map(|view| view.image.byte_len()).sum();
+    let rays = config.train.rays;
+    let at_once = config.train.ray_chunk.map_or(rays, |chunk| chunk.min(rays));
     Estimate {
         seconds: config.train.steps as f64 * flops / (speed * 1e9 * share),
-        bytes: BASE_BYTES
-            + image_bytes as f64
-            + at_once * rows.full as f64 * width as f64 * BYTES_PER_UNIT,
+        bytes: BASE_BYTES + image_bytes as f64 + at_once as f64 * bytes_per_ray(config, &rows),
+    }
+}
+
+/// Bytes kept for the backward pass, per ray.
+fn bytes_per_ray(config: &Config, rows: &StepRows) -> f64 {
+    let rows_per_ray = rows.full as f64 / config.train.rays as f64;
+    rows_per_ray * config.model.implicit.width as f64 * BYTES_PER_UNIT
+}
+
+/// Takes the rays of a step in several passes if what is kept of all of them for the
+/// backward pass would not fit into half of `limit`, unless `config` has decided
+/// `train.ray_chunk` already. For backends whose numbers are in this memory.
+pub(crate) fn fit_memory(config: &mut Config, limit: MemoryLimit, on_event: OnEvent<'_>) {
+    let rays = config.train.rays;
+    if config.train.ray_chunk.is_some() || rays == 0 {
+        return;
+    }
+    let each = bytes_per_ray(config, &rows_of_step(config));
+    let chunk = limit.at_once(each as u64);
+    if chunk < rays {
+        config.train.ray_chunk = Some(chunk);
+        on_event(Event::Note(format!(
+            "train.ray_chunk = {chunk}: all {rays} rays of a step at once would take {:.1} GiB, more than half of the memory limit",
+            rays as f64 * each / 1024f64.powi(3)
+        )));
     }
 }
 
@@ -142,5 +168,32 @@ mod tests {
         assert!((4.0..10.0).contains(&fast.seconds), "{fast:?}");
         config.train.ray_chunk = Some(256);
         assert!(estimate(&config, &scene, 185.0).bytes < 0.5 * paper.bytes);
+    }
+
+    #[test]
+    fn steps_that_do_not_fit_are_taken_in_passes_if_nobody_has_decided() {
+        let fitted = |preset: Preset, limit: MemoryLimit, given: Option<usize>| {
+            let mut config = preset.config();
+            config.train.ray_chunk = given;
+            let mut notes = 0;
+            fit_memory(&mut config, limit, &mut |event| {
+                notes += usize::from(matches!(event, Event::Note(_)));
+            });
+            (config.train.ray_chunk, notes)
+        };
+        let gib = |count: u64| MemoryLimit::of_bytes(count << 30);
+        assert_eq!(fitted(Preset::PaperAbc, gib(16), None), (None, 0));
+        assert_eq!(fitted(Preset::PaperAbc, MemoryLimit::NONE, None), (None, 0));
+        assert_eq!(fitted(Preset::Fast, gib(1), None), (None, 0));
+        assert_eq!(fitted(Preset::PaperAbc, gib(2), Some(999)), (Some(999), 0));
+        // 2.3 GiB of 1024 rays: half of the limit holds somewhat less than half of them.
+        let (Some(chunk), 1) = fitted(Preset::PaperAbc, gib(2), None) else {
+            panic!("a chunk and a note");
+        };
+        assert!((350..512).contains(&chunk), "{chunk}");
+        assert_eq!(
+            fitted(Preset::PaperAbc, MemoryLimit::of_bytes(1), None),
+            (Some(1), 1)
+        );
     }
 }

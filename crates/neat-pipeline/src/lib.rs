@@ -19,6 +19,7 @@ pub mod field;
 pub mod flops;
 pub mod image_io;
 pub mod losses;
+pub mod machine_memory;
 pub mod manifest;
 pub mod model;
 pub mod overlay;

@@ -11,8 +11,8 @@ use crate::config::Config;
 use crate::error::PipelineError;
 use crate::event::{OnEvent, Stage};
 use crate::run_dir::{Existing, RunDir};
-use neat_core::Wireframe3d;
 use neat_core::file_cache::FileCache;
+use neat_core::{MemoryLimit, Wireframe3d};
 use neat_tensor::Backend;
 use neat_wireframe::metrics::ImageEvidence;
 use session::Session;
@@ -45,6 +45,10 @@ pub struct RunOptions {
     pub examine: bool,
     /// Keeps what takes long, such as detected 2D wireframes, for the next run.
     pub cache: Option<FileCache>,
+    /// How much memory may be used. It decides how images are kept and how many are
+    /// worked on at once, and `train.ray_chunk` where that is open and a step would not
+    /// fit.
+    pub memory_limit: MemoryLimit,
     /// The arguments of the program, for the manifest.
     pub command_line: Vec<String>,
 }

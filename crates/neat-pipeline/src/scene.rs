@@ -7,7 +7,7 @@ use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage, timed};
 use neat_core::file_cache::FileCache;
 use neat_core::layout::HAWP_DIR;
-use neat_core::{LoadOptions, Scene, SceneSphere, SphereChoice, load_scene};
+use neat_core::{LoadOptions, MemoryLimit, Scene, SceneSphere, SphereChoice, load_scene};
 use neat_doctor::{Depth, ExamineOptions, Finding, Level, Repair, Verdict};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,8 @@ pub struct PreparedScene {
 /// Reads the scene in the folder `dir`, and detects its 2D wireframes if it has
 /// none. What `config` leaves to the background of the images is decided. `placed`
 /// is the sphere of an earlier part of the run, which stays; `cache`
-/// keeps what takes long for the next time.
+/// keeps what takes long for the next time. `memory_limit` decides whether images stay in
+/// memory and how many are worked on at once, not what comes out.
 ///
 /// Without a configured radius the world is scaled so that the scene sphere has
 /// radius 1: every length of a configuration (β, grid, encoding) then means the
@@ -45,22 +46,33 @@ pub fn prepare_scene(
     config: &mut Config,
     placed: Option<&SceneSphere>,
     cache: Option<&FileCache>,
+    memory_limit: MemoryLimit,
     on_event: OnEvent<'_>,
 ) -> Result<PreparedScene, PipelineError> {
     let detected = !dir.join(HAWP_DIR).is_dir();
     let options = LoadOptions {
         require_wireframes: !detected,
-        ..load_options(&config.data, cache)
+        ..load_options(&config.data, cache, memory_limit)
     };
     let mut seconds = BTreeMap::new();
     let (loaded, time) = timed(on_event, Stage::Load, |_| Ok(load_scene(dir, &options)?))?;
     seconds.insert(Stage::Load, time);
     let mut warnings: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
     let mut scene = loaded.scene;
+    tell_of_images(&scene, on_event);
     if detected {
         let (more, time) = timed(on_event, Stage::Detect, |on_event| {
             let min_score = config.data.min_segment_score;
-            detect_wireframes(&mut scene, dir, &config.detect, min_score, cache, on_event)
+            let detector = &config.detect;
+            detect_wireframes(
+                &mut scene,
+                dir,
+                detector,
+                min_score,
+                cache,
+                memory_limit,
+                on_event,
+            )
         })?;
         seconds.insert(Stage::Detect, time);
         warnings.extend(more);
@@ -75,7 +87,7 @@ pub fn prepare_scene(
         radius: scene.original_from_world.scale * scene.sphere_radius,
         source: placed.map_or(loaded.sphere.source, |sphere| sphere.source),
     };
-    fit_background(config, &scene)?;
+    fit_background(config, &scene, memory_limit)?;
     on_event(Event::Note(format!("scene sphere: {sphere}")));
     if let (SphereChoice::Given { .. }, Some(radius)) =
         (config.data.scene_sphere, config.data.scene_radius)
@@ -95,6 +107,19 @@ pub fn prepare_scene(
         warnings,
         seconds,
     })
+}
+
+/// Tells where the images are, if they are not in memory.
+fn tell_of_images(scene: &Scene, on_event: OnEvent<'_>) {
+    let in_file = scene.views.iter().filter(|view| view.image.is_in_file());
+    let sizes: Vec<u64> = in_file.map(|view| view.image.byte_len()).collect();
+    if !sizes.is_empty() {
+        let mib = sizes.iter().sum::<u64>().div_ceil(1 << 20);
+        let views = sizes.len();
+        on_event(Event::Note(format!(
+            "{views} images of {mib} MiB together are kept in a temporary file, for the sake of memory"
+        )));
+    }
 }
 
 /// The scene around the sphere of the run that it belongs to, which it may not have by
@@ -124,13 +149,15 @@ fn placed_at(scene: Scene, sphere: &SceneSphere, config: &DataConfig) -> Scene {
 pub fn examine_quickly(
     scene: &Scene,
     config: &DataConfig,
+    memory_limit: MemoryLimit,
     on_event: OnEvent<'_>,
 ) -> Result<Vec<String>, PipelineError> {
     let examination = neat_doctor::examine(
         scene,
         &ExamineOptions {
             depth: Depth::Quick,
-            read_with: Repair::of(&load_options(config, None)),
+            read_with: Repair::of(&load_options(config, None, memory_limit)),
+            memory_limit,
         },
     );
     let lines = |level: Level| -> Vec<String> {
@@ -151,7 +178,11 @@ pub fn examine_quickly(
 }
 
 /// How a configuration wants a scene to be read.
-pub fn load_options(config: &DataConfig, cache: Option<&FileCache>) -> LoadOptions {
+pub fn load_options(
+    config: &DataConfig,
+    cache: Option<&FileCache>,
+    memory_limit: MemoryLimit,
+) -> LoadOptions {
     LoadOptions {
         pixel_center: config.pixel_center,
         min_segment_score: config.min_segment_score,
@@ -162,6 +193,7 @@ pub fn load_options(config: &DataConfig, cache: Option<&FileCache>) -> LoadOptio
         max_views: config.max_views,
         max_image_size: config.max_image_size,
         cache_dir: cache.map(|cache| cache.dir().into()),
+        memory_limit,
         ..LoadOptions::default()
     }
 }
@@ -206,7 +238,14 @@ mod tests {
 
         let mut config = Preset::Fast.config();
         let read = |config: &Config| {
-            let prepared = prepare_scene(dir.path(), &mut config.clone(), None, None, &mut |_| {});
+            let prepared = prepare_scene(
+                dir.path(),
+                &mut config.clone(),
+                None,
+                None,
+                MemoryLimit::NONE,
+                &mut |_| {},
+            );
             prepared.unwrap().scene
         };
         let scaled = read(&config);
@@ -234,7 +273,15 @@ mod tests {
         write_scene(&scene, dir.path()).unwrap();
         let config = Preset::Fast.config();
         let read = |config: &Config, placed: Option<&SceneSphere>| {
-            prepare_scene(dir.path(), &mut config.clone(), placed, None, &mut |_| {}).unwrap()
+            prepare_scene(
+                dir.path(),
+                &mut config.clone(),
+                placed,
+                None,
+                MemoryLimit::NONE,
+                &mut |_| {},
+            )
+            .unwrap()
         };
         let first = read(&config, None);
         // The same sphere changes nothing, to the bit.

@@ -4,8 +4,8 @@ use crate::ReportError;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::Vector3;
-use neat_core::Scene;
 use neat_core::downscaling::Downscaling;
+use neat_core::{Scene, View};
 use rayon::prelude::*;
 
 /// How many photographs a report has, and how large they are.
@@ -80,23 +80,26 @@ pub fn photographs(
     let centers: Vec<_> = (scene.views.iter())
         .map(|view| view.camera.center_in_world)
         .collect();
-    let mut chosen = vec![false; centers.len()];
-    for index in spread(&centers, config.max_photographs) {
-        chosen[index] = true;
+    let mut chosen = spread(&centers, config.max_photographs);
+    chosen.sort_unstable();
+    let mut found = vec![None; centers.len()];
+    // No more than this at once: images may be read only now.
+    for views in chosen.chunks(rayon::current_num_threads()) {
+        let some = (views.par_iter())
+            .map(|&view| photograph_of(&scene.views[view], config))
+            .collect::<Result<Vec<_>, _>>()?;
+        for (&view, photograph) in views.iter().zip(some) {
+            found[view] = Some(photograph);
+        }
     }
-    (scene.views.par_iter().zip(chosen))
-        .map(|(view, chosen)| {
-            if !chosen {
-                return Ok(None);
-            }
-            Photograph::of_image(&*view.image.read()?, config)
-                .map(Some)
-                .map_err(|source| ReportError::Photograph {
-                    view: view.name.clone(),
-                    source,
-                })
-        })
-        .collect()
+    Ok(found)
+}
+
+fn photograph_of(view: &View, config: &PhotographConfig) -> Result<Photograph, ReportError> {
+    Photograph::of_image(&*view.image.read()?, config).map_err(|source| ReportError::Photograph {
+        view: view.name.clone(),
+        source,
+    })
 }
 
 /// Up to `count` points that are far from each other, in the order of choice: the

@@ -82,6 +82,7 @@ impl AblateArgs {
             time_budget: self.compute.time_budget,
             examine: false,
             cache: self.cache.open(),
+            memory_limit: self.compute.memory.limit(),
             command_line: super::train::command_line(),
         };
         let interrupted = interrupt::flag()?;

@@ -10,6 +10,7 @@ use crate::scene_arguments::SceneArgs;
 use clap::{Args, Subcommand};
 use neat_core::file;
 use neat_pipeline::distill::agreement;
+use neat_pipeline::machine_memory::default_limit;
 use neat_pipeline::scene::prepare_scene;
 use neat_wireframe::ViewObservation;
 use neat_wireframe::export::{ExportError, WireframeDocument, write_json, write_obj, write_ply};
@@ -79,6 +80,7 @@ impl Line3dArgs {
             &mut config,
             None,
             cache.as_ref(),
+            default_limit(),
             &mut |event| {
                 progress.show(event);
             },

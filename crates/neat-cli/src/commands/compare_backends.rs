@@ -9,6 +9,7 @@ use clap::Args;
 use neat_core::file;
 use neat_pipeline::compare_backends::compare_backends;
 use neat_pipeline::event::Event;
+use neat_pipeline::machine_memory::default_limit;
 use neat_pipeline::reconstruct::software_warning;
 use neat_pipeline::run_dir::RunDir;
 use neat_pipeline::scene::prepare_scene;
@@ -72,6 +73,7 @@ impl CompareBackendsArgs {
             &mut config,
             None,
             cache.as_ref(),
+            default_limit(),
             &mut |event| {
                 progress.show(event);
             },

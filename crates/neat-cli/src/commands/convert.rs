@@ -7,6 +7,7 @@ use crate::scene_arguments::SceneArgs;
 use clap::{Args, ValueEnum};
 use neat_core::convert::{SceneFormat, convert};
 use neat_core::load_scene;
+use neat_pipeline::machine_memory::default_limit;
 use std::path::PathBuf;
 
 /// Write a scene in another format
@@ -60,7 +61,7 @@ impl From<Format> for SceneFormat {
 
 impl ConvertArgs {
     pub fn run(self) -> Result<(), CliError> {
-        let options = self.scene_args.load_options(self.cache.open().as_ref());
+        let options = (self.scene_args).load_options(self.cache.open().as_ref(), default_limit());
         let loaded = load_scene(&self.scene, &options)?;
         for warning in &loaded.warnings {
             output::note(&format!("warning: {warning}"));

@@ -52,6 +52,7 @@ impl DemoArgs {
             time_budget: self.compute.time_budget,
             examine: false,
             cache: None,
+            memory_limit: self.compute.memory.limit(),
             command_line: command_line(),
         };
         let interrupted = interrupt::flag()?;

@@ -1,6 +1,7 @@
 //! `neat detect`.
 
 use crate::error::CliError;
+use crate::memory::MemoryArgs;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
@@ -49,6 +50,8 @@ pub struct DetectArgs {
     /// Write no pictures
     #[arg(long)]
     no_overlays: bool,
+    #[command(flatten)]
+    memory: MemoryArgs,
 }
 
 impl DetectArgs {
@@ -72,6 +75,7 @@ impl DetectArgs {
             source,
             config,
             overlays: !self.no_overlays,
+            memory_limit: self.memory.limit(),
         };
         let mut progress = Progress::new(quiet);
         let detected = detect_folder(&options, &mut |event| progress.show(event))?;

@@ -4,6 +4,7 @@ use super::reconstruct::summary;
 use crate::arguments::BackendArg;
 use crate::cache::CacheArgs;
 use crate::error::CliError;
+use crate::memory::MemoryArgs;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
@@ -33,6 +34,8 @@ pub struct DistillArgs {
     #[command(flatten)]
     backend: BackendArg,
     #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
     cache: CacheArgs,
 }
 
@@ -44,6 +47,7 @@ impl DistillArgs {
             self.scene.as_deref(),
             self.backend.backend,
             self.cache.open().as_ref(),
+            self.memory.limit(),
             |config| Ok::<_, CliError>(apply_overrides(&config, &self.set)?),
             &mut |event| progress.show(event),
         )?;

@@ -3,6 +3,7 @@
 use crate::arguments::BackendArg;
 use crate::cache::CacheArgs;
 use crate::error::CliError;
+use crate::memory::MemoryArgs;
 use crate::scene_arguments::SceneArgs;
 use crate::{duration, output};
 use clap::Args;
@@ -41,6 +42,8 @@ pub struct DoctorArgs {
     #[command(flatten)]
     backend: BackendArg,
     #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
     cache: CacheArgs,
     #[command(flatten)]
     scene_args: SceneArgs,
@@ -63,13 +66,16 @@ struct Report<'a> {
 
 impl DoctorArgs {
     pub fn run(self) -> Result<(), CliError> {
-        let options = self.scene_args.load_options(self.cache.open().as_ref());
+        let memory_limit = self.memory.limit();
+        let cache = self.cache.open();
+        let options = (self.scene_args).load_options(cache.as_ref(), memory_limit);
         let depth = match self.quick {
             true => Depth::Quick,
             false => Depth::Full,
         };
         let how = ExamineOptions {
             depth,
+            memory_limit,
             ..ExamineOptions::default()
         };
         // Before the work: a backend that cannot be used is an error at once. What

@@ -14,6 +14,7 @@ use neat_eval::{
     LimapLength, NeatAbc, NeatSurface, ObservationMask, Protocol, ScannedSurface, Scores,
     StructureScore, foreign,
 };
+use neat_pipeline::machine_memory::default_limit;
 use neat_pipeline::preset::Preset;
 use neat_pipeline::scene::prepare_scene;
 use neat_wireframe::ViewObservation;
@@ -338,7 +339,14 @@ impl EvalArgs {
     ) -> Result<EvaluationReport, CliError> {
         let mut config = Preset::default().config();
         let cache = self.cache.open();
-        let prepared = prepare_scene(scene, &mut config, None, cache.as_ref(), &mut |_| ())?;
+        let prepared = prepare_scene(
+            scene,
+            &mut config,
+            None,
+            cache.as_ref(),
+            default_limit(),
+            &mut |_| (),
+        )?;
         let views = ViewObservation::from_scene(&prepared.scene, config.data.min_segment_score);
         let required = EdgeSupportConfig::default().required_views(views.len());
         let world_from_original = prepared.scene.original_from_world.inverse();

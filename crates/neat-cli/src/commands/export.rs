@@ -13,6 +13,7 @@ use neat_export::{
     EdgeFilter, ExportError, ExportOptions, Format, LengthUnit, ViewDirection, export,
 };
 use neat_pipeline::event::{Event, Stage};
+use neat_pipeline::machine_memory::default_limit;
 use neat_pipeline::reconstruct::open_run;
 use neat_pipeline::run_dir::RunDir;
 use neat_wireframe::export::read_json;
@@ -242,6 +243,7 @@ impl ExportArgs {
             self.scene.as_deref(),
             self.backend.backend,
             self.cache.open().as_ref(),
+            default_limit(),
             Ok::<_, CliError>,
             &mut |event| progress.show(event),
         )?;

@@ -5,6 +5,7 @@ use crate::output;
 use crate::scene_arguments::SceneArgs;
 use clap::Args;
 use neat_core::{LoadOptions, LoadedScene, View, load_scene};
+use neat_pipeline::machine_memory::default_limit;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -42,7 +43,7 @@ impl InfoArgs {
     pub fn run(self) -> Result<(), CliError> {
         let options = LoadOptions {
             min_segment_score: self.min_score,
-            ..self.scene_args.load_options(None)
+            ..self.scene_args.load_options(None, default_limit())
         };
         let loaded = load_scene(&self.scene, &options)?;
         output::print(&describe(&loaded, self.min_score))?;

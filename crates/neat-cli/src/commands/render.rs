@@ -3,6 +3,7 @@
 use crate::arguments::BackendArg;
 use crate::cache::CacheArgs;
 use crate::error::CliError;
+use crate::memory::MemoryArgs;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
@@ -44,6 +45,8 @@ pub struct RenderArgs {
     #[command(flatten)]
     backend: BackendArg,
     #[command(flatten)]
+    memory: MemoryArgs,
+    #[command(flatten)]
     cache: CacheArgs,
 }
 
@@ -55,6 +58,7 @@ impl RenderArgs {
             self.scene.as_deref(),
             self.backend.backend,
             self.cache.open().as_ref(),
+            self.memory.limit(),
             Ok::<_, CliError>,
             &mut |event| progress.show(event),
         )?;

@@ -83,6 +83,7 @@ impl RunArgs {
             time_budget: self.compute.time_budget,
             examine: !self.no_doctor,
             cache: self.cache.open(),
+            memory_limit: self.compute.memory.limit(),
             command_line: command_line(),
         })
     }

@@ -78,7 +78,10 @@ pub(super) fn missing(path: &Path) -> SceneError {
 }
 
 /// Width and height, from the first bytes of an image.
-pub(super) fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
+///
+/// # Errors
+/// If it is missing or no image.
+pub fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
     ImageReader::open(path)
         .and_then(ImageReader::with_guessed_format)
         .map_err(|source| file::read_error(path, REMEDY, source))?

@@ -1,7 +1,7 @@
 //! From a folder to a scene: poses, images and 2D wireframes, read alike for all
 //! layouts.
 
-use super::masks::{self, MaskFiles};
+use super::masks::{self, MaskFiles, Room};
 use super::photograph::{self, Photograph};
 use super::poses::{self, PosedImage, Poses};
 use super::rectify::Rectification;
@@ -13,8 +13,8 @@ use crate::file_cache::FileCache;
 use crate::scene::{check_image_size, check_names, keep_observations};
 use crate::scene_sphere::SphereSource;
 use crate::{
-    Camera, Observation, Scene, SceneError, SceneSphere, SparsePoint, View, ViewError, Wireframe2d,
-    hawp_json,
+    Camera, ImageStore, Observation, Scene, SceneError, SceneSphere, SparsePoint, View, ViewError,
+    ViewImage, Wireframe2d, hawp_json,
 };
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -39,7 +39,7 @@ pub struct LoadedScene {
 /// Images and poses belong together by the order of the sorted file names, as in
 /// the published code, or by name where the layout gives names. Wireframes
 /// belong to images by name. Images are decoded in parallel; the result does not
-/// depend on the number of threads.
+/// depend on the number of threads, nor on the memory that they may use.
 ///
 /// Photographs with lens distortion are undistorted, and those larger than
 /// [`LoadOptions::max_image_size`] scaled down; their cameras, wireframes and the
@@ -124,8 +124,18 @@ pub(super) fn load_posed(
             .map_err(|problem| poses::view_error(&hawp_dir, &posed.name, problem))
     })?;
     let cache = options.cache_dir.as_ref().map(FileCache::new);
-    let photographs = try_par_map(&rectified, |(posed, rectification)| {
-        photograph::read(posed, rectification, options.background, cache.as_ref())
+    let sizes = rectifications.iter().map(Rectification::size);
+    let store = ImageStore::for_images(sizes, options.memory_limit, options.cache_dir.as_deref())?;
+    let limit = options.memory_limit;
+    let bytes_each = limit.bytes_each(
+        (rectifications.iter()).map(Rectification::photograph_size),
+        photograph::BYTES_PER_PIXEL,
+        "reading an image",
+        dir,
+    )?;
+    let photographs = limit.try_map(&rectified, bytes_each, |(posed, rectification)| {
+        let background = options.background;
+        photograph::read(posed, rectification, background, cache.as_ref())?.kept_in(&store, posed)
     })?;
     warnings.extend(rectification_warnings(&rectifications, options));
     warnings.extend(cache_warning(&photographs, options));
@@ -140,7 +150,7 @@ pub(super) fn load_posed(
             name: posed.name.clone(),
             camera: rectification.camera(),
             wireframe,
-            image: photograph.image.into(),
+            image: photograph.image,
         };
         view.validate()
             .map_err(|problem| poses::view_error(&hawp_dir, &view.name, problem))?;
@@ -178,7 +188,7 @@ pub(super) fn load_posed(
     };
     let mut kept = kept.into_iter();
     poses.views.retain(|_| kept.next() == Some(true));
-    let masks = masks::find(dir, &poses.views);
+    let masks = masks::find(dir, &poses.views, Room { limit, bytes_each });
     let sphere = Evidence {
         dir,
         masks: masks.as_ref(),
@@ -325,7 +335,10 @@ fn rectification_warnings(
 }
 
 /// The first reason why an image is not in the cache.
-fn cache_warning(photographs: &[Photograph], options: &LoadOptions) -> Option<SceneWarning> {
+fn cache_warning(
+    photographs: &[Photograph<ViewImage>],
+    options: &LoadOptions,
+) -> Option<SceneWarning> {
     let error = photographs
         .iter()
         .find_map(|view| view.not_cached.as_ref())?;

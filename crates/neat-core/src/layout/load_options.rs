@@ -2,7 +2,7 @@
 
 use super::poses::Poses;
 use super::{Layout, PixelCenter, PoseConvention};
-use crate::{Intrinsics, SphereChoice};
+use crate::{Intrinsics, MemoryLimit, SphereChoice};
 use std::path::PathBuf;
 
 /// How [`crate::load_scene`] reads a scene.
@@ -41,6 +41,10 @@ pub struct LoadOptions {
     /// A folder that keeps undistorted images for the next time; it is created
     /// where needed, and can be deleted at any time. `None` keeps nothing.
     pub cache_dir: Option<PathBuf>,
+    /// How much memory may be used. Images that are too large together to stay in it
+    /// ([`MemoryLimit::holds_images`]) go to a temporary file in [`Self::cache_dir`],
+    /// or in the system's folder for such files; what is read is the same.
+    pub memory_limit: MemoryLimit,
 }
 
 impl Default for LoadOptions {
@@ -58,6 +62,7 @@ impl Default for LoadOptions {
             max_views: None,
             max_image_size: None,
             cache_dir: None,
+            memory_limit: MemoryLimit::NONE,
         }
     }
 }

@@ -7,9 +7,8 @@
 use super::images;
 use super::poses::PosedImage;
 use crate::scene_sphere::Mask;
-use crate::{SceneError, hawp_json::file_stem};
+use crate::{MemoryLimit, SceneError, hawp_json::file_stem};
 use image::{GrayImage, ImageReader, imageops};
-use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 const DIRS: [&str; 2] = ["mask", "masks"];
@@ -24,6 +23,16 @@ pub(super) struct MaskFiles {
     pub files: Vec<PathBuf>,
     /// What of them shows the object.
     by: Shown,
+    room: Room,
+}
+
+/// Memory to read masks in.
+#[derive(Clone, Copy)]
+pub(super) struct Room {
+    /// For all that are read at once.
+    pub limit: MemoryLimit,
+    /// What one of them takes: about as much as a photograph.
+    pub bytes_each: u64,
 }
 
 #[derive(Clone, Copy)]
@@ -35,10 +44,11 @@ enum Shown {
 }
 
 /// The file with the mask of each view. `None` unless every view has one.
-pub(super) fn find(dir: &Path, views: &[PosedImage]) -> Option<MaskFiles> {
+pub(super) fn find(dir: &Path, views: &[PosedImage], room: Room) -> Option<MaskFiles> {
     let bright = |files| MaskFiles {
         files,
         by: Shown::Brightness,
+        room,
     };
     for folder in DIRS.map(|name| dir.join(name)) {
         let Ok(files) = images::list(&folder) else {
@@ -63,16 +73,15 @@ pub(super) fn find(dir: &Path, views: &[PosedImage]) -> Option<MaskFiles> {
     Some(MaskFiles {
         files,
         by: Shown::Opacity,
+        room,
     })
 }
 
 /// Reads the masks. `None` if they hide nothing: many programs write images with an
 /// alpha channel that is opaque everywhere.
 pub(super) fn read(masks: &MaskFiles) -> Result<Option<Vec<Mask>>, SceneError> {
-    let read: Vec<_> = (masks.files.par_iter())
-        .map(|path| read_one(path, masks.by))
-        .collect();
-    let read: Vec<Mask> = read.into_iter().collect::<Result<_, _>>()?;
+    let Room { limit, bytes_each } = masks.room;
+    let read = limit.try_map(&masks.files, bytes_each, |path| read_one(path, masks.by))?;
     let hides_something = read.iter().any(|mask| mask.inside.contains(&false));
     Ok(hides_something.then_some(read))
 }
@@ -113,6 +122,11 @@ mod tests {
     use nalgebra::Matrix4;
     use std::fs;
 
+    const ROOM: Room = Room {
+        limit: MemoryLimit::NONE,
+        bytes_each: 0,
+    };
+
     fn view(image: PathBuf) -> PosedImage {
         PosedImage {
             name: file_stem(&image),
@@ -131,12 +145,14 @@ mod tests {
         let mut image = RgbaImage::from_pixel(8, 4, Rgba([9, 9, 9, 255]));
         image.save(&path).unwrap();
         let views = [view(path.clone())];
-        let found = find(dir.path(), &views).unwrap();
+        let found = find(dir.path(), &views, ROOM).unwrap();
         assert_eq!(read(&found).unwrap(), None);
 
         image.put_pixel(7, 0, Rgba([9, 9, 9, 0]));
         image.save(&path).unwrap();
-        let mask = read(&find(dir.path(), &views).unwrap()).unwrap().unwrap();
+        let mask = read(&find(dir.path(), &views, ROOM).unwrap())
+            .unwrap()
+            .unwrap();
         assert_eq!(mask[0].inside.iter().filter(|inside| !**inside).count(), 1);
 
         // A file of masks counts by its brightness, also with an alpha channel.
@@ -144,7 +160,9 @@ mod tests {
         let mut mask = GrayAlphaImage::from_pixel(8, 4, LumaA([0, 255]));
         mask.put_pixel(2, 1, LumaA([255, 255]));
         mask.save(dir.path().join("mask/a.png")).unwrap();
-        let mask = read(&find(dir.path(), &views).unwrap()).unwrap().unwrap();
+        let mask = read(&find(dir.path(), &views, ROOM).unwrap())
+            .unwrap()
+            .unwrap();
         assert_eq!(mask[0].inside.iter().filter(|inside| **inside).count(), 1);
     }
 }

@@ -31,7 +31,7 @@ pub mod transforms_json;
 mod warning;
 
 pub use abc::HAWP_DIR;
-pub use images::{list as list_images, read_rgb as read_image};
+pub use images::{list as list_images, read_rgb as read_image, read_size as image_size};
 pub use load::{LoadedScene, load_scene};
 pub use load_options::LoadOptions;
 pub use pixel_center::PixelCenter;

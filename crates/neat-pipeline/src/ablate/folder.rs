@@ -144,6 +144,7 @@ mod tests {
     use super::*;
     use crate::preset::Preset;
     use crate::run_dir::Existing;
+    use neat_core::MemoryLimit;
     use neat_tensor::Backend;
     use serde_json::json;
     use std::time::Duration;
@@ -182,6 +183,7 @@ mod tests {
             time_budget: None,
             examine: false,
             cache: None,
+            memory_limit: MemoryLimit::NONE,
             command_line: Vec::new(),
         };
         let base = options.out.join("base");

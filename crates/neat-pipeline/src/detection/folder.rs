@@ -1,14 +1,13 @@
 //! 2D wireframes of a folder of images, as files.
 
-use super::DETECTED_WITH_PIXEL_CENTER;
+use super::{BYTES_PER_PIXEL, DETECTED_WITH_PIXEL_CENTER, DETECTING};
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage, timed};
 use crate::overlay::draw_detection;
 use image::RgbImage;
-use neat_core::layout::{list_images, read_image};
-use neat_core::{SceneError, Wireframe2d, file, hawp_json};
+use neat_core::layout::{image_size, list_images, read_image};
+use neat_core::{MemoryLimit, SceneError, Wireframe2d, file, hawp_json};
 use neat_detect::{DetectorConfig, detect, edge_map, segment_file, wireframe_from_segments};
-use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -41,6 +40,8 @@ pub struct DetectOptions {
     pub config: DetectorConfig,
     /// Whether pictures of the detections are written.
     pub overlays: bool,
+    /// How much memory may be used: it decides how many images are worked on at once.
+    pub memory_limit: MemoryLimit,
 }
 
 /// How much was found in an image.
@@ -80,6 +81,15 @@ pub fn detect_folder(
             reason: "another image has this name with another ending: rename one".into(),
         }));
     }
+    let sizes = images.iter().map(|path| image_size(path));
+    let sizes = sizes.collect::<Result<Vec<_>, _>>()?;
+    let limit = options.memory_limit;
+    let bytes_each = limit.bytes_each(
+        sizes.into_iter(),
+        BYTES_PER_PIXEL,
+        DETECTING,
+        &options.images,
+    )?;
     let detector = Detector::open(options)?;
     let overlays = options.out.join("overlays");
     file::create_dir(if options.overlays {
@@ -91,12 +101,9 @@ pub fn detect_folder(
         let mut detected = Vec::with_capacity(images.len());
         // Some at a time, so that progress can be told in between.
         for chunk in images.chunks(2 * rayon::current_num_threads()) {
-            let some: Vec<_> = (chunk.par_iter())
-                .map(|path| detect_one(path, &detector, options, &overlays))
-                .collect();
-            for one in some {
-                detected.push(one?);
-            }
+            detected.extend(limit.try_map(chunk, bytes_each, |path| {
+                detect_one(path, &detector, options, &overlays)
+            })?);
             on_event(Event::StageProgress {
                 stage: Stage::Detect,
                 fraction: detected.len() as f64 / images.len() as f64,

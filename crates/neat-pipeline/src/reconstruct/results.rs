@@ -9,15 +9,18 @@ use crate::event::{Event, Stage};
 use crate::field::TrainedField;
 use crate::image_io::write_png;
 use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe, spread_views};
-use neat_core::{Wireframe3d, file};
+use neat_core::{View, Wireframe3d, file};
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::metrics::ImageEvidence;
 use rayon::prelude::*;
 use serde_json::json;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 /// The wireframe is drawn on so many photographs.
 const OVERLAYS: usize = 6;
+/// Photographs that are in memory for that at once.
+const OVERLAYS_AT_ONCE: usize = 2;
 
 const NO_EDGES: &str =
     "the wireframe has no edges: train longer, or look at the 2D wireframes of the scene";
@@ -93,7 +96,7 @@ impl Session<'_> {
         if let Some(folder) = overlays.first().and_then(|(_, path)| path.parent()) {
             file::create_dir(folder)?;
         }
-        overlays.par_iter().try_for_each(|(view, path)| {
+        let draw = |(view, path): &(&View, PathBuf)| {
             let pixel_center = self.scene.pixel_center;
             let picture = match self.config.distill.overlay {
                 OverlayGround::Photo => draw_overlay(view, pixel_center, in_world)?,
@@ -103,7 +106,10 @@ impl Session<'_> {
                 }
             };
             write_png(path, &picture)
-        })?;
+        };
+        for some in overlays.chunks(OVERLAYS_AT_ONCE) {
+            some.par_iter().try_for_each(draw)?;
+        }
         written.extend(overlays.into_iter().map(|(_, path)| path));
 
         for path in written {

@@ -3,6 +3,7 @@
 use super::RunOptions;
 use crate::config::Config;
 use crate::error::PipelineError;
+use crate::estimate::fit_memory;
 use crate::event::{Event, OnEvent, Stage, timed};
 use crate::field::TrainedField;
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
@@ -10,7 +11,7 @@ use crate::run_dir::{Existing, RunDir};
 use crate::scene::{examine_quickly, prepare_scene};
 use burn::tensor::Device;
 use neat_core::file_cache::FileCache;
-use neat_core::{Scene, SceneError, file, hawp_json};
+use neat_core::{MemoryLimit, Scene, SceneError, file, hawp_json};
 use neat_tensor::Backend;
 use neat_tensor::backend::software_driver;
 use std::collections::BTreeMap;
@@ -48,12 +49,17 @@ impl<'a> Session<'a> {
         let cache = options.cache.as_ref();
         let placed = earlier.as_ref().and_then(|e| e.sphere.as_ref());
         let mut config = options.config.clone();
-        let prepared = prepare_scene(&scene_dir, &mut config, placed, cache, on_event)?;
+        let limit = options.memory_limit;
+        let prepared = prepare_scene(&scene_dir, &mut config, placed, cache, limit, on_event)?;
+        // A GPU has memory of its own.
+        if backend != Backend::Wgpu {
+            fit_memory(&mut config, limit, on_event);
+        }
         warnings.extend(prepared.warnings);
         let mut seconds = prepared.seconds;
         if options.examine && options.existing != Existing::Resume {
             let (found, time) = timed(on_event, Stage::Examine, |on_event| {
-                examine_quickly(&prepared.scene, &config.data, on_event)
+                examine_quickly(&prepared.scene, &config.data, limit, on_event)
             })?;
             warnings.extend(found);
             seconds.insert(Stage::Examine, time);
@@ -201,6 +207,7 @@ pub fn open_run<E>(
     scene: Option<&Path>,
     backend: Backend,
     cache: Option<&FileCache>,
+    memory_limit: MemoryLimit,
     configure: impl FnOnce(Config) -> Result<Config, E>,
     on_event: OnEvent<'_>,
 ) -> Result<OpenedRun, E>
@@ -209,7 +216,15 @@ where
 {
     let dir = RunDir::open(run).map_err(PipelineError::from)?;
     let config = configure(dir.config().map_err(PipelineError::from)?)?;
-    Ok(read_run(dir, config, scene, backend, cache, on_event)?)
+    Ok(read_run(
+        dir,
+        config,
+        scene,
+        backend,
+        cache,
+        memory_limit,
+        on_event,
+    )?)
 }
 
 fn read_run(
@@ -218,6 +233,7 @@ fn read_run(
     scene: Option<&Path>,
     backend: Backend,
     cache: Option<&FileCache>,
+    memory_limit: MemoryLimit,
     on_event: OnEvent<'_>,
 ) -> Result<OpenedRun, PipelineError> {
     let device = backend.device()?;
@@ -227,7 +243,14 @@ fn read_run(
     let manifest = dir.manifest()?;
     let scene_dir = scene.unwrap_or(&manifest.scene);
     let placed = manifest.sphere.as_ref();
-    let prepared = prepare_scene(scene_dir, &mut config, placed, cache, on_event)?;
+    let prepared = prepare_scene(
+        scene_dir,
+        &mut config,
+        placed,
+        cache,
+        memory_limit,
+        on_event,
+    )?;
     let checkpoint = dir.read_latest_checkpoint()?;
     let field = TrainedField::load(&config, &checkpoint, &device)?;
     Ok(OpenedRun {

@@ -232,6 +232,27 @@ fn wireframes_of_the_smaller_size_are_used_as_they_are() {
 }
 
 #[test]
+fn the_same_is_read_with_little_memory() {
+    let dir = TempDir::new().unwrap();
+    let plenty = load(&dir, BARREL, &LoadOptions::default()).scene;
+    for cache_dir in [None, Some(dir.path().join("cache"))] {
+        let options = LoadOptions {
+            memory_limit: crate::MemoryLimit::of_bytes(120_000),
+            cache_dir,
+            ..LoadOptions::default()
+        };
+        let little = load(&dir, BARREL, &options).scene;
+        assert_eq!(little.views.len(), plenty.views.len());
+        for (little, plenty) in little.views.iter().zip(&plenty.views) {
+            assert!(little.image.is_in_file() && !plenty.image.is_in_file());
+            assert_eq!(little.image.read().unwrap(), plenty.image.read().unwrap());
+            assert_eq!(little.camera, plenty.camera);
+            assert_eq!(little.wireframe, plenty.wireframe);
+        }
+    }
+}
+
+#[test]
 fn the_second_time_images_come_from_the_cache() {
     let dir = tempfile::tempdir().unwrap();
     let cache = dir.path().join("cache");
