@@ -1,10 +1,12 @@
 //! What a finished run says of its result.
 
 use crate::error::BatchError;
+use crate::job_record::JobState;
 use neat_core::ground_truth::{parse, read_wireframe};
 use neat_core::{SceneError, file};
 use neat_eval::{NeatAbc, NeatAbcScores};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 const REMEDY: &str = "run the job again";
@@ -58,6 +60,43 @@ struct RunManifest {
     backend: String,
     steps: u64,
     warnings: Vec<String>,
+    status: RunStatus,
+    /// Of each stage.
+    seconds: BTreeMap<String, f64>,
+}
+
+/// How a run ended, by itself.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum RunStatus {
+    /// Or it was killed.
+    Running,
+    Interrupted,
+    Failed,
+    Finished,
+}
+
+/// The state and the seconds of a run that no batch has made, but `neat reconstruct`
+/// itself; pending if there is none.
+///
+/// # Errors
+/// If its `manifest.json` cannot be read or understood.
+pub fn read_state(run: &Path) -> Result<(JobState, f64), SceneError> {
+    let manifest = match read_manifest(run) {
+        Err(SceneError::Missing { .. }) => return Ok((JobState::Pending, 0.0)),
+        manifest => manifest?,
+    };
+    let state = match manifest.status {
+        RunStatus::Running | RunStatus::Interrupted => JobState::Interrupted,
+        RunStatus::Failed => JobState::Failed,
+        RunStatus::Finished => JobState::Finished,
+    };
+    Ok((state, manifest.seconds.values().sum()))
+}
+
+fn read_manifest(run: &Path) -> Result<RunManifest, SceneError> {
+    let path = run.join("manifest.json");
+    from_json(&file::read(&path, REMEDY)?, &path, "manifest of a run")
 }
 
 /// Reads the figures of a run from its `wireframe.json` and `manifest.json`, and
@@ -70,9 +109,7 @@ pub fn read_result(run: &Path, truth: Option<&Path>) -> Result<ResultFigures, Ba
     let bytes = file::read(&path, REMEDY)?;
     let wireframe = parse(&bytes, &path)?.wireframe;
     let document: Document = from_json(&bytes, &path, "3D wireframe")?;
-    let manifest_path = run.join("manifest.json");
-    let manifest_bytes = file::read(&manifest_path, REMEDY)?;
-    let manifest: RunManifest = from_json(&manifest_bytes, &manifest_path, "manifest of a run")?;
+    let manifest = read_manifest(run)?;
     let agreement = document.metadata.agreement.as_ref();
     let evaluation = match truth {
         Some(path) => {

@@ -4,8 +4,8 @@ use crate::batch::Batch;
 use crate::error::BatchError;
 use crate::job::Job;
 use crate::job_folder::JobFolder;
-use crate::job_record::{JobRecord, JobState};
-use crate::result_files::{ResultFigures, read_result};
+use crate::job_record::JobState;
+use crate::result_files::{ResultFigures, read_result, read_state};
 use crate::summary_table::{to_csv, to_markdown};
 use neat_core::{SceneError, file};
 use serde::{Deserialize, Serialize};
@@ -32,7 +32,7 @@ pub struct JobSummary {
     /// What has become of it. A job whose process was killed is
     /// [`JobState::Interrupted`].
     pub state: JobState,
-    /// How often it was tried.
+    /// How often a batch tried it; 0 also for a run by `neat reconstruct` itself.
     pub attempts: usize,
     /// How long that took together, in seconds.
     pub seconds: f64,
@@ -159,34 +159,43 @@ impl JobSummary {
     /// others from being summed up: it is the `error` of this one.
     fn read(out: &Path, job: &Job) -> Self {
         let folder = JobFolder::new(out, job);
-        let pending = JobRecord::new(job);
-        let (record, unreadable) = match folder.read_record() {
-            Ok(record) => (record.unwrap_or(pending), None),
-            Err(error) => (pending, Some(error.to_string())),
-        };
         let mut summary = Self {
             name: job.name.clone(),
             scene: job.scene.clone(),
-            state: record.state,
-            attempts: record.attempts.len(),
-            seconds: record.seconds(),
-            error: unreadable.or(record.error.clone()),
-            figures: None,
+            ..Self::default()
         };
-        // Whoever works on it has the lock; without, the record is a dead one's.
-        if record.state == JobState::Running && matches!(folder.lock(), Ok(Some(_))) {
-            summary.state = JobState::Interrupted;
+        if let Err(error) = summary.take_state(&folder, job) {
+            summary.error = Some(error.to_string());
         }
-        if record.state == JobState::Finished {
-            if let Some(difference) = record.difference(job) {
-                summary.error = Some(format!("the result is of another job: {difference}"));
-            }
+        if summary.state == JobState::Finished {
             match read_result(&folder.run(), job.truth_file().as_deref()) {
                 Ok(figures) => summary.figures = Some(figures),
                 Err(error) => summary.error = Some(error.to_string()),
             }
         }
         summary
+    }
+
+    /// What has become of the job, by its record or else by its run.
+    fn take_state(&mut self, folder: &JobFolder, job: &Job) -> Result<(), BatchError> {
+        let Some(record) = folder.read_record()? else {
+            (self.state, self.seconds) = read_state(&folder.run())?;
+            return Ok(());
+        };
+        self.state = record.state;
+        self.attempts = record.attempts.len();
+        self.seconds = record.seconds();
+        // Whoever works on it has the lock; without, the record is a dead one's.
+        if record.state == JobState::Running && folder.lock()?.is_some() {
+            self.state = JobState::Interrupted;
+        }
+        self.error = match record.difference(job) {
+            Some(difference) if record.state == JobState::Finished => {
+                Some(format!("the result is of another job: {difference}"))
+            }
+            _ => record.error,
+        };
+        Ok(())
     }
 
     /// Its figures as numbers.
@@ -197,7 +206,7 @@ impl JobSummary {
         let junctions = graph.and_then(|graph| graph.junctions.first());
         let segments = graph.and_then(|graph| graph.segments_max.first());
         Aggregate {
-            seconds: (self.attempts > 0).then_some(self.seconds),
+            seconds: (self.state != JobState::Pending).then_some(self.seconds),
             junctions: figures.map(|figures| figures.junctions as f64),
             edges: figures.map(|figures| figures.edges as f64),
             explained_length_share: figures.and_then(|f| f.explained_length_share),

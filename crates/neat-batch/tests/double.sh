@@ -11,7 +11,8 @@ arguments=$*
 finish() {
     mkdir -p "$run"
     cat >"$run/manifest.json" <<END
-{"backend": "double", "steps": 7, "warnings": ["a warning"], "status": "finished"}
+{"backend": "double", "steps": 7, "warnings": ["a warning"], "status": "finished",
+ "seconds": {"train": 1.5, "distill": 0.5}}
 END
     cat >"$run/wireframe.json" <<END
 {"metadata": {"agreement": {"explained_length_share": 0.5, "mean_reprojection_error_in_pixels": 0.25}},

@@ -413,3 +413,19 @@ fn the_summary_has_the_results_of_all_shards_and_measures_them() {
             == 4
     );
 }
+
+#[test]
+fn runs_that_no_batch_has_made_are_summed_up_as_well() {
+    let scenes = Scenes::new(&[("a", GOOD), ("b", GOOD)]);
+    scenes.run();
+    fs::remove_file(scenes.out().join("a/job.json")).unwrap();
+    fs::remove_dir_all(scenes.out().join("b")).unwrap();
+    let summary = Summary::read(&scenes.batch(), &scenes.out());
+    let first = &summary.jobs[0];
+    assert_eq!(
+        (first.state, first.attempts, first.seconds),
+        (JobState::Finished, 0, 2.0)
+    );
+    assert_eq!(first.figures.as_ref().map(|figures| figures.edges), Some(1));
+    assert_eq!(summary.jobs[1].state, JobState::Pending);
+}
