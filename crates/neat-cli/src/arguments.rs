@@ -31,8 +31,8 @@ Exit codes:
   0    done
   1    the run failed
   2    the arguments or the input cannot be used
-  130  interrupted: Ctrl-C ends training after the current step and leaves a checkpoint to
-       continue from with --resume; a second Ctrl-C ends at once"
+  130  interrupted: Ctrl-C (or SIGTERM) ends a run after the current step and leaves a
+       checkpoint; the same command with --resume goes on; a second Ctrl-C ends at once"
 )]
 pub struct Cli {
     #[command(subcommand)]
@@ -61,26 +61,31 @@ impl Cli {
 /// The method, its numbers and its seed.
 #[derive(Debug, Args)]
 pub struct MethodArgs {
-    /// Configuration to start from
-    #[arg(long, value_name = "NAME", default_value = Preset::default().name(), value_parser = preset_parser())]
-    pub preset: Preset,
+    /// Configuration to start from [default: fast]
+    #[arg(long, value_name = "NAME", value_parser = preset_parser())]
+    preset: Option<Preset>,
     /// Configuration file to start from instead of a preset, such as a run's config.toml
     #[arg(long, value_name = "FILE", conflicts_with = "preset")]
-    pub config: Option<PathBuf>,
+    config: Option<PathBuf>,
     /// Change one value of the configuration, such as train.rays=512; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
-    pub set: Vec<String>,
+    set: Vec<String>,
     /// Number of training steps, the same as --set train.steps=N
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub steps: Option<u64>,
 }
 
 impl MethodArgs {
+    /// Whether a configuration to start from was given.
+    pub fn has_base(&self) -> bool {
+        self.preset.is_some() || self.config.is_some()
+    }
+
     /// The configuration: a preset or a file, with everything that was set.
     pub fn config(&self) -> Result<Config, CliError> {
         let base = match &self.config {
             Some(path) => parse_config(path)?,
-            None => self.preset.config(),
+            None => self.preset.unwrap_or_default().config(),
         };
         self.apply(&base)
     }
@@ -98,7 +103,7 @@ impl MethodArgs {
     pub fn name(&self) -> String {
         match &self.config {
             Some(path) => path.display().to_string(),
-            None => self.preset.to_string(),
+            None => self.preset.unwrap_or_default().to_string(),
         }
     }
 }

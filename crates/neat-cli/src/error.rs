@@ -123,7 +123,9 @@ impl CliError {
     /// The error of a command that has `--resume`.
     pub fn of_resumable(error: PipelineError) -> Self {
         match error {
-            PipelineError::Interrupted { .. } => Self::Resumable(error),
+            PipelineError::Interrupted { .. } | PipelineError::InterruptedIn(_) => {
+                Self::Resumable(error)
+            }
             error => Self::Pipeline(error),
         }
     }
@@ -155,7 +157,9 @@ impl CliError {
             Self::Resumable(_)
             | Self::BatchInterrupted { .. }
             | Self::Pipeline(
-                PipelineError::Interrupted { .. } | PipelineError::AblationInterrupted { .. },
+                PipelineError::Interrupted { .. }
+                | PipelineError::InterruptedIn(_)
+                | PipelineError::AblationInterrupted { .. },
             ) => INTERRUPTED,
             Self::Pipeline(error) if error.is_bad_input() => BAD_INPUT,
             Self::Override(_)
@@ -179,6 +183,7 @@ impl CliError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use neat_pipeline::event::Stage;
     use std::io;
 
     #[test]
@@ -190,6 +195,10 @@ mod tests {
         let ablation = PipelineError::AblationInterrupted { done: 3, all: 20 };
         for (error, hint) in [
             (CliError::of_resumable(interrupted()), Some("--resume")),
+            (
+                CliError::of_resumable(PipelineError::InterruptedIn(Stage::Detect)),
+                Some("--resume"),
+            ),
             // Of a command without --resume.
             (interrupted().into(), None),
             (ablation.into(), Some("the same command again")),

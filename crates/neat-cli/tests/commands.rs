@@ -102,14 +102,21 @@ fn a_trained_run_can_be_distilled_rendered_and_continued() {
     assert!(stderr(&unknown).contains("`nowhere`"));
     assert!(stderr(&unknown).contains("image_0003"));
 
-    scene.run("train", "3").arg("--resume").assert().success();
-    assert_eq!(json(&scene.file("run/manifest.json"))["steps"], 3);
+    let other = scene.run("train", "5").arg("--resume").assert().code(2);
+    assert!(stderr(&other).contains("train.steps: 1 then, 5 now"));
+    let resume = || scene.run("reconstruct", "1").arg("--resume").assert();
+    let distilled = stdout(&resume().success());
+    let written = fs::metadata(scene.file("run/wireframe.json")).unwrap();
+    // Nothing is left to do: the result is told once more.
+    assert_eq!(stdout(&resume().success()), distilled);
+    let now = fs::metadata(scene.file("run/wireframe.json")).unwrap();
+    assert_eq!(now.modified().unwrap(), written.modified().unwrap());
     let metrics = fs::read_to_string(scene.file("run/metrics.jsonl")).unwrap();
-    assert_eq!(metrics.lines().count(), 2, "{metrics}");
+    assert_eq!(metrics.lines().count(), 1, "{metrics}");
 
-    truncate(&scene.file("run/checkpoints/step-00000003.safetensors"));
+    truncate(&scene.file("run/checkpoints/step-00000001.safetensors"));
     let damaged = neat(&["distill", &run]).assert().code(2);
-    assert!(stderr(&damaged).contains("step-00000003.safetensors"));
+    assert!(stderr(&damaged).contains("step-00000001.safetensors"));
 
     scene
         .run("train", "1")

@@ -15,13 +15,22 @@ fn manifest(run: &Path) -> Value {
     serde_json::from_slice(&fs::read(run.join("manifest.json")).unwrap()).unwrap()
 }
 
+/// The last checkpoint of a run of [`STEPS`] steps.
+const LAST: &str = "checkpoints/step-00000600.safetensors";
+const STEPS: &str = "600";
+
 #[test]
 fn ctrl_c_leaves_a_checkpoint_to_continue_from() {
     let scene = TestScene::new();
+    scene.run("train", STEPS).assert().success();
     let run = scene.file("run");
+    let reference = fs::read(run.join(LAST)).unwrap();
+    let metrics = fs::read(run.join("metrics.jsonl")).unwrap();
+    fs::remove_dir_all(&run).unwrap();
+
     let mut child = Command::new(env!("CARGO_BIN_EXE_neat"))
         .args(["train", &scene.path("scene"), "--out", &scene.path("run")])
-        .args(["--backend", "flex", "--steps", "1000000"])
+        .args(["--backend", "flex", "--steps", STEPS])
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
@@ -29,7 +38,7 @@ fn ctrl_c_leaves_a_checkpoint_to_continue_from() {
     let trains = || fs::metadata(run.join("metrics.jsonl")).is_ok_and(|file| file.len() > 0);
     while !trains() {
         assert!(Instant::now() < deadline, "no step was done");
-        sleep(Duration::from_millis(20));
+        sleep(Duration::from_millis(2));
     }
     let killed = Command::new("kill")
         .args(["-INT", &child.id().to_string()])
@@ -40,13 +49,45 @@ fn ctrl_c_leaves_a_checkpoint_to_continue_from() {
 
     assert_eq!(manifest(&run)["status"], "interrupted");
     let steps = manifest(&run)["steps"].as_u64().unwrap();
-    assert!(steps >= 1);
+    assert!((1..600).contains(&steps));
     let checkpoint = run.join(format!("checkpoints/step-{steps:08}.safetensors"));
     assert!(checkpoint.exists());
 
-    let more = (steps + 1).to_string();
-    scene.run("train", &more).arg("--resume").assert().success();
-    assert_eq!(manifest(&run)["steps"], steps + 1);
+    scene.run("train", STEPS).arg("--resume").assert().success();
+    assert_eq!(manifest(&run)["steps"], 600);
+    assert_eq!(fs::read(run.join(LAST)).unwrap(), reference);
+    assert_eq!(fs::read(run.join("metrics.jsonl")).unwrap(), metrics);
+}
+
+#[test]
+fn numbers_that_diverge_are_caught_and_a_state_that_shows_it_is_left() {
+    let scene = TestScene::new();
+    // Each step overflows, with any of the lower rates too.
+    let output = scene
+        .run("train", "40")
+        .args(["--set", "train.learning_rate=1e30"])
+        .assert()
+        .code(1);
+    let message = support::stderr(&output);
+    assert!(
+        message.contains("3 tries with lower learning rates"),
+        "{message}"
+    );
+    assert!(message.contains("run/failure"), "{message}");
+    assert_eq!(manifest(&scene.file("run"))["status"], "failed");
+
+    // The dump is a run that fails at once.
+    let again = support::neat(&[
+        "train",
+        &scene.path("scene"),
+        "--backend",
+        "flex",
+        "--resume",
+    ])
+    .args(["--out", &scene.path("run/failure")])
+    .assert()
+    .code(1);
+    assert!(support::stderr(&again).contains("tries with lower learning rates"));
 }
 
 /// A limit on the size of files stands in for a full disk: writing a checkpoint

@@ -3,7 +3,7 @@
 use crate::SceneError;
 use image::{ImageFormat, RgbImage};
 use std::fs;
-use std::io::{self, Cursor, Read};
+use std::io::{self, Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -48,15 +48,22 @@ pub(crate) fn read_error(path: &Path, remedy: &str, source: io::Error) -> SceneE
     }
 }
 
-/// Writes a whole file under a temporary name in the same folder, then renames
-/// it: readers see the old file or the new one, never a part.
+/// Writes a whole file under a temporary name in the same folder, brings it to the
+/// disk, then renames it: readers see the old file or the new one, never a part, also
+/// after the power went.
 ///
 /// # Errors
 /// If the folder does not exist, is read-only, or the disk is full; the
 /// temporary file is then removed.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), SceneError> {
     let temporary = temporary_name(path);
-    let result = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
+    let written = fs::File::create(&temporary).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.sync_all()
+    });
+    let result = written
+        .and_then(|()| fs::rename(&temporary, path))
+        .and_then(|()| sync_parent(path));
     result.map_err(|source| {
         // The first error is the one to report; a file that was never created
         // cannot be removed.
@@ -66,6 +73,50 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), SceneError> {
             source,
         }
     })
+}
+
+/// Brings the name of a file that was renamed to the disk. Only Unix opens folders.
+fn sync_parent(path: &Path) -> io::Result<()> {
+    #[cfg(unix)]
+    if let Some(parent) = path.parent() {
+        let parent = match parent.as_os_str().is_empty() {
+            true => Path::new("."),
+            false => parent,
+        };
+        match fs::File::open(parent)?.sync_all() {
+            // Some network file systems cannot, and need not.
+            Err(error) if error.kind() == io::ErrorKind::InvalidInput => {}
+            result => result?,
+        }
+    }
+    #[cfg(not(unix))]
+    let _ = path;
+    Ok(())
+}
+
+/// Removes what writers that were killed left in a folder: their temporary files and
+/// folders. Nobody may be writing into it.
+///
+/// # Errors
+/// If the folder cannot be read, or one of them cannot be removed.
+pub fn remove_temporaries(dir: &Path) -> Result<(), SceneError> {
+    let write_error = |path: &Path, source| SceneError::Write {
+        path: path.into(),
+        source,
+    };
+    let entries = fs::read_dir(dir).map_err(|source| read_error(dir, "", source))?;
+    for entry in entries {
+        let path = entry.map_err(|source| read_error(dir, "", source))?.path();
+        if !is_temporary(&path) {
+            continue;
+        }
+        let removed = match path.is_dir() {
+            true => fs::remove_dir_all(&path),
+            false => fs::remove_file(&path),
+        };
+        removed.map_err(|source| write_error(&path, source))?;
+    }
+    Ok(())
 }
 
 /// Creates a folder and its parents.
@@ -123,6 +174,21 @@ fn temporary_name(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}.{}.{count}.tmp", std::process::id()))
 }
 
+/// Whether a file or folder has the name that [`write_atomically`] and
+/// [`write_dir_atomically`] give to what is not complete yet.
+pub fn is_temporary(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let Some(rest) = (name.strip_prefix('.')).and_then(|name| name.strip_suffix(".tmp")) else {
+        return false;
+    };
+    let mut parts = rest.rsplitn(3, '.');
+    let numbers = [parts.next(), parts.next()];
+    let is_number = |part: &Option<&str>| {
+        part.is_some_and(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()))
+    };
+    numbers.iter().all(is_number) && parts.next().is_some_and(|name| !name.is_empty())
+}
+
 /// Writes a PNG, completely or not at all.
 ///
 /// # Errors
@@ -150,6 +216,34 @@ mod tests {
         write_atomically(&path, b"new").unwrap();
         assert_eq!(read(&path, "").unwrap(), b"new");
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_killed_writers_left_goes_and_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let left = temporary_name(&dir.path().join("wireframe.json"));
+        fs::write(&left, "half").unwrap();
+        fs::create_dir(temporary_name(&dir.path().join("folder"))).unwrap();
+        let kept = [
+            ".a.tmp",
+            ".a.1.tmp",
+            "a.1.2.tmp",
+            ".a.b.2.tmp",
+            ".1.2.tmp",
+            ".a.1.2",
+        ];
+        for name in kept {
+            fs::write(dir.path().join(name), "mine").unwrap();
+        }
+        remove_temporaries(dir.path()).unwrap();
+        let mut names: Vec<_> = fs::read_dir(dir.path())
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name())
+            .collect();
+        names.sort();
+        let mut expected = kept;
+        expected.sort();
+        assert_eq!(names, expected);
     }
 
     #[test]

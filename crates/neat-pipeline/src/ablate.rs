@@ -200,7 +200,7 @@ fn measure(
 ) -> Result<Row, PipelineError> {
     let config = variant.apply(&settled(&options.config, &run.config))?;
     let start = Instant::now();
-    let distilled = distill(&run.scene, &run.field, &config, &mut |_| ())?;
+    let distilled = distill(&run.scene, &run.field, &config, &mut |_| Ok(()))?;
     let seconds = start.elapsed().as_secs_f64();
     let document = distilled.document(&run.scene);
     if !variant.trains {

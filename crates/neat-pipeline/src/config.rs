@@ -147,6 +147,21 @@ pub struct TrainConfig {
     pub warm_up_steps: u64,
     /// A checkpoint is written every so many steps (and at the end).
     pub checkpoint_interval: u64,
+    /// A checkpoint is also written after so many seconds without one.
+    #[serde(default = "default_checkpoint_seconds")]
+    pub checkpoint_seconds: f64,
+    /// So many of the last checkpoints stay on disk, besides the one with the smallest
+    /// loss: one to continue from, and others in case that it turns out to be damaged.
+    #[serde(default = "default_kept_checkpoints")]
+    pub kept_checkpoints: usize,
+}
+
+fn default_checkpoint_seconds() -> f64 {
+    120.0
+}
+
+fn default_kept_checkpoints() -> usize {
+    2
 }
 
 /// Where the eikonal term samples the gradient.

@@ -11,6 +11,7 @@ use neat_core::{Scene, SceneError, View, Wireframe2d, hawp_json};
 use neat_detect::{DetectorConfig, detect};
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Files and detectors have pixel centres at integers.
 const DETECTED_WITH_PIXEL_CENTER: f64 = 0.0;
@@ -25,13 +26,15 @@ const DETECTOR_VERSION: u32 = 1;
 /// and this configuration is not detected again.
 ///
 /// # Errors
-/// If the configuration is out of range, or no view has a segment.
+/// If the configuration is out of range, or no view has a segment;
+/// [`PipelineError::InterruptedIn`] once `cancelled` is set.
 pub fn detect_wireframes(
     scene: &mut Scene,
     dir: &Path,
     config: &DetectorConfig,
     min_segment_score: f64,
     cache: Option<&FileCache>,
+    cancelled: &AtomicBool,
     on_event: OnEvent<'_>,
 ) -> Result<Vec<String>, PipelineError> {
     config.validate()?;
@@ -40,6 +43,9 @@ pub fn detect_wireframes(
     let mut done = 0;
     // Some at a time, so that progress can be told in between.
     for chunk in scene.views.chunks_mut(4 * rayon::current_num_threads()) {
+        if cancelled.load(Ordering::Relaxed) {
+            return Err(PipelineError::InterruptedIn(Stage::Detect));
+        }
         let found: Vec<_> = (chunk.par_iter())
             .map(|view| detect_in(view, config, cache))
             .collect();
@@ -145,6 +151,7 @@ mod tests {
             &DetectorConfig::default(),
             0.05,
             cache,
+            &AtomicBool::new(false),
             &mut |_| {},
         )
     }
@@ -185,6 +192,7 @@ mod tests {
             &config,
             0.05,
             Some(&cache),
+            &AtomicBool::new(false),
             &mut |_| {},
         )
         .unwrap();

@@ -26,9 +26,20 @@ const RAY_CHUNK: usize = 2048;
 /// Half the width of the thin regions that are queried (paper §4.3).
 const THIN_REGION: f64 = 1.0;
 
+/// Who listens to the progress wants the distillation to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("interrupted")]
+pub struct Cancelled;
+
+/// Receives the share that is done, from 0 to 1, and says whether to go on.
+pub type OnProgress<'a> = &'a mut dyn FnMut(f64) -> Result<(), Cancelled>;
+
 /// Why no wireframe could be taken out of a field.
 #[derive(Debug, thiserror::Error)]
 pub enum DistillError {
+    /// Nobody wants it any more.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// The paper's back end refused its input.
     #[error(transparent)]
     Paper(#[from] PaperBackEndError),
@@ -71,15 +82,13 @@ impl Distilled {
 
 /// Queries the thin regions of all views and assembles the wireframe.
 ///
-/// `progress` receives the share that is done.
-///
 /// # Errors
-/// If the field's junctions or distances are not finite.
+/// If the field's junctions or distances are not finite, or `progress` says so.
 pub fn distill(
     scene: &Scene,
     field: &TrainedField,
     config: &Config,
-    progress: &mut dyn FnMut(f64),
+    progress: OnProgress<'_>,
 ) -> Result<Distilled, DistillError> {
     match config.distill.back_end {
         BackEnd::Paper => paper(scene, field, config, progress),
@@ -240,10 +249,10 @@ fn fast(
     scene: &Scene,
     field: &TrainedField,
     config: &Config,
-    progress: &mut dyn FnMut(f64),
+    progress: OnProgress<'_>,
 ) -> Result<Distilled, DistillError> {
     let views = ViewObservation::from_scene(scene, config.data.min_segment_score);
-    let proposals = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f));
+    let proposals = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f))?;
     let surface = field.surface_grid();
     let result = fast_back_end::run(
         &views,
@@ -253,7 +262,7 @@ fn fast(
         field.scene_radius,
         &config.distill.fast,
     );
-    progress(0.9);
+    progress(0.9)?;
     let report = json!({
         "back_end": "fast",
         "proposals": proposals.len(),
@@ -268,10 +277,10 @@ fn tracks(
     scene: &Scene,
     field: &TrainedField,
     config: &Config,
-    progress: &mut dyn FnMut(f64),
+    progress: OnProgress<'_>,
 ) -> Result<Distilled, DistillError> {
     let views = ViewObservation::from_scene(scene, config.data.min_segment_score);
-    let priors = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f));
+    let priors = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f))?;
     let surface = field.surface_grid();
     let result = line_tracks::run(
         &views,
@@ -280,7 +289,7 @@ fn tracks(
         field.scene_radius,
         &config.distill.tracks,
     );
-    progress(0.9);
+    progress(0.9)?;
     let report = json!({
         "back_end": "tracks",
         "priors": priors.len(),
@@ -294,13 +303,16 @@ fn tracks(
 }
 
 /// One robust 3D segment for every detected 2D segment that the field answers.
+///
+/// # Errors
+/// If `progress` says so.
 pub fn propose_segments(
     scene: &Scene,
     field: &TrainedField,
     config: &Config,
     views: &[ViewObservation],
-    progress: &mut dyn FnMut(f64),
-) -> Vec<SegmentProposal> {
+    progress: OnProgress<'_>,
+) -> Result<Vec<SegmentProposal>, Cancelled> {
     let robust = RobustSegmentConfig::default();
     let mut proposals = Vec::new();
     for (view, observation) in views.iter().enumerate() {
@@ -324,16 +336,16 @@ pub fn propose_segments(
                 .enumerate()
                 .filter_map(|(segment, rays)| robust_segment(views, view, segment, rays, &robust)),
         );
-        progress((view + 1) as f64 / views.len() as f64);
+        progress((view + 1) as f64 / views.len() as f64)?;
     }
-    proposals
+    Ok(proposals)
 }
 
 fn paper(
     scene: &Scene,
     field: &TrainedField,
     config: &Config,
-    progress: &mut dyn FnMut(f64),
+    progress: OnProgress<'_>,
 ) -> Result<Distilled, DistillError> {
     let paper = &config.distill.paper;
     let views = ViewObservation::from_scene(scene, paper.neat_lines.min_segment_score);
@@ -361,7 +373,7 @@ fn paper(
             })
             .collect();
         rays_by_view.push(rays);
-        progress(0.95 * (index + 1) as f64 / views.len() as f64);
+        progress(0.95 * (index + 1) as f64 / views.len() as f64)?;
     }
     let result = paper.run(&field.junctions(), &views, &rays_by_view, field)?;
     let report = json!({ "back_end": "paper", "steps": result.counts });

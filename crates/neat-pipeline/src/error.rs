@@ -1,6 +1,7 @@
 //! What can go wrong in a run as a whole.
 
 use crate::distill::DistillError;
+use crate::event::Stage;
 use crate::overrides::OverrideError;
 use crate::run_dir::RunDirError;
 use crate::trainer::TrainError;
@@ -12,6 +13,7 @@ use neat_tensor::BackendError;
 use neat_tensor::checkpoint::CheckpointError;
 use neat_wireframe::export::ExportError;
 use std::error::Error;
+use std::io::ErrorKind;
 use std::path::PathBuf;
 
 /// Why a run did not finish.
@@ -40,6 +42,16 @@ pub enum PipelineError {
         "the scene is not fit for a run:\n{0}\n`neat doctor` explains it; --no-doctor runs it nevertheless"
     )]
     NotReady(String),
+    /// A run would continue with other inputs or another configuration.
+    #[error(
+        "{dir} holds a run that began otherwise:\n  {differences}\nrestore that, or begin anew with --overwrite or in another folder"
+    )]
+    Changed {
+        /// The folder of the run.
+        dir: PathBuf,
+        /// One per line.
+        differences: String,
+    },
     /// A change of the configuration does not apply.
     #[error(transparent)]
     Override(OverrideError),
@@ -48,7 +60,7 @@ pub enum PipelineError {
     Train(#[from] TrainError),
     /// No wireframe could be taken out of the field.
     #[error(transparent)]
-    Distill(#[from] DistillError),
+    Distill(DistillError),
     /// A result could not be written.
     #[error(transparent)]
     Export(#[from] ExportError),
@@ -58,13 +70,37 @@ pub enum PipelineError {
     /// A result could not be measured.
     #[error(transparent)]
     Evaluation(#[from] EvalError),
-    /// A person stopped the run.
+    /// A person, or the system, stopped the run during its training.
     #[error("interrupted after step {step}: {checkpoint} holds the state")]
     Interrupted {
         /// Steps that are done.
         step: u64,
         /// The checkpoint that was written.
         checkpoint: PathBuf,
+    },
+    /// A person, or the system, stopped the run in another stage, which will be
+    /// repeated.
+    #[error("interrupted ({0}): what was done before is on disk")]
+    InterruptedIn(Stage),
+    /// The optimisation failed again and again.
+    #[error(
+        "{source}; {tries} tries with lower learning rates did not help: {dump} holds the state before it; look at train.learning_rate and at the scene's poses"
+    )]
+    Diverged {
+        /// So often the last good checkpoint was restored.
+        tries: usize,
+        /// The folder of a run that shows the failure again.
+        dump: PathBuf,
+        /// The last failure.
+        source: TrainError,
+    },
+    /// The device failed, and so did all that it could be replaced by.
+    #[error(
+        "the device failed ({reason}): try --backend flex, a smaller train.ray_chunk, or --resume after other programs have released its memory"
+    )]
+    DeviceFailed {
+        /// What the backend said.
+        reason: String,
     },
     /// A person stopped an ablation.
     #[error("interrupted: {done} of {all} variants are done")]
@@ -84,6 +120,15 @@ pub enum PipelineError {
     },
 }
 
+impl From<DistillError> for PipelineError {
+    fn from(error: DistillError) -> Self {
+        match error {
+            DistillError::Cancelled(_) => Self::InterruptedIn(Stage::Distill),
+            error => Self::Distill(error),
+        }
+    }
+}
+
 impl PipelineError {
     /// Whether the cause lies in what was asked for or in the input, and trying
     /// again without a change is pointless; otherwise the run itself failed.
@@ -91,9 +136,12 @@ impl PipelineError {
         match self {
             Self::Scene(error) => !is_write_error(error),
             Self::RunDir(RunDirError::File(error)) => !is_write_error(error),
-            Self::RunDir(
-                RunDirError::Serialize(_) | RunDirError::Checkpoint(CheckpointError::Io { .. }),
-            ) => false,
+            Self::RunDir(RunDirError::Serialize(_) | RunDirError::InUse(_)) => false,
+            // A folder that may not be written is a wrong choice, a full disk is not.
+            Self::RunDir(RunDirError::Unwritable { source, .. }) => !is_full_disk(source),
+            Self::RunDir(RunDirError::Checkpoint(CheckpointError::File(error))) => {
+                !is_write_error(error)
+            }
             Self::RunDir(_)
             | Self::Backend(_)
             | Self::SceneDirNotEmpty(_)
@@ -102,6 +150,7 @@ impl PipelineError {
             | Self::Detector(_)
             | Self::Override(_)
             | Self::OtherAblation { .. }
+            | Self::Changed { .. }
             | Self::NotReady(_) => true,
             Self::Train(error) => matches!(
                 error,
@@ -114,6 +163,9 @@ impl PipelineError {
             | Self::Export(_)
             | Self::Report(_)
             | Self::Interrupted { .. }
+            | Self::InterruptedIn(_)
+            | Self::Diverged { .. }
+            | Self::DeviceFailed { .. }
             | Self::AblationInterrupted { .. } => false,
         }
     }
@@ -134,6 +186,15 @@ pub fn with_causes(error: &dyn Error) -> String {
         cause = error.source();
     }
     text
+}
+
+fn is_full_disk(error: &SceneError) -> bool {
+    let full = [
+        ErrorKind::StorageFull,
+        ErrorKind::QuotaExceeded,
+        ErrorKind::FileTooLarge,
+    ];
+    matches!(error, SceneError::Write { source, .. } if full.contains(&source.kind()))
 }
 
 fn is_write_error(error: &SceneError) -> bool {

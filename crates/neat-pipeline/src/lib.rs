@@ -6,6 +6,7 @@ pub mod ablate;
 mod awake;
 pub mod background;
 pub mod benchmark;
+pub mod changes;
 mod chunked_step;
 pub mod compare_backends;
 pub mod config;

@@ -1,5 +1,6 @@
 //! From a scene on disk to a run folder: training, distillation, and both.
 
+mod device_failure;
 mod report;
 mod results;
 mod session;
@@ -64,20 +65,27 @@ pub struct Reconstruction {
 
 /// Trains on a scene and leaves a run folder with checkpoints.
 ///
-/// `cancelled` is looked at before every step: once it is set, the last state is
-/// written and the run ends.
+/// `cancelled` is looked at before every step and between the views that are
+/// detected: once it is set, the last state is written and the run ends.
+///
+/// [`Existing::Resume`] continues where a run ended, in whatever way, and comes to the
+/// same bytes as without the interruption, on the same backend. Under a time budget
+/// the schedules follow the clock: the bytes are others then.
 ///
 /// # Errors
 /// If the scene, the folder or the backend cannot be used, the optimisation
 /// fails, or the disk is full; [`PipelineError::Interrupted`] after
-/// cancellation. What has been written stays.
+/// cancellation; [`PipelineError::Changed`] if the run began with something else.
+/// What has been written stays.
 pub fn train(
     options: &RunOptions,
     cancelled: &AtomicBool,
     on_event: OnEvent<'_>,
 ) -> Result<RunDir, PipelineError> {
-    Session::start(options, on_event)?.finish(|session| {
-        session.train(options, cancelled)?;
+    Session::start(options, cancelled, on_event)?.finish(|session| {
+        if !session.finished {
+            session.train(options, cancelled)?;
+        }
         Ok(session.dir.clone())
     })
 }
@@ -91,9 +99,14 @@ pub fn reconstruct(
     cancelled: &AtomicBool,
     on_event: OnEvent<'_>,
 ) -> Result<Reconstruction, PipelineError> {
-    Session::start(options, on_event)?.finish(|session| {
+    Session::start(options, cancelled, on_event)?.finish(|session| {
+        if session.finished
+            && let Some(result) = session.earlier_result()
+        {
+            return Ok(result);
+        }
         let field = session.train(options, cancelled)?;
-        session.distill(&field)
+        session.distill(&field, cancelled)
     })
 }
 
@@ -115,13 +128,17 @@ pub fn distill_run(
         device,
         field,
     } = opened;
+    let lock = dir.lock()?;
     let mut session = Session {
         dir,
         config,
         manifest,
         scene,
         device,
+        ray_chunk: None,
+        finished: false,
         on_event,
+        _lock: lock,
     };
     // Distillation is repeated: only the last one's time counts.
     for stage in [Stage::Distill, Stage::Export] {
@@ -129,7 +146,7 @@ pub fn distill_run(
     }
     session.forget_distillation_warnings();
     // How the training ended stays as it is.
-    let result = session.distill(&field);
+    let result = session.distill(&field, &AtomicBool::new(false));
     let recorded = session.write_manifest();
     // Of two errors the first is the cause.
     let reconstruction = result?;

@@ -5,30 +5,30 @@
 //! manifest.json       what ran, where, on which inputs, and how long
 //! metrics.jsonl       one line of losses every few steps
 //! junctions.jsonl     where the global junctions were, fifty times over the training
-//! checkpoints/        the last two, step-NNNNNNNN.safetensors
+//! checkpoints/        the last ones and the best, step-NNNNNNNN.safetensors
 //! wireframe.json      junctions and edges, in the frame of the user's files
 //! wireframe.obj, .ply the same for other programs
 //! wireframe.png       a picture of it
 //! report.html         all of it to look at, with the evidence for every edge
 //! overlays/           the wireframe drawn on some of the photographs
 //! detections/         2D wireframes, where the scene came without
+//! failure/            a run that shows a numerical failure again, after one
+//! .lock               held while a process works in the folder
 //! ```
 //!
 //! `neat render` and `neat export` add `renders/` and `mesh.ply` if they are asked to.
 //! Every file is complete or not there; the logs (`.jsonl`) only grow, but for the
-//! steps that a resumed run takes again.
+//! steps that a resumed run takes again. The folder holds a run once `manifest.json`
+//! is there.
 
 use crate::config::Config;
 use crate::manifest::Manifest;
+use crate::trainer::AVERAGE_LOSS;
 use neat_core::{SceneError, file};
 use neat_tensor::checkpoint::{Checkpoint, CheckpointError};
-use std::fs;
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
-
-/// So many checkpoints stay on disk: one to continue from, and one more in case
-/// that one turns out to be damaged.
-const KEPT_CHECKPOINTS: usize = 2;
 
 const CONFIG: &str = "config.toml";
 const MANIFEST: &str = "manifest.json";
@@ -39,6 +39,8 @@ const CHECKPOINTS: &str = "checkpoints";
 const OVERLAYS: &str = "overlays";
 const DETECTIONS: &str = "detections";
 const RENDERS: &str = "renders";
+const FAILURE: &str = "failure";
+const LOCK: &str = ".lock";
 const MESH: &str = "mesh.ply";
 const RESULT_FILES: [&str; 4] = [
     "wireframe.json",
@@ -55,7 +57,7 @@ pub enum Existing {
     Refuse,
     /// Remove the files of an earlier run and start anew; other files stay.
     Overwrite,
-    /// Continue from the last checkpoint in it.
+    /// Continue the run in it from its last checkpoint; begin one where none is.
     Resume,
 }
 
@@ -73,6 +75,29 @@ pub enum RunDirError {
     /// No run has been here.
     #[error("{0} is not the folder of a run: it has no config.toml")]
     NotARun(PathBuf),
+    /// A run that has lost the file that says what it is.
+    #[error(
+        "{path} has checkpoints but no {missing}: put it back, or begin again with --overwrite"
+    )]
+    Incomplete {
+        /// The folder.
+        path: PathBuf,
+        /// Name of the file.
+        missing: &'static str,
+    },
+    /// Another process is at work in the folder.
+    #[error("another process works on the run in {0}: wait for it, or choose another folder")]
+    InUse(PathBuf),
+    /// Every checkpoint is damaged.
+    #[error(
+        "none of the checkpoints in {path} can be read: put one back, or train again with --overwrite"
+    )]
+    NoUsableCheckpoint {
+        /// The folder of the run.
+        path: PathBuf,
+        /// What is wrong with the last one.
+        source: CheckpointError,
+    },
     /// A run that ended before its first checkpoint.
     #[error("{0} has no checkpoint: train again with --overwrite")]
     NoCheckpoint(PathBuf),
@@ -111,49 +136,97 @@ pub struct RunDir {
     root: PathBuf,
 }
 
+/// As long as it lives, no other process works in the folder.
+#[derive(Debug)]
+pub struct RunLock {
+    _file: File,
+}
+
+/// The last checkpoint that can be read.
+#[derive(Debug)]
+pub struct UsableCheckpoint {
+    /// Its file.
+    pub path: PathBuf,
+    /// What is in it.
+    pub checkpoint: Checkpoint,
+    /// Later ones, which cannot be read, with what is wrong with them.
+    pub damaged: Vec<(PathBuf, CheckpointError)>,
+}
+
 impl RunDir {
     /// Checks, without changing anything, that a run may use `root`.
     ///
     /// # Errors
     /// If it is no folder, is not empty although `existing` is
-    /// [`Existing::Refuse`], or holds no run although it is [`Existing::Resume`].
+    /// [`Existing::Refuse`], or holds something but no run although it is
+    /// [`Existing::Resume`].
     pub fn check(root: &Path, existing: Existing) -> Result<(), RunDirError> {
         if existing == Existing::Resume {
-            return Self::open(root).map(|_| ());
+            return Self::to_resume(root).map(|_| ());
         }
-        let mut entries = match fs::read_dir(root) {
-            Ok(entries) => entries,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
-                return Err(RunDirError::NotAFolder(root.into()));
-            }
-            Err(error) => return Err(read_error(root, error).into()),
-        };
-        if existing == Existing::Refuse && entries.next().is_some() {
+        let not_empty = !entries(root)?.is_empty();
+        if existing == Existing::Refuse && not_empty {
             return Err(RunDirError::NotEmpty(root.into()));
         }
         Ok(())
     }
 
-    /// Makes `root` ready for a run: creates it where needed and, for
-    /// [`Existing::Overwrite`], removes the files of an earlier run.
+    /// The run in `root` that can be continued; `None` where a run can only begin: in
+    /// no folder, an empty one, or one with nothing but what a run leaves that was
+    /// killed before its beginning was on disk.
     ///
     /// # Errors
-    /// As [`Self::check`], or if the folder cannot be written.
-    pub fn create(root: &Path, existing: Existing) -> Result<Self, RunDirError> {
+    /// If there is something else in the folder, or a part of the run is missing.
+    pub fn to_resume(root: &Path) -> Result<Option<Self>, RunDirError> {
+        let dir = Self { root: root.into() };
+        let files = [CONFIG, MANIFEST];
+        let missing: Vec<_> = (files.into_iter())
+            .filter(|name| !root.join(name).is_file())
+            .collect();
+        let Some(&missing) = missing.first() else {
+            return Ok(Some(dir));
+        };
+        if !dir.checkpoints()?.is_empty() {
+            let path = root.into();
+            return Err(RunDirError::Incomplete { path, missing });
+        }
+        let beginning = |path: &PathBuf| {
+            let name = path.file_name().unwrap_or_default();
+            [CONFIG, CHECKPOINTS, DETECTIONS, LOCK]
+                .iter()
+                .any(|known| name == *known)
+                || file::is_temporary(path)
+        };
+        match entries(root)?.iter().all(beginning) {
+            true => Ok(None),
+            false => Err(RunDirError::NotARun(root.into())),
+        }
+    }
+
+    /// Makes `root` ready for a run and keeps other processes out of it: creates it
+    /// where needed, removes the files of an earlier run for
+    /// [`Existing::Overwrite`], and what killed writers left for
+    /// [`Existing::Resume`].
+    ///
+    /// # Errors
+    /// As [`Self::check`], or if the folder cannot be written or is in use.
+    pub fn create(root: &Path, existing: Existing) -> Result<(Self, RunLock), RunDirError> {
         Self::check(root, existing)?;
         let dir = Self { root: root.into() };
-        let cleared = match existing {
-            Existing::Overwrite => dir.remove_earlier_run(),
-            Existing::Refuse | Existing::Resume => Ok(()),
+        let unwritable = |source| RunDirError::Unwritable {
+            path: root.into(),
+            source,
         };
-        cleared
-            .and_then(|()| file::create_dir(&root.join(CHECKPOINTS)))
-            .map_err(|source| RunDirError::Unwritable {
-                path: root.into(),
-                source,
-            })?;
-        Ok(dir)
+        file::create_dir(root).map_err(unwritable)?;
+        let lock = dir.lock()?;
+        match existing {
+            Existing::Overwrite => dir.remove_earlier_run(),
+            Existing::Resume => dir.remove_temporaries(),
+            Existing::Refuse => Ok(()),
+        }
+        .and_then(|()| file::create_dir(&root.join(CHECKPOINTS)))
+        .map_err(unwritable)?;
+        Ok((dir, lock))
     }
 
     /// The folder of a run that has been.
@@ -167,6 +240,39 @@ impl RunDir {
         Ok(Self { root: root.into() })
     }
 
+    /// Keeps other processes from working in the folder until the lock is dropped; a
+    /// process that ends in any way drops it.
+    ///
+    /// # Errors
+    /// If another process has it, or the folder cannot be written.
+    pub fn lock(&self) -> Result<RunLock, RunDirError> {
+        let path = self.root.join(LOCK);
+        let file = OpenOptions::new()
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .open(&path)
+            .map_err(|source| RunDirError::Unwritable {
+                path: self.root.clone(),
+                source: write_error(&path, source),
+            })?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(RunDirError::InUse(self.root.clone())),
+            // A file system without locks: as before there were any.
+            Err(TryLockError::Error(_)) => {}
+        }
+        Ok(RunLock { _file: file })
+    }
+
+    fn remove_temporaries(&self) -> Result<(), SceneError> {
+        let folders = [CHECKPOINTS, OVERLAYS, DETECTIONS, RENDERS].map(|name| self.root.join(name));
+        for dir in folders.iter().filter(|dir| dir.is_dir()) {
+            file::remove_temporaries(dir)?;
+        }
+        file::remove_temporaries(&self.root)
+    }
+
     fn remove_earlier_run(&self) -> Result<(), SceneError> {
         let files = [CONFIG, MANIFEST, METRICS, JUNCTIONS, REPORT, MESH]
             .iter()
@@ -174,7 +280,7 @@ impl RunDir {
         for name in files {
             ignore_missing(fs::remove_file(self.root.join(name)), &self.root.join(name))?;
         }
-        for name in [CHECKPOINTS, OVERLAYS, DETECTIONS, RENDERS] {
+        for name in [CHECKPOINTS, OVERLAYS, DETECTIONS, RENDERS, FAILURE] {
             let path = self.root.join(name);
             ignore_missing(fs::remove_dir_all(&path), &path)?;
         }
@@ -273,7 +379,13 @@ impl RunDir {
         Ok(ignore_missing(fs::remove_file(&path), &path)?)
     }
 
-    /// Writes the checkpoint of a step and removes all but the last two.
+    /// The folder of a run that shows a numerical failure of this one again.
+    pub fn failure(&self) -> PathBuf {
+        self.root.join(FAILURE)
+    }
+
+    /// Writes the checkpoint of a step and removes all but the last `kept` and the one
+    /// with the smallest average loss.
     ///
     /// # Errors
     /// If the disk is full or the folder cannot be written; earlier checkpoints
@@ -282,26 +394,84 @@ impl RunDir {
         &self,
         iteration: u64,
         checkpoint: &Checkpoint,
+        kept: usize,
     ) -> Result<PathBuf, RunDirError> {
         let path = self
             .root
             .join(CHECKPOINTS)
             .join(format!("step-{iteration:08}.safetensors"));
         checkpoint.write(&path)?;
-        let mut checkpoints = self.checkpoints()?;
-        checkpoints.truncate(checkpoints.len().saturating_sub(KEPT_CHECKPOINTS));
-        for (_, old) in checkpoints {
-            ignore_missing(fs::remove_file(&old), &old)?;
+        let mut old = self.checkpoints()?;
+        old.truncate(old.len().saturating_sub(kept.max(1)));
+        if !old.is_empty() {
+            let best = self.best_checkpoint()?;
+            for (_, path) in old {
+                if best.as_ref() != Some(&path) {
+                    ignore_missing(fs::remove_file(&path), &path)?;
+                }
+            }
         }
         Ok(path)
     }
 
-    /// Reads the last checkpoint.
+    /// The checkpoint with the smallest average loss, the first of several; `None`
+    /// where no checkpoint tells its loss.
     ///
     /// # Errors
-    /// If there is none, or it is damaged.
-    pub fn read_latest_checkpoint(&self) -> Result<Checkpoint, RunDirError> {
-        Ok(Checkpoint::read(&self.latest_checkpoint()?)?)
+    /// If the folder cannot be read.
+    pub fn best_checkpoint(&self) -> Result<Option<PathBuf>, RunDirError> {
+        let loss = |path: &Path| -> Option<f64> {
+            let metadata = Checkpoint::read_metadata(path).ok()?;
+            metadata.get(AVERAGE_LOSS)?.parse().ok()
+        };
+        let mut best: Option<(f64, PathBuf)> = None;
+        for (_, path) in self.checkpoints()? {
+            if let Some(loss) = loss(&path)
+                && best.as_ref().is_none_or(|(least, _)| loss < *least)
+            {
+                best = Some((loss, path));
+            }
+        }
+        Ok(best.map(|(_, path)| path))
+    }
+
+    /// Reads the last checkpoint that is not damaged; `None` if there is no
+    /// checkpoint.
+    ///
+    /// # Errors
+    /// If all are damaged, or the folder cannot be read.
+    pub fn usable_checkpoint(&self) -> Result<Option<UsableCheckpoint>, RunDirError> {
+        let mut damaged = Vec::new();
+        for (_, path) in self.checkpoints()?.into_iter().rev() {
+            match Checkpoint::read(&path) {
+                Ok(checkpoint) => {
+                    return Ok(Some(UsableCheckpoint {
+                        path,
+                        checkpoint,
+                        damaged,
+                    }));
+                }
+                Err(error) => damaged.push((path, error)),
+            }
+        }
+        match damaged.into_iter().next() {
+            None => Ok(None),
+            Some((_, source)) => Err(RunDirError::NoUsableCheckpoint {
+                path: self.root.clone(),
+                source,
+            }),
+        }
+    }
+
+    /// Renames a checkpoint, so that it is one no more.
+    ///
+    /// # Errors
+    /// If the system refuses.
+    pub fn set_aside(&self, checkpoint: &Path) -> Result<(), RunDirError> {
+        let mut aside = checkpoint.as_os_str().to_owned();
+        aside.push(".damaged");
+        let renamed = fs::rename(checkpoint, &aside);
+        Ok(renamed.map_err(|error| write_error(checkpoint, error))?)
     }
 
     /// The last checkpoint's file.
@@ -349,6 +519,21 @@ pub fn parse_config(path: &Path) -> Result<Config, RunDirError> {
     toml::from_str(&text).map_err(|error| malformed(path, &error))
 }
 
+/// What is in a folder; nothing where there is none.
+fn entries(root: &Path) -> Result<Vec<PathBuf>, RunDirError> {
+    let entries = match fs::read_dir(root) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) if error.kind() == io::ErrorKind::NotADirectory => {
+            return Err(RunDirError::NotAFolder(root.into()));
+        }
+        Err(error) => return Err(read_error(root, error).into()),
+    };
+    let path = |entry: io::Result<fs::DirEntry>| entry.map(|entry| entry.path());
+    let paths: io::Result<_> = entries.map(path).collect();
+    paths.map_err(|error| read_error(root, error).into())
+}
+
 /// The step in the name of a checkpoint.
 fn checkpoint_iteration(path: &Path) -> Option<u64> {
     let name = path.file_name()?.to_str()?;
@@ -394,7 +579,7 @@ mod tests {
         let root = dir.path().join("run");
         RunDir::check(&root, Existing::Refuse).unwrap();
         assert!(!root.exists(), "checking creates nothing");
-        RunDir::create(&root, Existing::Refuse).unwrap();
+        drop(RunDir::create(&root, Existing::Refuse).unwrap());
 
         fs::write(root.join("wireframe.obj"), "v").unwrap();
         fs::write(root.join("notes.txt"), "mine").unwrap();
@@ -411,11 +596,11 @@ mod tests {
             fs::write(root.join(name), "old").unwrap();
         }
         fs::create_dir(root.join(RENDERS)).unwrap();
-        RunDir::create(&root, Existing::Overwrite).unwrap();
+        drop(RunDir::create(&root, Existing::Overwrite).unwrap());
         let entries = fs::read_dir(&root).unwrap();
         let mut left: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
         left.sort();
-        assert_eq!(left, [CHECKPOINTS, "notes.txt"]);
+        assert_eq!(left, [LOCK, CHECKPOINTS, "notes.txt"]);
         assert_eq!(fs::read(root.join("notes.txt")).unwrap(), b"mine");
 
         assert!(matches!(
@@ -425,20 +610,81 @@ mod tests {
     }
 
     #[test]
-    fn the_last_two_checkpoints_stay() {
+    fn a_folder_is_continued_begun_or_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let run = RunDir::create(dir.path(), Existing::Refuse).unwrap();
+        let root = dir.path().join("run");
+        assert_eq!(RunDir::to_resume(&root).unwrap(), None);
+        // What a run leaves that was killed at its very beginning.
+        drop(RunDir::create(&root, Existing::Resume).unwrap());
+        fs::write(root.join(CONFIG), "").unwrap();
+        fs::write(root.join(".manifest.json.12.0.tmp"), "{").unwrap();
+        assert_eq!(RunDir::to_resume(&root).unwrap(), None);
+        let (run, lock) = RunDir::create(&root, Existing::Resume).unwrap();
+        assert!(!root.join(".manifest.json.12.0.tmp").exists());
+        assert!(matches!(
+            RunDir::create(&root, Existing::Resume),
+            Err(RunDirError::InUse(_))
+        ));
+        drop(lock);
+
+        run.write_checkpoint(1, &Checkpoint::default(), 2).unwrap();
+        assert!(matches!(
+            RunDir::to_resume(&root),
+            Err(RunDirError::Incomplete {
+                missing: MANIFEST,
+                ..
+            })
+        ));
+        fs::write(root.join(MANIFEST), "{}").unwrap();
+        assert_eq!(RunDir::to_resume(&root).unwrap(), Some(run));
+
+        let other = dir.path().join("other");
+        fs::create_dir(&other).unwrap();
+        fs::write(other.join("letter.txt"), "").unwrap();
+        assert!(matches!(
+            RunDir::to_resume(&other),
+            Err(RunDirError::NotARun(_))
+        ));
+    }
+
+    #[test]
+    fn the_last_checkpoints_and_the_best_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let (run, _lock) = RunDir::create(dir.path(), Existing::Refuse).unwrap();
         assert!(matches!(
             run.latest_checkpoint(),
             Err(RunDirError::NoCheckpoint(_))
         ));
-        for iteration in [5, 50, 100_000_000, 200_000_000] {
-            let path = run
-                .write_checkpoint(iteration, &Checkpoint::default())
-                .unwrap();
+        assert!(run.usable_checkpoint().unwrap().is_none());
+        let losses = [(5, 3.0), (50, 0.5), (500, 2.0), (100_000_000, 1.0)];
+        for (iteration, loss) in losses {
+            let mut checkpoint = Checkpoint::default();
+            let metadata = &mut checkpoint.metadata;
+            metadata.insert(AVERAGE_LOSS.to_owned(), loss.to_string());
+            let path = run.write_checkpoint(iteration, &checkpoint, 2).unwrap();
             assert_eq!(run.latest_checkpoint().unwrap(), path);
         }
         let kept: Vec<u64> = run.checkpoints().unwrap().iter().map(|c| c.0).collect();
-        assert_eq!(kept, [100_000_000, 200_000_000]);
+        assert_eq!(kept, [50, 500, 100_000_000]);
+    }
+
+    #[test]
+    fn a_damaged_checkpoint_gives_way_to_the_one_before() {
+        let dir = tempfile::tempdir().unwrap();
+        let (run, _lock) = RunDir::create(dir.path(), Existing::Refuse).unwrap();
+        let [first, second] =
+            [1, 2].map(|i| run.write_checkpoint(i, &Checkpoint::default(), 2).unwrap());
+        fs::write(&second, "half").unwrap();
+        let usable = run.usable_checkpoint().unwrap().unwrap();
+        assert_eq!(usable.path, first);
+        assert_eq!(usable.damaged[0].0, second);
+        run.set_aside(&second).unwrap();
+        assert_eq!(run.latest_checkpoint().unwrap(), first);
+
+        fs::write(&first, "").unwrap();
+        assert!(matches!(
+            run.usable_checkpoint(),
+            Err(RunDirError::NoUsableCheckpoint { .. })
+        ));
     }
 }

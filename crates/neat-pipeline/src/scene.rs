@@ -11,6 +11,7 @@ use neat_core::{LoadOptions, Scene, SceneSphere, SphereChoice, load_scene};
 use neat_doctor::{Depth, ExamineOptions, Finding, Level, Repair, Verdict};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 /// A scene as a run needs it.
 #[derive(Clone, Debug)]
@@ -32,19 +33,21 @@ pub struct PreparedScene {
 /// Reads the scene in the folder `dir`, and detects its 2D wireframes if it has
 /// none. What `config` leaves to the background of the images is decided. `placed`
 /// is the sphere of an earlier part of the run, which stays; `cache`
-/// keeps what takes long for the next time.
+/// keeps what takes long for the next time; `cancelled` ends the detection.
 ///
 /// Without a configured radius the world is scaled so that the scene sphere has
 /// radius 1: every length of a configuration (β, grid, encoding) then means the
 /// same in a scene of millimetres and in one of metres.
 ///
 /// # Errors
-/// If the scene cannot be read, or no view has a segment.
+/// If the scene cannot be read, or no view has a segment;
+/// [`PipelineError::InterruptedIn`] after cancellation.
 pub fn prepare_scene(
     dir: &Path,
     config: &mut Config,
     placed: Option<&SceneSphere>,
     cache: Option<&FileCache>,
+    cancelled: &AtomicBool,
     on_event: OnEvent<'_>,
 ) -> Result<PreparedScene, PipelineError> {
     let detected = !dir.join(HAWP_DIR).is_dir();
@@ -60,7 +63,15 @@ pub fn prepare_scene(
     if detected {
         let (more, time) = timed(on_event, Stage::Detect, |on_event| {
             let min_score = config.data.min_segment_score;
-            detect_wireframes(&mut scene, dir, &config.detect, min_score, cache, on_event)
+            detect_wireframes(
+                &mut scene,
+                dir,
+                &config.detect,
+                min_score,
+                cache,
+                cancelled,
+                on_event,
+            )
         })?;
         seconds.insert(Stage::Detect, time);
         warnings.extend(more);
@@ -206,7 +217,14 @@ mod tests {
 
         let mut config = Preset::Fast.config();
         let read = |config: &Config| {
-            let prepared = prepare_scene(dir.path(), &mut config.clone(), None, None, &mut |_| {});
+            let prepared = prepare_scene(
+                dir.path(),
+                &mut config.clone(),
+                None,
+                None,
+                &AtomicBool::new(false),
+                &mut |_| {},
+            );
             prepared.unwrap().scene
         };
         let scaled = read(&config);
@@ -234,7 +252,9 @@ mod tests {
         write_scene(&scene, dir.path()).unwrap();
         let config = Preset::Fast.config();
         let read = |config: &Config, placed: Option<&SceneSphere>| {
-            prepare_scene(dir.path(), &mut config.clone(), placed, None, &mut |_| {}).unwrap()
+            let never = AtomicBool::new(false);
+            let config = &mut config.clone();
+            prepare_scene(dir.path(), config, placed, None, &never, &mut |_| {}).unwrap()
         };
         let first = read(&config, None);
         // The same sphere changes nothing, to the bit.

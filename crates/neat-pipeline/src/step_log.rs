@@ -61,6 +61,15 @@ impl<T: Serialize> StepLog<T> {
             .write_all(&line)
             .map_err(|error| write_error(&self.path, error).into())
     }
+
+    /// Brings the lines to the disk.
+    ///
+    /// # Errors
+    /// If the disk is full.
+    pub fn sync(&self) -> Result<(), RunDirError> {
+        let synced = self.file.sync_data();
+        synced.map_err(|error| write_error(&self.path, error).into())
+    }
 }
 
 /// The records of a log; lines that an interrupt cut off are passed over, and a

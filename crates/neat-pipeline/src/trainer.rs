@@ -20,12 +20,22 @@ use neat_sdf::{Distances, ImplicitNetwork};
 use neat_tensor::adam::Adam;
 use neat_tensor::checkpoint::Checkpoint;
 use neat_tensor::fused::is_fused;
-use neat_tensor::parameters::{ParameterError, load_parameters, named_parameters};
+use neat_tensor::parameters::{
+    ParameterError, gradients_are_finite, load_parameters, named_parameters,
+};
 use neat_tensor::random::{Purpose, stream};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
+
+/// Key of a checkpoint's metadata: [`Trainer::learning_rate_scale`].
+const LEARNING_RATE_SCALE: &str = "learning_rate_scale";
+
+/// Key of a checkpoint's metadata: [`Trainer::average_loss`].
+pub const AVERAGE_LOSS: &str = "average_loss";
+/// A step counts in the average loss with one of so many parts.
+const AVERAGED_STEPS: f64 = 50.0;
 
 /// Why training cannot start or go on.
 #[derive(Debug, thiserror::Error)]
@@ -39,14 +49,18 @@ pub enum TrainError {
     )]
     NoRegionPixel(f64),
     /// The loss is no number any more.
-    #[error(
-        "the loss became {value} in iteration {iteration}; resume from the last checkpoint with a lower train.learning_rate"
-    )]
-    NonFinite {
+    #[error("the loss became {value} in iteration {iteration}")]
+    NonFiniteLoss {
         /// The iteration.
         iteration: u64,
         /// The loss.
         value: f64,
+    },
+    /// A gradient is no number any more, although the loss is.
+    #[error("the gradient became infinite or no number in iteration {iteration}")]
+    NonFiniteGradient {
+        /// The iteration.
+        iteration: u64,
     },
     /// Junctions could not be matched.
     #[error("junctions could not be matched in iteration {iteration}: {source}")]
@@ -130,6 +144,10 @@ pub struct Trainer {
     adam: Adam,
     sampler: RaySampler,
     iteration: u64,
+    /// Factor on all learning rates: below 1 after a numerical failure.
+    learning_rate_scale: f64,
+    /// The loss, averaged over the last steps.
+    average_loss: Option<f64>,
     /// β of the last iteration.
     beta: f64,
     timings: StepTimings,
@@ -170,6 +188,22 @@ pub struct Probe {
     pub gradients: BTreeMap<String, TensorData>,
 }
 
+impl TrainError {
+    /// Whether a number became none: a lower learning rate may avoid it.
+    pub fn is_numerical(&self) -> bool {
+        // Costs that are no numbers cannot be assigned either.
+        matches!(
+            self,
+            Self::NonFiniteLoss { .. }
+                | Self::NonFiniteGradient { .. }
+                | Self::Assignment {
+                    source: AssignmentError::Cost { .. },
+                    ..
+                }
+        )
+    }
+}
+
 impl Trainer {
     /// Networks at their start and the scene prepared.
     ///
@@ -201,6 +235,8 @@ impl Trainer {
             scene_radius,
             model,
             iteration: 0,
+            learning_rate_scale: 1.0,
+            average_loss: None,
             timings: StepTimings::default(),
             rows: StepRows::default(),
         })
@@ -220,6 +256,9 @@ impl Trainer {
         let mut trainer = Self::new(scene, config, seed, device)?;
         trainer.iteration = metadata(&checkpoint, "iteration")?;
         trainer.beta = metadata(&checkpoint, "beta")?;
+        trainer.learning_rate_scale = metadata(&checkpoint, LEARNING_RATE_SCALE)?;
+        let average: f64 = metadata(&checkpoint, AVERAGE_LOSS)?;
+        trainer.average_loss = average.is_finite().then_some(average);
         let mut parameters = BTreeMap::new();
         let mut moments: BTreeMap<String, [Option<TensorData>; 2]> = BTreeMap::new();
         for (name, data) in checkpoint.tensors {
@@ -248,6 +287,21 @@ impl Trainer {
         Ok(trainer)
     }
 
+    /// Factor on all learning rates of the configuration.
+    pub fn learning_rate_scale(&self) -> f64 {
+        self.learning_rate_scale
+    }
+
+    /// Multiplies all learning rates by `factor` from now on.
+    pub fn scale_learning_rates(&mut self, factor: f64) {
+        self.learning_rate_scale *= factor;
+    }
+
+    /// The loss, averaged over the last steps; infinite before the first one.
+    pub fn average_loss(&self) -> f64 {
+        self.average_loss.unwrap_or(f64::INFINITY)
+    }
+
     /// Iterations done.
     pub fn iteration(&self) -> u64 {
         self.iteration
@@ -257,7 +311,7 @@ impl Trainer {
     /// the learning rate and an annealed β follow it.
     ///
     /// # Errors
-    /// If the loss is no number; the parameters are then as before.
+    /// If loss or gradient are no numbers; the parameters are then as before.
     pub fn step(&mut self, schedule: f64) -> Result<StepReport, TrainError> {
         // A device of its own has nothing to hand out.
         if !is_fused(&self.device) {
@@ -275,14 +329,20 @@ impl Trainer {
             ..
         } = self.gradients(schedule)?;
         if !losses.total.is_finite() {
-            return Err(TrainError::NonFinite {
+            return Err(TrainError::NonFiniteLoss {
                 iteration: self.iteration + 1,
                 value: losses.total,
             });
         }
+        if !gradients_are_finite(&self.model, &gradients) {
+            return Err(TrainError::NonFiniteGradient {
+                iteration: self.iteration + 1,
+            });
+        }
         let start = Instant::now();
         let train = &self.config.train;
-        let factor = learning_rate_factor(train, self.iteration, schedule);
+        let factor =
+            self.learning_rate_scale * learning_rate_factor(train, self.iteration, schedule);
         let networks = train.learning_rate * factor;
         let junctions = train.junction_learning_rate * factor;
         let rate = |name: &str| match name.starts_with("perceiver.") {
@@ -293,6 +353,8 @@ impl Trainer {
         self.model = self.adam.step(model, &mut gradients, rate);
         self.timings.optimiser = start.elapsed();
         self.iteration += 1;
+        let average = self.average_loss.unwrap_or(losses.total);
+        self.average_loss = Some(average + (losses.total - average) / AVERAGED_STEPS);
         Ok(StepReport {
             iteration: self.iteration,
             losses,
@@ -515,6 +577,8 @@ impl Trainer {
             ("seed", self.seed.to_string()),
             ("scene_radius", self.scene_radius.to_string()),
             ("beta", self.beta.to_string()),
+            (LEARNING_RATE_SCALE, self.learning_rate_scale.to_string()),
+            (AVERAGE_LOSS, self.average_loss().to_string()),
         ];
         checkpoint
             .metadata
@@ -598,6 +662,12 @@ fn validate(config: &Config) -> Result<(), TrainError> {
     }
     if train.steps == 0 {
         return refuse("train.steps must be positive");
+    }
+    if train.checkpoint_interval == 0 || train.kept_checkpoints == 0 {
+        return refuse("train.checkpoint_interval and kept_checkpoints must be positive");
+    }
+    if train.checkpoint_seconds.is_nan() || train.checkpoint_seconds <= 0.0 {
+        return refuse("train.checkpoint_seconds must be positive");
     }
     if config.model.perceiver.junctions == 0 || config.model.perceiver.width == 0 {
         return refuse("model.perceiver needs junctions and a width");

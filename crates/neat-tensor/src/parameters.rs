@@ -91,6 +91,34 @@ pub fn named_gradients<M: Module>(
     reader.values
 }
 
+struct GradientSums<'a> {
+    gradients: &'a GradientsParams,
+    sums: Vec<Tensor<1>>,
+}
+
+impl ModuleVisitor for GradientSums<'_> {
+    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
+        if let Some(gradient) = self.gradients.get::<D>(param.id) {
+            self.sums.push(gradient.sum());
+        }
+    }
+}
+
+/// Whether all gradients of a module's parameters are numbers. One value is read
+/// from the device: the sum of all, which no NaN and no infinity leaves finite.
+pub fn gradients_are_finite<M: Module>(module: &M, gradients: &GradientsParams) -> bool {
+    let mut visitor = GradientSums {
+        gradients,
+        sums: Vec::new(),
+    };
+    module.visit(&mut visitor);
+    if visitor.sums.is_empty() {
+        return true;
+    }
+    let total = Tensor::cat(visitor.sums, 0).sum().into_data();
+    total.iter::<f64>().all(f64::is_finite)
+}
+
 /// Why parameters could not be put into a module.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum ParameterError {

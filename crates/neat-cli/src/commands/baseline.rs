@@ -15,6 +15,7 @@ use neat_wireframe::ViewObservation;
 use neat_wireframe::export::{ExportError, WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::line_tracks::{Line3dConfig, line3d, wireframe_of_segments};
 use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Reconstruct with the method of somebody else, on the same 2D wireframes
@@ -79,6 +80,7 @@ impl Line3dArgs {
             &mut config,
             None,
             cache.as_ref(),
+            &AtomicBool::new(false),
             &mut |event| {
                 progress.show(event);
             },

@@ -14,6 +14,7 @@ use neat_pipeline::run_dir::RunDir;
 use neat_pipeline::scene::prepare_scene;
 use neat_tensor::Backend;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
 
 /// Enough to see the speed; losses of different backends drift apart later anyway.
 const DEFAULT_STEPS: u64 = 50;
@@ -72,6 +73,7 @@ impl CompareBackendsArgs {
             &mut config,
             None,
             cache.as_ref(),
+            &AtomicBool::new(false),
             &mut |event| {
                 progress.show(event);
             },

@@ -21,6 +21,7 @@ use neat_wireframe::edge_support::EdgeSupportConfig;
 use neat_wireframe::metrics::Matching;
 use neat_wireframe::supported_truth::{SupportedTruthConfig, supported_truth, without_curves};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 /// Measure a wireframe against the truth or a scanned surface, by a published protocol
 ///
@@ -338,7 +339,9 @@ impl EvalArgs {
     ) -> Result<EvaluationReport, CliError> {
         let mut config = Preset::default().config();
         let cache = self.cache.open();
-        let prepared = prepare_scene(scene, &mut config, None, cache.as_ref(), &mut |_| ())?;
+        let never = AtomicBool::new(false);
+        let cache = cache.as_ref();
+        let prepared = prepare_scene(scene, &mut config, None, cache, &never, &mut |_| ())?;
         let views = ViewObservation::from_scene(&prepared.scene, config.data.min_segment_score);
         let required = EdgeSupportConfig::default().required_views(views.len());
         let world_from_original = prepared.scene.original_from_world.inverse();

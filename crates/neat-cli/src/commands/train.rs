@@ -39,14 +39,15 @@ pub struct RunArgs {
     /// Replace an earlier run in that folder
     #[arg(long)]
     overwrite: bool,
-    /// Continue the run in that folder from its last checkpoint, with its configuration and seed
-    #[arg(long, conflicts_with_all = ["overwrite", "preset", "config", "seed", "SceneArgs"])]
+    /// Continue the run in that folder where it ended, however it ended, to the same result; begin
+    /// it if there is none. Other inputs or options than those it began with are refused
+    #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
     #[command(flatten)]
     method: MethodArgs,
-    /// Seed of all randomness
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
+    /// Seed of all randomness [default: 0]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
     #[command(flatten)]
     compute: ComputeArgs,
     /// Begin without a look at whether poses and images agree (see `neat doctor`)
@@ -61,17 +62,28 @@ pub struct RunArgs {
 impl RunArgs {
     /// The options of the run.
     pub fn options(&self) -> Result<RunOptions, CliError> {
-        let (existing, config, preset, seed) = if self.resume {
-            let run = RunDir::open(&self.out)?;
-            let manifest = run.manifest()?;
-            let config = self.method.apply(&run.config()?)?;
-            (Existing::Resume, config, manifest.preset, manifest.seed)
-        } else {
-            let existing = existing(self.overwrite);
-            let mut config = self.method.config()?;
-            config.data = self.scene_args.apply(config.data);
-            (existing, config, self.method.name(), self.seed)
+        let earlier = match self.resume {
+            true => RunDir::to_resume(&self.out)?,
+            false => None,
         };
+        let existing = match self.resume {
+            true => Existing::Resume,
+            false => existing(self.overwrite),
+        };
+        let (mut config, preset, seed) = match earlier {
+            Some(run) => {
+                let manifest = run.manifest()?;
+                // What is not said again stays; what is said has to be the same.
+                let config = match self.method.has_base() {
+                    true => self.method.config()?,
+                    false => self.method.apply(&run.config()?)?,
+                };
+                (config, manifest.preset, manifest.seed)
+            }
+            None => (self.method.config()?, self.method.name(), 0),
+        };
+        config.data = self.scene_args.apply(config.data);
+        let seed = self.seed.unwrap_or(seed);
         Ok(RunOptions {
             scene: self.scene.clone(),
             out: self.out.clone(),

@@ -3,21 +3,26 @@
 use super::Reconstruction;
 use super::session::Session;
 use crate::config::OverlayGround;
-use crate::distill::{Distilled, agreement, distill};
+use crate::distill::{Cancelled, Distilled, agreement, distill};
 use crate::error::PipelineError;
 use crate::event::{Event, Stage};
 use crate::field::TrainedField;
 use crate::image_io::write_png;
 use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe, spread_views};
 use neat_core::{Wireframe3d, file};
-use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
+use neat_wireframe::export::{WireframeDocument, read_json, write_json, write_obj, write_ply};
 use neat_wireframe::metrics::ImageEvidence;
 use rayon::prelude::*;
 use serde_json::json;
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The wireframe is drawn on so many photographs.
 const OVERLAYS: usize = 6;
+
+/// Keys of the metadata of `wireframe.json`.
+const REPORT: &str = "report";
+const AGREEMENT: &str = "agreement";
 
 const NO_EDGES: &str =
     "the wireframe has no edges: train longer, or look at the 2D wireframes of the scene";
@@ -30,8 +35,25 @@ impl Session<'_> {
         warnings.retain(|text| text != NO_EDGES && !text.starts_with(NO_REPORT));
     }
 
-    /// Takes the wireframe out of the field and writes it.
-    pub fn distill(&mut self, field: &TrainedField) -> Result<Reconstruction, PipelineError> {
+    /// The result that is on disk, where there is one that can be read.
+    pub fn earlier_result(&self) -> Option<Reconstruction> {
+        let document = read_json(&self.dir.wireframe("json")).ok()?;
+        let of = |key: &str| document.metadata.get(key).cloned().unwrap_or_default();
+        Some(Reconstruction {
+            run: self.dir.clone(),
+            wireframe: document.wireframe(),
+            agreement: serde_json::from_value(of(AGREEMENT)).ok()?,
+            report: of(REPORT),
+        })
+    }
+
+    /// Takes the wireframe out of the field and writes it, unless `cancelled` is set
+    /// before.
+    pub fn distill(
+        &mut self,
+        field: &TrainedField,
+        cancelled: &AtomicBool,
+    ) -> Result<Reconstruction, PipelineError> {
         let distilled = self.stage(Stage::Distill, |session| {
             let on_event = &mut *session.on_event;
             let mut progress = |fraction| {
@@ -39,6 +61,10 @@ impl Session<'_> {
                     stage: Stage::Distill,
                     fraction,
                 });
+                match cancelled.load(Ordering::Relaxed) {
+                    true => Err(Cancelled),
+                    false => Ok(()),
+                }
             };
             let (scene, config) = (&session.scene, &session.config);
             Ok(distill(scene, field, config, &mut progress)?)
@@ -126,8 +152,8 @@ impl Session<'_> {
             ("steps", json!(self.manifest.steps)),
             // `neat distill` may have chosen others than those of config.toml.
             ("distill", json!(self.config.distill)),
-            ("report", distilled.report.clone()),
-            ("agreement", json!(agreement)),
+            (REPORT, distilled.report.clone()),
+            (AGREEMENT, json!(agreement)),
         ]
         .map(|(key, value)| (key.to_owned(), value))
         .into()

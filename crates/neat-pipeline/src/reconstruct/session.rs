@@ -1,13 +1,15 @@
 //! A run in progress: its folder, its scene, and its manifest kept up to date.
 
 use super::RunOptions;
+use crate::changes::Belonging;
 use crate::config::Config;
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage, timed};
 use crate::field::TrainedField;
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
-use crate::run_dir::{Existing, RunDir};
+use crate::run_dir::{Existing, RunDir, RunDirError, RunLock};
 use crate::scene::{examine_quickly, prepare_scene};
+use crate::trainer::TrainError;
 use burn::tensor::Device;
 use neat_core::file_cache::FileCache;
 use neat_core::{Scene, SceneError, file, hawp_json};
@@ -15,6 +17,7 @@ use neat_tensor::Backend;
 use neat_tensor::backend::software_driver;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// A run in progress.
@@ -24,19 +27,35 @@ pub(super) struct Session<'a> {
     pub manifest: Manifest,
     pub scene: Scene,
     pub device: Device,
+    /// Rays per pass, where the device could not take as many as configured.
+    pub ray_chunk: Option<usize>,
+    /// Whether the run had ended when the session began.
+    pub finished: bool,
     pub on_event: OnEvent<'a>,
+    /// Keeps other processes out of the folder.
+    pub _lock: RunLock,
+}
+
+/// The part of a run that is on disk already.
+struct Earlier {
+    manifest: Manifest,
+    config: Config,
 }
 
 impl<'a> Session<'a> {
     /// Reads the scene, then makes the run folder with `config.toml` and a first
     /// `manifest.json`: bad input leaves no folder behind.
-    pub fn start(options: &RunOptions, on_event: OnEvent<'a>) -> Result<Self, PipelineError> {
+    pub fn start(
+        options: &RunOptions,
+        cancelled: &AtomicBool,
+        on_event: OnEvent<'a>,
+    ) -> Result<Self, PipelineError> {
         RunDir::check(&options.out, options.existing)?;
         // Once: looking for GPUs takes a while.
         let backend = options.backend.resolve();
         let device = backend.device()?;
         let earlier = match options.existing {
-            Existing::Resume => Some(RunDir::open(&options.out)?.manifest()?),
+            Existing::Resume => earlier(&options.out, on_event)?,
             Existing::Refuse | Existing::Overwrite => None,
         };
         let scene_dir = absolute(&options.scene)?;
@@ -46,12 +65,12 @@ impl<'a> Session<'a> {
             on_event(Event::Warning(warning.clone()));
         }
         let cache = options.cache.as_ref();
-        let placed = earlier.as_ref().and_then(|e| e.sphere.as_ref());
+        let placed = earlier.as_ref().and_then(|e| e.manifest.sphere.as_ref());
         let mut config = options.config.clone();
-        let prepared = prepare_scene(&scene_dir, &mut config, placed, cache, on_event)?;
+        let prepared = prepare_scene(&scene_dir, &mut config, placed, cache, cancelled, on_event)?;
         warnings.extend(prepared.warnings);
         let mut seconds = prepared.seconds;
-        if options.examine && options.existing != Existing::Resume {
+        if options.examine && earlier.is_none() {
             let (found, time) = timed(on_event, Stage::Examine, |on_event| {
                 examine_quickly(&prepared.scene, &config.data, on_event)
             })?;
@@ -59,16 +78,12 @@ impl<'a> Session<'a> {
             seconds.insert(Stage::Examine, time);
         }
         let inputs = hash_inputs(&scene_dir, &prepared.files)?;
-        if earlier.as_ref().is_some_and(|e| e.inputs != inputs) {
-            let warning = "the files of the scene have changed since the run began".to_owned();
-            on_event(Event::Warning(warning.clone()));
-            warnings.push(warning);
+        if cancelled.load(Ordering::Relaxed) {
+            return Err(PipelineError::InterruptedIn(Stage::Load));
         }
 
-        let dir = RunDir::create(&options.out, options.existing)?;
-        dir.write_config(&config)?;
         let now = utc_now();
-        let manifest = Manifest {
+        let mut manifest = Manifest {
             neat: env!("CARGO_PKG_VERSION").to_owned(),
             compiler: env!("NEAT_RUSTC").to_owned(),
             target: env!("NEAT_TARGET").to_owned(),
@@ -83,29 +98,72 @@ impl<'a> Session<'a> {
             inputs,
             warnings,
             status: Status::Running,
-            steps: earlier.as_ref().map_or(0, |e| e.steps),
-            started: earlier
-                .as_ref()
-                .map_or_else(|| now.clone(), |e| e.started.clone()),
+            steps: 0,
+            started: now.clone(),
             updated: now,
-            seconds: earlier.map_or_else(BTreeMap::new, |e| e.seconds),
+            seconds: BTreeMap::new(),
         };
+        let mut finished = false;
+        if let Some(Earlier {
+            manifest: before,
+            config: configured,
+        }) = &earlier
+        {
+            let now = Belonging::new(&config, &manifest)?;
+            let then = Belonging::new(configured, before)?;
+            then.refuse_changes(&now, &options.out)?;
+            refuse_other_state(&now, &options.out)?;
+            warn_of_other_programs(before, &mut manifest, on_event);
+            finished = before.status == Status::Finished;
+            manifest.steps = before.steps;
+            manifest.started.clone_from(&before.started);
+            manifest.seconds.clone_from(&before.seconds);
+            for warning in &before.warnings {
+                if !manifest.warnings.contains(warning) {
+                    manifest.warnings.push(warning.clone());
+                }
+            }
+        }
+        let (dir, lock) = RunDir::create(&options.out, options.existing)?;
         let mut session = Self {
             dir,
             config,
             manifest,
             scene: prepared.scene,
             device,
+            ray_chunk: None,
+            finished,
             on_event,
+            _lock: lock,
         };
         for (stage, seconds) in seconds {
             session.add_seconds(stage, seconds);
         }
-        session.write_manifest()?;
+        if finished {
+            return Ok(session);
+        }
+        session.set_damaged_aside()?;
+        session.dir.write_config(&session.config)?;
         if prepared.detected {
             session.write_detections()?;
         }
+        // The last of the three: now the folder holds a run.
+        session.write_manifest()?;
         Ok(session)
+    }
+
+    /// Renames checkpoints that cannot be read, so that they do not stand in the way
+    /// of those to come.
+    fn set_damaged_aside(&mut self) -> Result<(), PipelineError> {
+        let Some(usable) = self.dir.usable_checkpoint()? else {
+            return Ok(());
+        };
+        for (path, error) in usable.damaged {
+            self.dir.set_aside(&path)?;
+            let used = usable.path.display();
+            self.warn(&format!("{error}: {used} is used instead"));
+        }
+        Ok(())
     }
 
     /// Does the work of the run and records in the manifest how it ended.
@@ -116,7 +174,9 @@ impl<'a> Session<'a> {
         let result = work(&mut self);
         self.manifest.status = match &result {
             Ok(_) => Status::Finished,
-            Err(PipelineError::Interrupted { .. }) => Status::Interrupted,
+            Err(PipelineError::Interrupted { .. } | PipelineError::InterruptedIn(_)) => {
+                Status::Interrupted
+            }
             Err(_) => Status::Failed,
         };
         let recorded = self.write_manifest();
@@ -167,6 +227,44 @@ impl<'a> Session<'a> {
 
     fn add_seconds(&mut self, stage: Stage, seconds: f64) {
         *self.manifest.seconds.entry(stage).or_default() += seconds;
+    }
+}
+
+/// The run in `out` that can be continued.
+fn earlier(out: &Path, on_event: OnEvent<'_>) -> Result<Option<Earlier>, PipelineError> {
+    let Some(dir) = RunDir::to_resume(out)? else {
+        let note = format!("{} holds no run yet: it begins", out.display());
+        on_event(Event::Note(note));
+        return Ok(None);
+    };
+    Ok(Some(Earlier {
+        manifest: dir.manifest()?,
+        config: dir.config()?,
+    }))
+}
+
+/// Refuses the state in `out` if it belongs to something else than what is about to
+/// continue: `config.toml` may have been changed by hand.
+fn refuse_other_state(now: &Belonging, out: &Path) -> Result<(), PipelineError> {
+    let Some(usable) = RunDir::open(out)?.usable_checkpoint()? else {
+        return Ok(());
+    };
+    match Belonging::read_from(&usable.checkpoint.metadata) {
+        Some(then) => then.refuse_changes(now, out),
+        None => Err(TrainError::Checkpoint("config".to_owned()).into()),
+    }
+}
+
+/// The same bytes can be promised for the same program on the same backend only.
+fn warn_of_other_programs(before: &Manifest, now: &mut Manifest, on_event: OnEvent<'_>) {
+    let described = |m: &Manifest| format!("neat {} on {}", m.neat, m.backend);
+    let (then, with) = (described(before), described(now));
+    if then != with {
+        let warning = format!(
+            "the run began with {then} and continues with {with}: the result may differ in the last digits"
+        );
+        on_event(Event::Warning(warning.clone()));
+        now.warnings.push(warning);
     }
 }
 
@@ -227,9 +325,15 @@ fn read_run(
     let manifest = dir.manifest()?;
     let scene_dir = scene.unwrap_or(&manifest.scene);
     let placed = manifest.sphere.as_ref();
-    let prepared = prepare_scene(scene_dir, &mut config, placed, cache, on_event)?;
-    let checkpoint = dir.read_latest_checkpoint()?;
-    let field = TrainedField::load(&config, &checkpoint, &device)?;
+    let never = AtomicBool::new(false);
+    let prepared = prepare_scene(scene_dir, &mut config, placed, cache, &never, on_event)?;
+    let no_checkpoint = || RunDirError::NoCheckpoint(dir.root().into());
+    let usable = dir.usable_checkpoint()?.ok_or_else(no_checkpoint)?;
+    for (_, error) in &usable.damaged {
+        let used = usable.path.display();
+        on_event(Event::Warning(format!("{error}: {used} is used instead")));
+    }
+    let field = TrainedField::load(&config, &usable.checkpoint, &device)?;
     Ok(OpenedRun {
         dir,
         config,

@@ -1,14 +1,21 @@
-//! The training loop: budget, checkpoints, metrics and cancellation.
+//! The training loop: budget, checkpoints, metrics, cancellation, and what is done
+//! about numbers and devices that fail.
 
 use super::RunOptions;
+use super::device_failure::{self, Replacement};
 use super::session::Session;
+use crate::changes::Belonging;
 use crate::error::PipelineError;
 use crate::event::{Event, Stage};
 use crate::field::TrainedField;
-use crate::run_dir::Existing;
+use crate::manifest::Manifest;
+use crate::run_dir::{Existing, RunDir};
 use crate::step_log::{JunctionsLine, StepLog};
 use crate::trainer::Trainer;
 use nalgebra::Vector3;
+use neat_tensor::Backend;
+use neat_tensor::checkpoint::Checkpoint;
+use neat_tensor::fused::is_fused;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -42,21 +49,91 @@ impl Progress {
     }
 }
 
+/// A numerical failure lowers the learning rates by this factor …
+const LOWER_RATE: f64 = 0.3;
+/// … at most so often from one checkpoint.
+const MAX_TRIES: usize = 3;
+
 impl Session<'_> {
-    /// Trains until the steps or the time are used up, or `cancelled` is set.
+    /// Trains until the steps or the time are used up, or `cancelled` is set. Goes on
+    /// from the last checkpoint, where there is one.
     pub fn train(
         &mut self,
         options: &RunOptions,
         cancelled: &AtomicBool,
     ) -> Result<TrainedField, PipelineError> {
         (self.on_event)(Event::StageStarted(Stage::Train));
-        let mut trainer = self.trainer(options)?;
+        let field = loop {
+            // Only a GPU fails by itself; a panic on the CPU is our mistake.
+            if is_fused(&self.device) {
+                break self.train_here(options, cancelled)?;
+            }
+            match device_failure::catch(|| self.train_here(options, cancelled)) {
+                Ok(result) => break result?,
+                Err(reason) => self.replace_device(&reason, options)?,
+            }
+        };
+        let seconds = self.earlier_training_time().as_secs_f64();
+        let stage = Stage::Train;
+        (self.on_event)(Event::StageFinished { stage, seconds });
+        Ok(field)
+    }
+
+    /// Trains on the device of the session; after a numerical failure with lower
+    /// learning rates from the last checkpoint.
+    fn train_here(
+        &mut self,
+        options: &RunOptions,
+        cancelled: &AtomicBool,
+    ) -> Result<TrainedField, PipelineError> {
         let progress = Progress {
             steps: self.config.train.steps,
             budget: options.time_budget,
             before: self.earlier_training_time(),
             start: Instant::now(),
         };
+        let mut tries = 0;
+        let mut tried_from = 0;
+        loop {
+            let mut trainer = self.trainer(options)?;
+            let from = trainer.iteration();
+            // Another checkpoint has been reached since the last failure, and holds
+            // the rates that led there.
+            if from != tried_from {
+                (tries, tried_from) = (0, from);
+            }
+            trainer.scale_learning_rates(LOWER_RATE.powi(tries as i32));
+            let failure = match self.optimise(&mut trainer, &progress, cancelled) {
+                Ok(()) => return Ok(trainer.field()),
+                Err(PipelineError::Train(failure)) if failure.is_numerical() => failure,
+                Err(error) => return Err(error),
+            };
+            if tries == MAX_TRIES {
+                return Err(PipelineError::Diverged {
+                    tries,
+                    dump: self.dump(&trainer)?,
+                    source: failure,
+                });
+            }
+            tries += 1;
+            let from = self.dir.usable_checkpoint()?;
+            let from = from.map_or("the beginning".to_owned(), |usable| {
+                let name = usable.path.file_name().unwrap_or_default();
+                name.to_string_lossy().into_owned()
+            });
+            self.warn(&format!(
+                "{failure}: training goes on from {from} with {LOWER_RATE} of the learning rates"
+            ));
+        }
+    }
+
+    /// Steps until the steps or the time are used up.
+    fn optimise(
+        &mut self,
+        trainer: &mut Trainer,
+        progress: &Progress,
+        cancelled: &AtomicBool,
+    ) -> Result<(), PipelineError> {
         let mut metrics = StepLog::open(&self.dir.metrics(), trainer.iteration())?;
         let mut junctions = StepLog::open(&self.dir.junctions(), trainer.iteration())?;
         let mut fraction = progress.fraction(trainer.iteration());
@@ -64,9 +141,13 @@ impl Session<'_> {
             0 => 0.0,
             _ => (fraction * JUNCTION_SNAPSHOTS).floor() + 1.0,
         };
+        let interval = self.config.train.checkpoint_interval;
+        let mut saved = Instant::now();
         while fraction < 1.0 {
             if cancelled.load(Ordering::Relaxed) {
-                let checkpoint = self.save(&trainer, &progress)?;
+                metrics.sync()?;
+                junctions.sync()?;
+                let checkpoint = self.save(trainer, progress)?;
                 return Err(PipelineError::Interrupted {
                     step: trainer.iteration(),
                     checkpoint,
@@ -83,32 +164,73 @@ impl Session<'_> {
                 metrics.append(&report)?;
             }
             if fraction * JUNCTION_SNAPSHOTS >= snapshots {
-                junctions.append(&self.junctions_line(&trainer))?;
+                junctions.append(&self.junctions_line(trainer))?;
                 snapshots = (fraction * JUNCTION_SNAPSHOTS).floor() + 1.0;
             }
-            let interval = self.config.train.checkpoint_interval.max(1);
-            if fraction >= 1.0 || iteration.is_multiple_of(interval) {
-                self.save(&trainer, &progress)?;
+            let late = saved.elapsed().as_secs_f64() > self.config.train.checkpoint_seconds;
+            if fraction >= 1.0 || late || iteration.is_multiple_of(interval) {
+                // A checkpoint never knows more than the logs beside it.
+                metrics.sync()?;
+                junctions.sync()?;
+                self.save(trainer, progress)?;
+                saved = Instant::now();
             }
         }
-        (self.on_event)(Event::StageFinished {
-            stage: Stage::Train,
-            seconds: progress.elapsed().as_secs_f64(),
-        });
-        Ok(trainer.field())
+        Ok(())
     }
 
-    /// A new trainer, or one that continues from the last checkpoint.
+    /// A trainer that continues from the last checkpoint, or a new one.
     fn trainer(&self, options: &RunOptions) -> Result<Trainer, PipelineError> {
-        let (scene, config, device) = (&self.scene, &self.config, &self.device);
-        let seed = options.seed;
-        Ok(match options.existing {
-            Existing::Resume => {
-                let checkpoint = self.dir.read_latest_checkpoint()?;
-                Trainer::resume(scene, config, seed, device, checkpoint)?
-            }
-            Existing::Refuse | Existing::Overwrite => Trainer::new(scene, config, seed, device)?,
+        let mut config = self.config.clone();
+        if let Some(chunk) = self.ray_chunk {
+            config.train.ray_chunk = Some(chunk);
+        }
+        let (scene, device, seed) = (&self.scene, &self.device, options.seed);
+        Ok(match self.dir.usable_checkpoint()? {
+            Some(usable) => Trainer::resume(scene, &config, seed, device, usable.checkpoint)?,
+            None => Trainer::new(scene, &config, seed, device)?,
         })
+    }
+
+    /// Takes less memory, or another device, after the device has failed.
+    fn replace_device(&mut self, reason: &str, options: &RunOptions) -> Result<(), PipelineError> {
+        let train = &self.config.train;
+        let chunk = self.ray_chunk.or(train.ray_chunk).unwrap_or(train.rays);
+        // Who asked for one backend by name gets that one or none.
+        let cpu_allowed = options.backend == Backend::Auto;
+        let what = match Replacement::after(chunk, train.rays, cpu_allowed) {
+            Replacement::SmallerChunks(smaller) => {
+                self.ray_chunk = Some(smaller);
+                format!("{smaller} rays at once")
+            }
+            Replacement::Cpu => {
+                self.device = Backend::Flex.device()?;
+                self.ray_chunk = None;
+                self.manifest.backend = Backend::Flex.to_string();
+                "the CPU".to_owned()
+            }
+            Replacement::None => {
+                let reason = reason.to_owned();
+                return Err(PipelineError::DeviceFailed { reason });
+            }
+        };
+        self.warn(&format!(
+            "the device failed ({reason}): training goes on from the last checkpoint with {what}"
+        ));
+        Ok(())
+    }
+
+    /// Leaves the folder of a run whose next step fails as this one's did.
+    fn dump(&self, trainer: &Trainer) -> Result<PathBuf, PipelineError> {
+        let path = self.dir.failure();
+        let (dump, _lock) = RunDir::create(&path, Existing::Overwrite)?;
+        dump.write_config(&self.config)?;
+        dump.write_checkpoint(trainer.iteration(), &self.checkpoint(trainer)?, 1)?;
+        dump.write_manifest(&Manifest {
+            steps: trainer.iteration(),
+            ..self.manifest.clone()
+        })?;
+        Ok(path)
     }
 
     /// The global junctions, in the frame of the user's files.
@@ -130,16 +252,24 @@ impl Session<'_> {
         Duration::try_from_secs_f64(*seconds.unwrap_or(&0.0)).unwrap_or_default()
     }
 
+    /// The trainer's state, with what it belongs to.
+    fn checkpoint(&self, trainer: &Trainer) -> Result<Checkpoint, PipelineError> {
+        let mut checkpoint = trainer.checkpoint();
+        let of = Belonging::new(&self.config, &self.manifest)?;
+        of.write_into(&mut checkpoint.metadata);
+        Ok(checkpoint)
+    }
+
     /// Writes a checkpoint, and the manifest that says how far the run is.
     fn save(&mut self, trainer: &Trainer, progress: &Progress) -> Result<PathBuf, PipelineError> {
-        let checkpoint = self
-            .dir
-            .write_checkpoint(trainer.iteration(), &trainer.checkpoint())?;
+        let checkpoint = self.checkpoint(trainer)?;
+        let kept = self.config.train.kept_checkpoints;
+        let path = (self.dir).write_checkpoint(trainer.iteration(), &checkpoint, kept)?;
         self.manifest.steps = trainer.iteration();
         let seconds = progress.elapsed().as_secs_f64();
         self.manifest.seconds.insert(Stage::Train, seconds);
         self.write_manifest()?;
-        Ok(checkpoint)
+        Ok(path)
     }
 }
 
