@@ -65,6 +65,16 @@ pub enum BatchError {
         /// What it would be in the way of.
         reason: &'static str,
     },
+    /// A file system without locks.
+    #[error(
+        "{path} cannot be locked: choose a folder on a file system with locks (Lustre needs the mount option `flock`)"
+    )]
+    NoLock {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// A shard that does not exist.
     #[error(transparent)]
     Shard(#[from] ShardError),

@@ -70,17 +70,16 @@ impl JobFolder {
     pub fn lock(&self) -> Result<Option<JobLock>, BatchError> {
         file::create_dir(&self.root)?;
         let path = self.root.join("lock");
-        let write_error = |source| SceneError::Write {
-            path: path.clone(),
-            source,
-        };
         let mut open = OpenOptions::new();
         open.read(true).write(true).create(true).truncate(false);
-        let file = open.open(&path).map_err(write_error)?;
+        let file = open.open(&path).map_err(|source| SceneError::Write {
+            path: path.clone(),
+            source,
+        })?;
         match file.try_lock() {
             Ok(()) => Ok(Some(JobLock { file })),
             Err(TryLockError::WouldBlock) => Ok(None),
-            Err(TryLockError::Error(source)) => Err(write_error(source).into()),
+            Err(TryLockError::Error(source)) => Err(BatchError::NoLock { path, source }),
         }
     }
 
@@ -134,9 +133,9 @@ impl JobFolder {
         }
     }
 
-    /// Whether a run has left something.
+    /// Whether a run has begun: its manifest is the first file that it writes.
     fn has_run(&self) -> bool {
-        fs::read_dir(self.run()).is_ok_and(|mut entries| entries.next().is_some())
+        self.run().join("manifest.json").is_file()
     }
 
     /// Removes the run.
@@ -200,7 +199,7 @@ mod tests {
         record.state = JobState::Finished;
         // Something was lost since.
         assert_eq!(folder.plan(&job, Some(&record)), Plan::Begin);
-        fs::write(folder.run().join("config.toml"), "").unwrap();
+        fs::write(folder.run().join("manifest.json"), "{}").unwrap();
         assert_eq!(folder.plan(&job, Some(&record)), Plan::Continue);
         fs::write(folder.wireframe(), "{}").unwrap();
         assert_eq!(folder.plan(&job, Some(&record)), Plan::Finished);

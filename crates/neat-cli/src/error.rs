@@ -20,9 +20,6 @@ const BAD_INPUT: u8 = 2;
 /// Exit code after Ctrl-C, by the convention of shells: 128 + SIGINT.
 pub const INTERRUPTED: u8 = 130;
 
-/// How to continue what continues by itself.
-const AGAIN: &str = "give the same command again to continue";
-
 /// Why a command did not do what was asked for.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
@@ -146,8 +143,8 @@ impl CliError {
     fn hint(&self) -> Option<&'static str> {
         match self {
             Self::Resumable(_) => Some("give the same command with --resume to continue"),
-            Self::Pipeline(PipelineError::AblationInterrupted { .. }) => Some(AGAIN),
-            Self::BatchInterrupted { .. } => Some(AGAIN),
+            Self::Pipeline(PipelineError::AblationInterrupted { .. })
+            | Self::BatchInterrupted { .. } => Some("give the same command again to continue"),
             _ => None,
         }
     }
