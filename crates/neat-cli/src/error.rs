@@ -1,6 +1,7 @@
 //! What ends a command early, and the exit code that tells scripts.
 
 use crate::output;
+use neat_batch::BatchError;
 use neat_core::SceneError;
 use neat_core::synthetic::SyntheticError;
 use neat_eval::EvalError;
@@ -35,6 +36,23 @@ pub enum CliError {
         failed: usize,
         /// … of so many.
         all: usize,
+    },
+    /// A batch that cannot be done as asked for.
+    #[error(transparent)]
+    Batch(#[from] BatchError),
+    /// Jobs of a batch without a result.
+    #[error("{unfinished} of {all} jobs are not finished: the summary says why")]
+    JobsUnfinished {
+        /// So many are not …
+        unfinished: usize,
+        /// … of so many.
+        all: usize,
+    },
+    /// A batch that a person or a cluster stopped.
+    #[error("interrupted with {unfinished} jobs to go")]
+    BatchInterrupted {
+        /// So many are not finished.
+        unfinished: usize,
     },
     /// A `--set` that does not apply.
     #[error(transparent)]
@@ -125,9 +143,8 @@ impl CliError {
     fn hint(&self) -> Option<&'static str> {
         match self {
             Self::Resumable(_) => Some("give the same command with --resume to continue"),
-            Self::Pipeline(PipelineError::AblationInterrupted { .. }) => {
-                Some("give the same command again to continue")
-            }
+            Self::Pipeline(PipelineError::AblationInterrupted { .. })
+            | Self::BatchInterrupted { .. } => Some("give the same command again to continue"),
             _ => None,
         }
     }
@@ -135,6 +152,7 @@ impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Resumable(_)
+            | Self::BatchInterrupted { .. }
             | Self::Pipeline(
                 PipelineError::Interrupted { .. }
                 | PipelineError::InterruptedIn(_)
@@ -147,6 +165,7 @@ impl CliError {
             | Self::Threads(_)
             | Self::NotReady => BAD_INPUT,
             Self::Export(error) if error.is_bad_input() => BAD_INPUT,
+            Self::Batch(error) if error.is_bad_input() => BAD_INPUT,
             // `neat info SCENE | head` is no failure.
             Self::Output(_) if self.is_closed_pipe() => 0,
             _ => FAILED,

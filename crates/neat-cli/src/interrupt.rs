@@ -6,6 +6,16 @@ use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+/// A flag that every Ctrl-C, or request to terminate, sets, for a command that clears
+/// it and decides itself what the second one means.
+pub fn repeated_flag() -> Result<Arc<AtomicBool>, CliError> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        flag::register(signal, Arc::clone(&interrupted)).map_err(CliError::Interrupt)?;
+    }
+    Ok(interrupted)
+}
+
 /// A flag that the first Ctrl-C, or a request to terminate, sets.
 pub fn flag() -> Result<Arc<AtomicBool>, CliError> {
     let interrupted = Arc::new(AtomicBool::new(false));

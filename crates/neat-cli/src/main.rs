@@ -1,6 +1,7 @@
 //! `neat`: posed photographs in, 3D wireframes out.
 
 mod arguments;
+mod batch_progress;
 mod cache;
 mod commands;
 mod duration;

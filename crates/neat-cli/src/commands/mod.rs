@@ -2,6 +2,7 @@
 
 mod ablate;
 mod baseline;
+mod batch;
 mod bench;
 mod compare_backends;
 mod convert;
@@ -25,6 +26,7 @@ use clap::Subcommand;
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Reconstruct(reconstruct::ReconstructArgs),
+    Batch(batch::BatchArgs),
     Train(train::TrainArgs),
     Distill(distill::DistillArgs),
     View(view::ViewArgs),
@@ -48,6 +50,7 @@ impl Command {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         match self {
             Self::Reconstruct(args) => args.run(quiet),
+            Self::Batch(args) => args.run(quiet),
             Self::Train(args) => args.run(quiet),
             Self::Distill(args) => args.run(quiet),
             Self::View(args) => args.run(),

@@ -1,0 +1,177 @@
+//! A whole batch: workers that take jobs from one queue.
+
+use crate::batch::Batch;
+use crate::error::BatchError;
+use crate::job::Job;
+use crate::queue::Queue;
+use crate::retry::Retry;
+use crate::stop::StopSwitch;
+use crate::worker::Worker;
+use neat_core::{SceneError, file};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::channel;
+use std::thread;
+use std::time::Duration;
+
+/// How a batch is run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BatchOptions {
+    /// The program, `neat`. It is given the arguments of [`Job::command_line`] and
+    /// `--threads N`. Exit codes: 0 done, 2 bad input, 130 interrupted, others failed.
+    pub program: PathBuf,
+    /// So many jobs run at a time.
+    pub workers: NonZeroUsize,
+    /// CPU threads, which the workers share. A job with a `--threads` of its own is
+    /// left alone.
+    pub threads: NonZeroUsize,
+    /// How often failures are tried again.
+    pub retry: Retry,
+    /// Remove the run of a job that has other arguments now, and begin it anew;
+    /// otherwise such a job fails, and its run is untouched.
+    pub restart_changed: bool,
+}
+
+impl BatchOptions {
+    /// One job at a time on all CPU threads: what is fastest for large scenes, and
+    /// for any on one GPU.
+    pub fn new(program: impl Into<PathBuf>) -> Self {
+        Self {
+            program: program.into(),
+            workers: NonZeroUsize::MIN,
+            threads: thread::available_parallelism().unwrap_or(NonZeroUsize::MIN),
+            retry: Retry::default(),
+            restart_changed: false,
+        }
+    }
+}
+
+/// What happens to a job.
+#[derive(Clone, Debug, PartialEq)]
+pub enum JobEvent {
+    /// It was finished before.
+    Skipped,
+    /// Another process works on it; it is looked at again until that has ended.
+    Waiting,
+    /// An attempt begins.
+    Started {
+        /// Which one, from 1, over all batches so far.
+        attempt: usize,
+        /// The worker that runs it, from 0.
+        worker: usize,
+    },
+    /// The program said something.
+    Progress {
+        /// Its last line.
+        line: String,
+    },
+    /// An attempt failed, and there will be another.
+    Retrying {
+        /// How it failed.
+        reason: String,
+        /// When the next one comes.
+        pause: Duration,
+    },
+    /// Its results are on disk.
+    Finished {
+        /// The time of all attempts.
+        seconds: f64,
+    },
+    /// It is given up.
+    Failed {
+        /// Why.
+        reason: String,
+    },
+    /// It was stopped; the next batch goes on with it.
+    Interrupted,
+}
+
+/// How many jobs came to which end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BatchEnd {
+    /// Finished now.
+    pub finished: usize,
+    /// Finished before.
+    pub skipped: usize,
+    /// Given up.
+    pub failed: usize,
+    /// Stopped, or not begun with before the batch was stopped.
+    pub unfinished: usize,
+}
+
+/// Runs all jobs of a batch that are not finished in `out`, and tells `on_event` what
+/// happens to them, on the thread of the caller.
+///
+/// A job that fails, whatever the reason, does not keep others from running: see
+/// [`BatchEnd`] and the [`JobRecord`]s.
+///
+/// # Errors
+/// If `out` cannot be created.
+pub fn run(
+    batch: &Batch,
+    out: &Path,
+    options: &BatchOptions,
+    stop: &StopSwitch,
+    on_event: &mut dyn FnMut(&Job, JobEvent),
+) -> Result<BatchEnd, BatchError> {
+    file::create_dir(out)?;
+    let out = std::path::absolute(out).map_err(|source| SceneError::Read {
+        path: out.into(),
+        source,
+    })?;
+    let jobs = batch.jobs();
+    let queue = Queue::new(jobs.len());
+    let workers = options.workers.get().min(jobs.len());
+    let mut end = BatchEnd::default();
+    thread::scope(|scope| {
+        let (events, received) = channel();
+        for number in 0..workers {
+            let worker = Worker {
+                number,
+                threads: share(options.threads.get(), workers, number),
+                jobs,
+                out: &out,
+                options,
+                stop,
+                events: events.clone(),
+            };
+            let queue = &queue;
+            scope.spawn(move || worker.work(queue));
+        }
+        drop(events);
+        for (position, event) in received {
+            match &event {
+                JobEvent::Finished { .. } => end.finished += 1,
+                JobEvent::Skipped => end.skipped += 1,
+                JobEvent::Failed { .. } => end.failed += 1,
+                _ => {}
+            }
+            on_event(&jobs[position], event);
+        }
+    });
+    end.unfinished = jobs.len() - end.finished - end.skipped - end.failed;
+    Ok(end)
+}
+
+/// The threads of a worker: those of the machine, spread evenly, one at least.
+fn share(threads: usize, workers: usize, number: usize) -> usize {
+    let remainder = usize::from(number < threads % workers);
+    (threads / workers + remainder).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn workers_share_all_threads() {
+        let shares = |threads, workers| -> Vec<usize> {
+            (0..workers)
+                .map(|number| share(threads, workers, number))
+                .collect()
+        };
+        assert_eq!(shares(8, 3), [3, 3, 2]);
+        assert_eq!(shares(2, 2), [1, 1]);
+        assert_eq!(shares(1, 3), [1, 1, 1]);
+    }
+}
