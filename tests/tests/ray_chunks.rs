@@ -1,6 +1,8 @@
 //! A batch taken in several passes gives the gradients of the batch.
 
+use neat_core::SparsePoint;
 use neat_core::synthetic::{SyntheticScene, generate};
+use neat_gjp::JunctionCount;
 use neat_pipeline::config::Config;
 use neat_pipeline::preset::Preset;
 use neat_pipeline::trainer::Trainer;
@@ -13,17 +15,24 @@ fn train(
     chunk: Option<usize>,
     device: &burn::tensor::Device,
 ) -> (Vec<f64>, Vec<f64>) {
-    let scene = generate(&SyntheticScene {
+    let synthetic = generate(&SyntheticScene {
         views: 4,
         image_size: 96,
         ..SyntheticScene::default()
     })
-    .expect("a valid scene")
-    .scene;
+    .expect("a valid scene");
+    let mut scene = synthetic.scene;
+    scene.sparse_points = (synthetic.truth.junctions.iter())
+        .map(|junction| SparsePoint {
+            position_in_world: *junction,
+            observations: Vec::new(),
+        })
+        .collect();
     let mut config = config.clone();
     config.train.ray_chunk = chunk;
     let mut trainer = Trainer::new(&scene, &config, 0, device).expect("it trains");
     let step = trainer.step(0.1).expect("a step").losses;
+    assert!(step.points > 0.0, "the term of sparse points is taken");
     let losses = vec![
         step.total,
         step.rgb,
@@ -32,6 +41,7 @@ fn train(
         step.segment,
         step.junction_3d,
         step.junction_2d,
+        step.points,
     ];
     let parameters = trainer.checkpoint().tensors;
     let parameters = parameters
@@ -70,11 +80,13 @@ fn of_a_small_paper_preset() {
     let mut config = Preset::PaperAbc.config();
     config.train.rays = 48;
     config.train.loss.mask = 0.1;
+    config.train.loss.points = 0.5;
+    config.train.surface_points = 40;
     config.model.implicit.width = 64;
     config.model.implicit.features = 16;
     config.model.rendering.width = 32;
     config.model.attraction.width = 32;
-    config.model.perceiver.junctions = 32;
+    config.model.perceiver.junctions = JunctionCount::Fixed(32);
     if let neat_sdf::RaySamplerConfig::ErrorBound(sampler) = &mut config.train.sampler {
         sampler.samples = 16;
         sampler.samples_per_iteration = 32;

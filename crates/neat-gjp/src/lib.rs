@@ -10,4 +10,4 @@ pub mod junction_loss;
 pub mod perceiver;
 
 pub use candidates::{CandidateConfig, MatchingConfig};
-pub use perceiver::{JunctionPerceiver, PerceiverConfig};
+pub use perceiver::{JunctionCount, JunctionPerceiver, PerceiverConfig};

@@ -7,12 +7,43 @@ use neat_tensor::random::standard_normal;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
+/// How many global junctions there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "a number of junctions, or \"auto\"")]
+pub enum JunctionCount {
+    /// So many.
+    Fixed(usize),
+    /// As many as the 2D wireframes of a scene ask for.
+    FromData(FromData),
+}
+
+/// The word for a number that the data decide.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FromData {
+    /// `"auto"`.
+    #[serde(rename = "auto")]
+    Auto,
+}
+
+impl JunctionCount {
+    /// `"auto"`.
+    pub const AUTO: Self = Self::FromData(FromData::Auto);
+
+    /// The number; `None` while it is not decided.
+    pub fn fixed(self) -> Option<usize> {
+        match self {
+            Self::Fixed(count) => Some(count),
+            Self::FromData(FromData::Auto) => None,
+        }
+    }
+}
+
 /// Number and width of the latents.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PerceiverConfig {
     /// Number of global junctions `N`.
-    pub junctions: usize,
+    pub junctions: JunctionCount,
     /// Width of each latent and of the decoder's two hidden layers.
     pub width: usize,
 }
@@ -21,7 +52,7 @@ impl Default for PerceiverConfig {
     /// As published for ABC: 64 junctions, 256 wide.
     fn default() -> Self {
         Self {
-            junctions: 64,
+            junctions: JunctionCount::Fixed(64),
             width: 256,
         }
     }
@@ -38,16 +69,19 @@ pub struct JunctionPerceiver {
 
 impl PerceiverConfig {
     /// Random latents and decoder.
+    ///
+    /// # Panics
+    /// If the number of junctions is not decided; configurations are validated
+    /// before.
     pub fn init(&self, rng: &mut impl Rng, device: &Device) -> JunctionPerceiver {
-        let latents: Vec<f32> = (0..self.junctions * self.width)
+        let junctions = (self.junctions.fixed())
+            .expect("PerceiverConfig::init: the number of junctions is decided");
+        let latents: Vec<f32> = (0..junctions * self.width)
             .map(|_| standard_normal(rng) as f32)
             .collect();
         let widths = [self.width, self.width, self.width, 3];
         JunctionPerceiver {
-            latents: Param::from_data(
-                TensorData::new(latents, [self.junctions, self.width]),
-                device,
-            ),
+            latents: Param::from_data(TensorData::new(latents, [junctions, self.width]), device),
             decoder: ReluMlp::new(&widths, false, rng, device),
         }
     }
@@ -57,5 +91,27 @@ impl JunctionPerceiver {
     /// The global junctions `[N, 3]` in the world.
     pub fn junctions(&self) -> Tensor<2> {
         self.decoder.forward(self.latents.val())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_junctions_is_a_number_or_auto() {
+        let parse = |text: &str| toml::from_str::<PerceiverConfig>(text);
+        let fixed = parse("junctions = 24").unwrap();
+        assert_eq!(fixed.junctions.fixed(), Some(24));
+        let auto = parse(r#"junctions = "auto""#).unwrap();
+        assert_eq!(auto.junctions, JunctionCount::AUTO);
+        assert_eq!(auto.junctions.fixed(), None);
+        for config in [fixed, auto] {
+            let text = toml::to_string(&config).unwrap();
+            assert_eq!(parse(&text).unwrap(), config);
+        }
+        let error = parse(r#"junctions = "many""#).unwrap_err().to_string();
+        assert!(error.contains("\"auto\""), "{error}");
+        assert!(parse("junctions = -1").is_err());
     }
 }

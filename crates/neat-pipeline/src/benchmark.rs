@@ -5,6 +5,7 @@
 
 use crate::config::ModelConfig;
 use crate::flops::{StepFlops, StepRows};
+use crate::latents::fit_latents;
 use crate::model::host_vec;
 use crate::preset::Preset;
 use crate::scene::scaled_for;
@@ -143,8 +144,9 @@ pub fn benchmark(
             let done = (i as f64 + fraction) / presets.len() as f64;
             progress(&format!("{preset}: {step}"), done);
         };
-        let config = preset.config();
+        let mut config = preset.config();
         let scene = scaled_for(&config.data, views.clone());
+        fit_latents(&mut config, &scene);
         let mut trainer = Trainer::new(&scene, &config, 0, device)?;
         let mut run = Run::default();
         warm_up(&mut trainer, backend, &mut progress)?;
@@ -443,6 +445,7 @@ mod tests {
             config.train.rays = 8;
             config.train.eikonal.uniform_points = Some(8);
             let scene = scaled_for(&config.data, views.clone());
+            fit_latents(&mut config, &scene);
             let mut trainer = Trainer::new(&scene, &config, 0, &Device::flex()).unwrap();
             trainer.step(SCHEDULE).unwrap();
             let rows = trainer.rows();

@@ -10,7 +10,7 @@ use crate::config::TrainConfig;
 use crate::flops::StepRows;
 use crate::losses::{
     Losses, RayTerms, RenderedSegments, StepInput, compared_rays, compared_with_observed,
-    eikonal_rows, junction_terms, ray_terms, render_batch, segment_gradient,
+    eikonal_rows, junction_terms, point_term, ray_terms, render_batch, segment_gradient,
 };
 use crate::model::{NeatModel, host_vec};
 use crate::training_data::Batch;
@@ -145,6 +145,11 @@ pub(crate) fn chunked_step(
         }
     }
 
+    if let Some(points) = point_term(model, input, device) {
+        losses.points = f64::from(host_vec(points.clone())[0]);
+        add(points.mul_scalar(config.loss.points));
+    }
+
     let mut rows = StepRows::default();
     let mut first_end = 0;
     for (i, range) in ranges.iter().enumerate() {
@@ -184,7 +189,8 @@ pub(crate) fn chunked_step(
         + weights.mask * losses.mask
         + weights.segment * losses.segment
         + weights.junction_3d * losses.junction_3d
-        + weights.junction_2d * losses.junction_2d;
+        + weights.junction_2d * losses.junction_2d
+        + weights.points * losses.points;
     Ok(StepGradients {
         losses,
         segment_errors: compared.error_in_pixels,

@@ -125,6 +125,10 @@ pub struct TrainConfig {
     pub min_sample_weight: Option<f64>,
     /// The eikonal points.
     pub eikonal: EikonalConfig,
+    /// Sparse points of the scene per iteration at which the distance should be 0;
+    /// a scene without sparse points has no such term.
+    #[serde(default)]
+    pub surface_points: usize,
     /// Weights of the loss terms.
     pub loss: LossConfig,
     /// How rendered end points become targets of the global junctions.
@@ -194,6 +198,9 @@ pub struct LossConfig {
     pub junction_3d: f64,
     /// Distance of their projections (calibrated).
     pub junction_2d: f64,
+    /// Distance of the surface from sparse points of the scene, in the world.
+    #[serde(default)]
+    pub points: f64,
     /// Rays whose segment misses its 2D segment by this many pixels or more do
     /// not count.
     pub segment_cutoff_in_pixels: f64,

@@ -13,7 +13,7 @@ use neat_field::segment_loss::{SegmentLossConfig, segment_loss};
 use neat_field::segment_rendering::{RayCameras, project_calibrated};
 use neat_gjp::candidates::{JunctionView, RenderedSegment, matching_cost};
 use neat_gjp::junction_loss::{JunctionLoss, MatchedJunctions, junction_loss};
-use neat_sdf::losses::{eikonal_loss, mask_loss, rgb_loss};
+use neat_sdf::losses::{eikonal_loss, mask_loss, point_loss, rgb_loss};
 use neat_sdf::{Distances, RaySamples};
 use neat_tensor::fused::is_fused;
 use serde::{Deserialize, Serialize};
@@ -36,6 +36,9 @@ pub struct Losses {
     pub junction_3d: f64,
     /// Junctions in the image, calibrated.
     pub junction_2d: f64,
+    /// Distance of the surface from sparse points.
+    #[serde(default)]
+    pub points: f64,
 }
 
 /// Everything random or observed of one iteration: with it the loss is a plain
@@ -50,6 +53,8 @@ pub struct StepInput<'a> {
     pub distances: &'a Distances,
     /// Points of the eikonal term besides rendered samples.
     pub eikonal_points: &'a [[f32; 3]],
+    /// Points that should lie on the surface.
+    pub surface_points: &'a [[f32; 3]],
     /// The views that [`Batch::view_of_ray`] speaks of: camera and 2D junctions.
     pub views: &'a [JunctionView<'a>],
     /// Whether the junction terms are due.
@@ -61,7 +66,7 @@ pub struct StepInput<'a> {
 pub struct StepLoss {
     /// The weighted sum, `[1]`.
     pub total: Tensor<1>,
-    /// `total`, then the terms in the order of [`Losses`], `[7]`, without gradient.
+    /// `total`, then the terms in the order of [`Losses`], `[8]`, without gradient.
     pub terms: Tensor<1>,
     /// Rendered colour `[R, 3]`, without gradient.
     pub color: Tensor<2>,
@@ -171,7 +176,8 @@ pub(crate) fn ray_terms(
         gradients.push(model.implicit_network.gradient_uncapped(points));
     }
     if config.eikonal.rendered_samples {
-        gradients.push(rendering.gradients);
+        // The bounding sphere has a slope of its own, which nothing can change.
+        gradients.push(rendering.gradients_uncapped);
     }
     let eikonal = match gradients.is_empty() {
         true => zero(),
@@ -193,6 +199,20 @@ pub(crate) fn ray_terms(
         segments,
         rows,
     }
+}
+
+/// Mean distance of the surface from the points that should lie on it; `None`
+/// without such points.
+pub(crate) fn point_term(
+    model: &NeatModel,
+    input: &StepInput<'_>,
+    device: &Device,
+) -> Option<Tensor<1>> {
+    if input.surface_points.is_empty() {
+        return None;
+    }
+    let points = point_tensor(input.surface_points, device);
+    Some(point_loss(model.implicit_network.sdf_uncapped(points)))
 }
 
 /// Renders the batch and adds up the terms.
@@ -247,12 +267,14 @@ pub fn step_loss(
             .collect();
     }
 
+    let points = point_term(model, input, device).unwrap_or_else(zero);
     let total = rgb.clone().mul_scalar(weights.rgb)
         + eikonal.clone().mul_scalar(weights.eikonal)
         + mask.clone().mul_scalar(weights.mask)
         + segment.clone().mul_scalar(weights.segment)
         + junction_3d.clone().mul_scalar(weights.junction_3d)
-        + junction_2d.clone().mul_scalar(weights.junction_2d);
+        + junction_2d.clone().mul_scalar(weights.junction_2d)
+        + points.clone().mul_scalar(weights.points);
     let terms = [
         total.clone(),
         rgb,
@@ -261,6 +283,7 @@ pub fn step_loss(
         segment,
         junction_3d,
         junction_2d,
+        points,
     ];
     Ok(StepLoss {
         total,
@@ -407,6 +430,7 @@ impl StepLoss {
             segment: term(4),
             junction_3d: term(5),
             junction_2d: term(6),
+            points: term(7),
         }
     }
 }

@@ -80,6 +80,8 @@ pub struct Rendering {
     pub segments: Option<Tensor<2>>,
     /// Gradient of the distance `[M, 3]` at the samples that were evaluated.
     pub gradients: Tensor<2>,
+    /// The same without the bounding sphere, `[M, 3]`.
+    pub gradients_uncapped: Tensor<2>,
     /// Index `ray · S + sample` of those samples; `None` where it is all.
     pub evaluated: Option<Vec<u32>>,
     /// How many samples the segments were rendered from.
@@ -196,6 +198,7 @@ impl NeatModel {
             color,
             segments,
             gradients,
+            gradients_uncapped: output.gradient_uncapped,
             evaluated: full,
             segment_samples: rows,
         }

@@ -28,20 +28,24 @@ pub enum Preset {
     /// CPU.
     #[default]
     Fast,
+    /// Larger networks and more rays on top of `fast`: a surface and renderings of
+    /// large scenes that can be used, in minutes on a CPU.
+    Balanced,
 }
 
 /// A name that is no preset's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown preset `{0}`; use one of paper-abc, paper-dtu, paper-blendedmvs, fast")]
+#[error("unknown preset `{0}`; use one of paper-abc, paper-dtu, paper-blendedmvs, fast, balanced")]
 pub struct UnknownPreset(String);
 
 impl Preset {
     /// Every preset.
-    pub const ALL: [Self; 4] = [
+    pub const ALL: [Self; 5] = [
         Self::PaperAbc,
         Self::PaperDtu,
         Self::PaperBlendedmvs,
         Self::Fast,
+        Self::Balanced,
     ];
 
     /// Its name on the command line.
@@ -51,6 +55,7 @@ impl Preset {
             Self::PaperDtu => "paper-dtu",
             Self::PaperBlendedmvs => "paper-blendedmvs",
             Self::Fast => "fast",
+            Self::Balanced => "balanced",
         }
     }
 
@@ -58,11 +63,13 @@ impl Preset {
     /// later ones lie on top of earlier ones.
     fn layers(self) -> &'static [&'static str] {
         const PAPER: &str = include_str!("../presets/paper.toml");
+        const FAST: &str = include_str!("../presets/fast.toml");
         match self {
             Self::PaperAbc => &[PAPER, include_str!("../presets/paper-abc.toml")],
             Self::PaperDtu => &[PAPER, include_str!("../presets/paper-dtu.toml")],
             Self::PaperBlendedmvs => &[PAPER, include_str!("../presets/paper-blendedmvs.toml")],
-            Self::Fast => &[include_str!("../presets/fast.toml")],
+            Self::Fast => &[FAST],
+            Self::Balanced => &[FAST, include_str!("../presets/balanced.toml")],
         }
     }
 
@@ -114,6 +121,7 @@ impl FromStr for Preset {
 mod tests {
     use super::*;
     use crate::overrides::apply_overrides;
+    use neat_gjp::JunctionCount;
 
     #[test]
     fn every_preset_survives_the_way_to_disk_and_back() {
@@ -151,6 +159,19 @@ mod tests {
             ];
             assert_eq!(weights, [1.0, 0.1, 0.0, 0.01, 0.1, 0.01], "{preset}");
         }
+    }
+
+    #[test]
+    fn the_balanced_preset_is_the_fast_one_in_a_larger_size() {
+        let (fast, balanced) = (Preset::Fast.config(), Preset::Balanced.config());
+        assert!(balanced.model.implicit.width > fast.model.implicit.width);
+        assert!(balanced.train.steps > fast.train.steps);
+        assert_eq!(balanced.model.perceiver.junctions, JunctionCount::AUTO);
+        // What its file does not name is as it was.
+        assert_eq!(balanced.data, fast.data);
+        assert_eq!(balanced.distill, fast.distill);
+        assert_eq!(balanced.train.loss, fast.train.loss);
+        assert_eq!(balanced.train.adam, fast.train.adam);
     }
 
     #[test]

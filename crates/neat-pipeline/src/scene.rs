@@ -5,6 +5,7 @@ use crate::config::{Config, DataConfig};
 use crate::detection::detect_wireframes;
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage, timed};
+use crate::latents::fit_latents;
 use crate::resources::Resources;
 use neat_core::file_cache::FileCache;
 use neat_core::layout::HAWP_DIR;
@@ -80,6 +81,7 @@ pub fn prepare_scene(
         source: placed.map_or(loaded.sphere.source, |sphere| sphere.source),
     };
     fit_background(config, &scene, resources.memory_limit)?;
+    fit_latents(config, &scene);
     on_event(Event::Note(format!("scene sphere: {sphere}")));
     if let (SphereChoice::Given { .. }, Some(radius)) =
         (config.data.scene_sphere, config.data.scene_radius)

@@ -7,6 +7,7 @@ pub use crate::field::TrainedField;
 use crate::flops::StepRows;
 use crate::losses::{Losses, StepInput, StepLoss, step_loss};
 use crate::model::{NeatModel, host_points, host_vec};
+use crate::surface_points::SurfacePoints;
 use crate::training_data::{Batch, TrainingData};
 use burn::module::Module;
 use burn::optim::GradientsParams;
@@ -139,6 +140,7 @@ impl std::ops::AddAssign for StepTimings {
 /// The state of an optimisation.
 pub struct Trainer {
     data: TrainingData,
+    surface_points: SurfacePoints,
     config: Config,
     seed: u64,
     device: Device,
@@ -163,6 +165,7 @@ struct Prepared {
     samples: RaySamples,
     distances: Distances,
     eikonal_points: Vec<[f32; 3]>,
+    surface_points: Vec<[f32; 3]>,
     /// Distances that the sampler asked for.
     asked: usize,
 }
@@ -174,6 +177,7 @@ impl Prepared {
             samples: &self.samples,
             distances: &self.distances,
             eikonal_points: &self.eikonal_points,
+            surface_points: &self.surface_points,
             views,
             junctions_due,
         }
@@ -229,6 +233,7 @@ impl Trainer {
         let initial_radius = config.model.implicit.initial_sphere * scene_radius;
         Ok(Self {
             data,
+            surface_points: SurfacePoints::of(scene, scene_radius),
             adam: Adam::new(config.train.adam),
             sampler: config.train.sampler.init(scene_radius, initial_radius),
             beta: config.model.density.initial_beta,
@@ -495,11 +500,17 @@ impl Trainer {
         let (samples, asked) = self.sample(&batch, &distances);
         self.timings.sampler = start.elapsed();
         let eikonal_points = self.eikonal_points(&batch, &samples);
+        let train = &self.config.train;
+        let wanted = match train.loss.points > 0.0 {
+            true => train.surface_points,
+            false => 0,
+        };
         Ok(Prepared {
             batch,
             samples,
             distances,
             eikonal_points,
+            surface_points: (self.surface_points).draw(wanted, self.seed, self.iteration),
             asked,
         })
     }
@@ -672,8 +683,13 @@ fn validate(config: &Config) -> Result<(), TrainError> {
     if train.checkpoint_seconds.is_nan() || train.checkpoint_seconds <= 0.0 {
         return refuse("train.checkpoint_seconds must be positive");
     }
-    if config.model.perceiver.junctions == 0 || config.model.perceiver.width == 0 {
-        return refuse("model.perceiver needs junctions and a width");
+    match config.model.perceiver.junctions.fixed() {
+        None => return refuse("model.perceiver.junctions is not decided for this scene"),
+        Some(0) => return refuse("model.perceiver needs junctions"),
+        Some(_) if config.model.perceiver.width == 0 => {
+            return refuse("model.perceiver needs a width");
+        }
+        Some(_) => {}
     }
     let positive = |x: f64| x.is_finite() && x > 0.0;
     let density = &config.model.density;

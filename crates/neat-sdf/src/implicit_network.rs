@@ -68,6 +68,9 @@ pub struct ImplicitOutput {
     pub features: Tensor<2>,
     /// Raw gradient of the distance `[N, 3]`.
     pub gradient: Tensor<2>,
+    /// The same without the bounding sphere, `[N, 3]`: what the eikonal term looks
+    /// at.
+    pub gradient_uncapped: Tensor<2>,
 }
 
 /// Points → signed distance and features.
@@ -200,7 +203,8 @@ impl ImplicitNetwork {
             let output = ImplicitOutput {
                 sdf: head(field.first.clone()),
                 features,
-                gradient: field.gradient,
+                gradient: field.gradient.clone(),
+                gradient_uncapped: field.gradient,
             };
             return (field.first, output);
         };
@@ -210,9 +214,8 @@ impl ImplicitNetwork {
         let output = ImplicitOutput {
             sdf: head(sdf.clone()),
             features,
-            gradient: field
-                .gradient
-                .mask_where(gradient_capped, head(cap.gradient)),
+            gradient: (field.gradient.clone()).mask_where(gradient_capped, head(cap.gradient)),
+            gradient_uncapped: field.gradient,
         };
         (sdf, output)
     }
@@ -227,7 +230,8 @@ impl ImplicitNetwork {
         ImplicitOutput {
             sdf: field.first,
             features: field.others.expect("features were asked for"),
-            gradient: field.gradient,
+            gradient: field.gradient.clone(),
+            gradient_uncapped: field.gradient,
         }
     }
 
@@ -235,6 +239,13 @@ impl ImplicitNetwork {
     /// the eikonal term looks at.
     pub fn gradient_uncapped(&self, points: Tensor<2>) -> Tensor<2> {
         self.mlp.field(points, FieldQuery::default()).gradient
+    }
+
+    /// The distance without the bounding sphere, `[N, 1]`: what the term of sparse
+    /// points looks at.
+    pub fn sdf_uncapped(&self, points: Tensor<2>) -> Tensor<2> {
+        // The fused operation: with its gradient, faster than plain operations.
+        self.mlp.field(points, FieldQuery::default()).first
     }
 
     /// The capped distance alone, `[N, 1]`.

@@ -20,6 +20,12 @@ pub fn eikonal_loss(gradient: Tensor<2>) -> Tensor<1> {
         .mean()
 }
 
+/// Mean absolute distance `sdf` `[N, 1]` at points that lie on the surface, as in
+/// Geo-NeuS (Fu et al., NeurIPS 2022).
+pub fn point_loss(sdf: Tensor<2>) -> Tensor<1> {
+    sdf.abs().mean()
+}
+
 /// Mean binary cross entropy of the accumulated weight `opacity` `[R, 1]`
 /// against the silhouette `mask` `[R, 1]` of zeros and ones.
 pub fn mask_loss(opacity: Tensor<2>, mask: Tensor<2>) -> Tensor<1> {

@@ -21,6 +21,8 @@ pub enum Purpose {
     Eikonal = 4,
     /// Which view an epoch visits when.
     ViewOrder = 5,
+    /// Which sparse points the surface is drawn to in an iteration.
+    SurfacePoints = 6,
 }
 
 /// The stream of `purpose` in `iteration` of the run with `seed`.

@@ -4,8 +4,8 @@ use crate::segment_projection::{camera, same_camera};
 use burn::tensor::{Device, Tensor};
 use neat_core::Camera;
 use neat_field::segment_rendering::project_calibrated;
-use neat_gjp::PerceiverConfig;
 use neat_gjp::junction_loss::{MatchedJunctions, junction_loss};
+use neat_gjp::{JunctionCount, PerceiverConfig};
 use neat_tensor::parameters::load_parameters;
 use neat_tensor::random::{Purpose, stream};
 use neat_tests::backends::on_each_backend;
@@ -26,7 +26,7 @@ fn project(points: Tensor<2>, camera: &Camera) -> Tensor<2> {
 
 fn check(golden: &Golden, camera: &Camera, problem: &str, device: &Device) {
     let config = PerceiverConfig {
-        junctions: 64,
+        junctions: JunctionCount::Fixed(64),
         width: 32,
     };
     let untrained = config.init(&mut stream(0, Purpose::Weights, 0), device);

@@ -7,6 +7,7 @@ use burn::optim::GradientsParams;
 use burn::tensor::Device;
 use nalgebra::{Vector2, Vector3};
 use neat_core::{Camera, LineSegment2, ScoredSegment2};
+use neat_gjp::JunctionCount;
 use neat_gjp::candidates::{CandidateConfig, JunctionView};
 use neat_pipeline::config::Config;
 use neat_pipeline::distill::support_point;
@@ -37,7 +38,7 @@ fn config(mode: &str) -> Config {
     let model = &mut config.model;
     (model.implicit.width, model.implicit.features) = (64, 32);
     (model.rendering.width, model.attraction.width) = (32, 32);
-    (model.perceiver.junctions, model.perceiver.width) = (64, 32);
+    (model.perceiver.junctions, model.perceiver.width) = (JunctionCount::Fixed(64), 32);
     config.train.candidates = match mode {
         "median" => CandidateConfig::published_toy(),
         _ => CandidateConfig::published(),
@@ -123,6 +124,7 @@ impl RecordedStep {
             samples: &self.samples,
             distances: &model.implicit_network.distances(device),
             eikonal_points: &self.eikonal_points,
+            surface_points: &[],
             views: &views,
             junctions_due: true,
         };

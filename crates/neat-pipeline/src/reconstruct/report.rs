@@ -108,13 +108,14 @@ impl Session<'_> {
 /// always 0 are left out.
 fn curves(metrics: &[StepReport]) -> Vec<Curve> {
     type Figure = fn(&StepReport) -> f64;
-    let figures: [(&str, Figure); 9] = [
+    let figures: [(&str, Figure); 10] = [
         ("Loss", |step| step.losses.total),
         ("Colour loss", |step| step.losses.rgb),
         ("Segment loss", |step| step.losses.segment),
         ("Junction loss", |step| step.losses.junction_3d),
         ("Silhouette loss", |step| step.losses.mask),
         ("Eikonal loss", |step| step.losses.eikonal),
+        ("Distance from sparse points", |step| step.losses.points),
         ("Segment error in pixels", |step| {
             step.segment_error_in_pixels
         }),
