@@ -309,6 +309,8 @@ async function checkHostile(browser) {
     assert.equal(await browser.evaluate("document.title.includes('onerror')"), true);
     assert.equal(await browser.evaluate("document.images.length + document.querySelectorAll('iframe, object, embed').length"), 0);
     assert.equal(await browser.evaluate("document.scripts.length"), 2);
+    assert.equal(await browser.evaluate("Object.keys(Object.prototype).length + Object.keys({}.__proto__).length"), 0);
+    assert.deepEqual(await browser.evaluate("['__proto__', 'constructor'].map((name) => Object.hasOwn(neat.data.edgeFields, name))"), [true, true]);
     await browser.evaluate("neat.viewer.select({ kind: 'segment', index: 3 })");
     await browser.evaluate("neat.viewer.lookThrough(0)");
     await browser.settle();

@@ -1,6 +1,8 @@
 //! What the tests that cross crates share: golden numbers, backends, named
 //! gradients and comparisons.
 
+#![forbid(unsafe_code)]
+
 pub mod backends;
 pub mod comparison;
 pub mod finite_differences;

@@ -1,5 +1,7 @@
 //! `neat`: posed photographs in, 3D wireframes out.
 
+#![forbid(unsafe_code)]
+
 mod arguments;
 mod batch_progress;
 mod cache;

@@ -10,14 +10,35 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// The largest text or array file that is read, in bytes.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
 
+/// Opens a regular file of at most [`MAX_FILE_BYTES`], and says how long it is.
+///
+/// Links are followed: whoever owns a folder may keep its files elsewhere. Devices
+/// and pipes are not opened, because some of them never end and others wait forever.
+pub(crate) fn open(path: &Path, remedy: &str) -> Result<(fs::File, u64), SceneError> {
+    let about = fs::metadata(path).map_err(|source| read_error(path, remedy, source))?;
+    if !about.is_file() {
+        let source = io::Error::new(io::ErrorKind::InvalidInput, "it is no regular file");
+        return Err(read_error(path, remedy, source));
+    }
+    if about.len() > MAX_FILE_BYTES {
+        return Err(SceneError::TooLarge {
+            path: path.into(),
+            limit: MAX_FILE_BYTES,
+        });
+    }
+    let file = fs::File::open(path).map_err(|source| read_error(path, remedy, source))?;
+    Ok((file, about.len()))
+}
+
 /// Reads a whole file of at most [`MAX_FILE_BYTES`].
 ///
 /// # Errors
 /// If it does not exist (the message then gives `remedy`), is empty, is too
-/// large, or cannot be read.
+/// large, is a folder, a device or a pipe, or cannot be read.
 pub fn read(path: &Path, remedy: &str) -> Result<Vec<u8>, SceneError> {
-    let file = fs::File::open(path).map_err(|source| read_error(path, remedy, source))?;
+    let (file, _) = open(path, remedy)?;
     let mut bytes = Vec::new();
+    // It may grow while it is read.
     file.take(MAX_FILE_BYTES + 1)
         .read_to_end(&mut bytes)
         .map_err(|source| read_error(path, remedy, source))?;

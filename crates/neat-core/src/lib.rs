@@ -13,7 +13,11 @@
 //! - *World* is the frame of a scene's cameras; [`Scene::original_from_world`]
 //!   leads back to the frame of the user's files.
 
+#![forbid(unsafe_code)]
+
 pub mod assignment;
+#[cfg(test)]
+mod awkward_array;
 pub mod camera;
 pub mod convert;
 pub mod distortion;
@@ -23,6 +27,7 @@ pub mod file;
 pub mod file_cache;
 pub mod ground_truth;
 pub mod hawp_json;
+pub mod image_file;
 pub mod layout;
 pub mod line_segment;
 pub mod memory_limit;
@@ -35,6 +40,7 @@ pub mod scene_sphere;
 pub mod synthetic;
 pub mod undistortion;
 pub mod view_image;
+mod view_name;
 pub mod wireframe2d;
 pub mod wireframe3d;
 

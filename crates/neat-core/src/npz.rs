@@ -390,6 +390,19 @@ mod tests {
     }
 
     #[test]
+    fn archives_that_unpack_to_too_much_are_refused() {
+        let deflated = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
+        let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+        archive.start_file("a.npy", deflated).unwrap();
+        for _ in 0..=MAX_ARRAY_BYTES >> 20 {
+            archive.write_all(&[0; 1 << 20]).unwrap();
+        }
+        let bytes = archive.finish().unwrap().into_inner();
+        assert!(bytes.len() < 1 << 18, "a bomb is small");
+        assert!(matches!(read_a(&bytes), Err(SceneError::TooLarge { .. })));
+    }
+
+    #[test]
     fn arrays_that_are_not_there_are_named() {
         let mut npz = NpzReader::from_bytes(small_archive(), Path::new("cameras.npz")).unwrap();
         assert!(npz.contains("a") && !npz.contains("extrinsics"));

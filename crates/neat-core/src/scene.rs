@@ -1,6 +1,6 @@
 //! A scene: posed images, each with its 2D wireframe.
 
-use crate::{Camera, SceneError, ViewError, ViewImage, Wireframe2d, scene_sphere};
+use crate::{Camera, SceneError, ViewError, ViewImage, Wireframe2d, scene_sphere, view_name};
 use nalgebra::{Matrix4, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -225,8 +225,8 @@ pub(crate) fn check_names<'a>(
 ) -> Result<(), SceneError> {
     let mut previous = None;
     for name in names {
-        let reason = if name.is_empty() || name.starts_with('.') || name.contains(['/', '\\']) {
-            "is not a plain file name: rename it"
+        let reason = if let Some(problem) = view_name::problem(name) {
+            problem
         } else if previous == Some(name) {
             "appears twice: give every image a name of its own"
         } else if previous > Some(name) {

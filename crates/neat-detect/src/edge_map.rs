@@ -3,10 +3,9 @@
 //! Lines are thinned to one pixel (Zhang and Suen, 1984), followed from end to end
 //! and split where they bend (Douglas and Peucker, 1973).
 
-use image::{GrayImage, ImageReader};
+use image::GrayImage;
 use nalgebra::Vector2;
-use neat_core::{LineSegment2, SceneError};
-use std::io::Cursor;
+use neat_core::{LineSegment2, SceneError, image_file};
 use std::path::Path;
 
 /// Pixels at least this bright are edges, as a share of the brightest.
@@ -47,21 +46,7 @@ pub fn read(path: &Path) -> Result<GrayImage, SceneError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GrayImage, SceneError> {
-    let decode = || {
-        let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?;
-        let mut limits = image::Limits::default();
-        limits.max_image_width = Some(MAX_SIDE);
-        limits.max_image_height = Some(MAX_SIDE);
-        reader.limits(limits);
-        reader.decode()
-    };
-    match decode() {
-        Ok(map) => Ok(map.into_luma8()),
-        Err(source) => Err(SceneError::Image {
-            path: path.into(),
-            source,
-        }),
-    }
+    Ok(image_file::decode(bytes, path, MAX_SIDE)?.into_luma8())
 }
 
 /// The straight pieces of the lines of an edge map.

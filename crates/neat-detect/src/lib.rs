@@ -11,6 +11,8 @@
 //!
 //! Coordinates are those of HAWP's files: pixel centres are integers.
 
+#![forbid(unsafe_code)]
+
 mod claimed_pixels;
 mod clutter;
 mod config;

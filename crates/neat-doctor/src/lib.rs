@@ -14,6 +14,8 @@
 //!
 //! [`SceneError`]: neat_core::SceneError
 
+#![forbid(unsafe_code)]
+
 mod agreement;
 mod capture_checks;
 mod corner_consensus;

@@ -44,6 +44,8 @@
 //! # Ok::<(), neat_eval::EvalError>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
 pub mod foreign;
 pub mod image_colouring;
 pub mod image_quality;

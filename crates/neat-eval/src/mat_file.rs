@@ -10,8 +10,9 @@ use neat_core::{SceneError, file};
 use std::io::Read;
 use std::path::Path;
 
-/// The largest array that is unpacked, in bytes: DTU's masks take 64 MiB.
-const MAX_ARRAY_BYTES: u64 = 1 << 28;
+/// What all variables of a file may unpack to, in bytes: DTU's masks take 64 MiB.
+/// A limit for each would add up, since a kilobyte can unpack to a megabyte.
+const MAX_UNPACKED_BYTES: u64 = 1 << 28;
 const HEADER_BYTES: usize = 128;
 
 /// A real array of numbers.
@@ -142,7 +143,7 @@ impl MatArray {
 ///
 /// # Errors
 /// If the file is missing (the message then gives `remedy`), empty, truncated, of
-/// another version, or holds an array that is too large.
+/// another version, or its variables unpack to too much.
 pub fn read_mat(path: &Path, remedy: &str) -> Result<Vec<MatArray>, SceneError> {
     parse_mat(&file::read(path, remedy)?, path)
 }
@@ -173,11 +174,13 @@ fn parse(bytes: &[u8]) -> Result<Vec<MatArray>, String> {
         byte_order,
     };
     let mut arrays = Vec::new();
+    let mut unpacked_bytes = 0;
     while let Some(element) = elements.next()? {
         match element.code {
             MATRIX => arrays.extend(matrix(element.data, byte_order)?),
             COMPRESSED => {
-                let unpacked = unpack(element.data)?;
+                let unpacked = unpack(element.data, MAX_UNPACKED_BYTES - unpacked_bytes)?;
+                unpacked_bytes += unpacked.len() as u64;
                 let mut inner = Elements {
                     rest: &unpacked,
                     byte_order,
@@ -194,15 +197,16 @@ fn parse(bytes: &[u8]) -> Result<Vec<MatArray>, String> {
     Ok(arrays)
 }
 
-fn unpack(data: &[u8]) -> Result<Vec<u8>, String> {
+/// Unpacks at most `room` bytes.
+fn unpack(data: &[u8], room: u64) -> Result<Vec<u8>, String> {
     let mut unpacked = Vec::new();
     ZlibDecoder::new(data)
-        .take(MAX_ARRAY_BYTES + 1)
+        .take(room + 1)
         .read_to_end(&mut unpacked)
         .map_err(|error| format!("a variable cannot be unpacked ({error})"))?;
-    if unpacked.len() as u64 > MAX_ARRAY_BYTES {
+    if unpacked.len() as u64 > room {
         return Err(format!(
-            "a variable unpacks to more than {MAX_ARRAY_BYTES} bytes"
+            "its variables unpack to more than {MAX_UNPACKED_BYTES} bytes"
         ));
     }
     Ok(unpacked)
@@ -415,6 +419,19 @@ pub(crate) mod tests {
         assert!(message(&short).contains("24 bytes"));
         let huge = mat_file(&[matrix_element("P", 6, &[i32::MAX; 3], 9, &[0; 24])]);
         assert!(message(&huge).contains("does not fit"));
+    }
+
+    #[test]
+    fn variables_that_add_up_to_too_much_are_refused() {
+        let zeros = vec![0; 1 << 26];
+        // Text, which is unpacked and passed over.
+        let variable = compressed(&matrix_element("A", 4, &[1 << 26, 1], 2, &zeros));
+        let file = |count: usize| mat_file(&vec![variable.clone(); count]);
+        assert_eq!(parse(&file(1)).unwrap(), []);
+        let bomb = file(4);
+        assert!(bomb.len() < 1 << 19, "a bomb is small");
+        let error = parse(&bomb).unwrap_err();
+        assert!(error.contains("variables unpack to more"), "{error}");
     }
 
     proptest! {

@@ -29,6 +29,8 @@
 //! [`marching_cubes`](marching_cubes::marching_cubes) turns a
 //! [`SignedDistance`](neat_wireframe::SignedDistance) into a [`TriangleMesh`].
 
+#![forbid(unsafe_code)]
+
 pub mod confidence;
 pub mod edge_filter;
 pub mod error;

@@ -2,6 +2,8 @@
 //! volume carries the 3D segment it belongs to, and rendering a ray renders a
 //! segment.
 
+#![forbid(unsafe_code)]
+
 pub mod attraction_network;
 pub mod attraction_region;
 pub mod host_segment_loss;

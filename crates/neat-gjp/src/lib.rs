@@ -4,6 +4,8 @@
 //! This crate takes candidate end points and 2D junctions from anywhere; it
 //! knows no field.
 
+#![forbid(unsafe_code)]
+
 pub mod candidates;
 pub mod clustering;
 pub mod junction_loss;

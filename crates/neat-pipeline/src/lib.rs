@@ -2,6 +2,8 @@
 //!
 //! Everything here reports through events and results; nothing draws.
 
+#![forbid(unsafe_code)]
+
 pub mod ablate;
 mod awake;
 pub mod background;

@@ -17,8 +17,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 const STEPS: u64 = 1000;
-const HOSTILE: &str =
-    "</script><img src=x onerror=alert(1)><!-- {{data}} ${1} \u{2028} \"'&lt; &amp; \\u003c";
+const HOSTILE: &str = "</script><img src=x onerror=alert(1)></title><!-- {{data}} ${1} \u{2028} \u{1b} \"'&lt; &amp; \\u003c";
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args_os()
@@ -73,7 +72,10 @@ fn hostile(sample: &Report) -> Report {
     }
     let fields = &mut report.document.edge_fields;
     let values = fields.values().next().cloned().unwrap_or_default();
-    fields.insert(text(), values);
+    // Names that objects of JavaScript have already.
+    for name in [text(), "__proto__".to_owned(), "constructor".to_owned()] {
+        fields.insert(name, values.clone());
+    }
     report
 }
 

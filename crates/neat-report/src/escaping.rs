@@ -22,7 +22,8 @@ pub(crate) fn json_for_script(value: &impl Serialize) -> Result<String, serde_js
     Ok(escaped)
 }
 
-/// Text as the content of an HTML element or a quoted attribute.
+/// Text as the content of an HTML element or a quoted attribute. Control characters,
+/// of which HTML allows white space only, are replaced.
 pub(crate) fn html_text(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -32,6 +33,9 @@ pub(crate) fn html_text(text: &str) -> String {
             '&' => escaped.push_str("&amp;"),
             '"' => escaped.push_str("&quot;"),
             '\'' => escaped.push_str("&#39;"),
+            control if control.is_control() && !control.is_ascii_whitespace() => {
+                escaped.push(char::REPLACEMENT_CHARACTER);
+            }
             other => escaped.push(other),
         }
     }
@@ -54,6 +58,10 @@ mod tests {
         assert_eq!(
             html_text("<b title=\"x\">'&'</b>"),
             "&lt;b title=&quot;x&quot;&gt;&#39;&amp;&#39;&lt;/b&gt;"
+        );
+        assert_eq!(
+            html_text("a\0\u{1b}[31m\u{85}\tb"),
+            "a\u{fffd}\u{fffd}[31m\u{fffd}\tb"
         );
     }
 

@@ -134,6 +134,43 @@ fn an_empty_report_is_a_page() {
     assert_eq!(data_of(&page)["edges"], serde_json::json!([]));
 }
 
+#[test]
+fn names_of_all_kinds_stay_texts() {
+    const HOSTILE: &str = "</script></title><!--<img src=x onerror=alert(1)>-->{{data}}\
+        \u{2028}\u{2029}\0\u{1b}[31m\u{202e}\"'`${1}&lt;\\u003c";
+    let mut report = small_report();
+    let title = format!("<title>{} – neat report</title>", report.title);
+    let frame = frame_of(&report.render().unwrap(), &title);
+    report.title = HOSTILE.into();
+    report.curves = vec![Curve {
+        name: HOSTILE.into(),
+        points: vec![(1, 0.5)],
+    }];
+    report.views[0].name = HOSTILE.into();
+    report.document.views = report.views.iter().map(|view| view.name.clone()).collect();
+    let edges = vec![0.5; report.document.edges.len()];
+    let junctions = vec![0.5; report.document.junctions.len()];
+    for name in [HOSTILE, "__proto__", "constructor"] {
+        (report.document.edge_fields).insert(name.into(), edges.clone());
+        (report.document.junction_fields).insert(name.into(), junctions.clone());
+    }
+    report.document.metadata = [(HOSTILE.to_owned(), HOSTILE.into())].into();
+    let page = report.render().unwrap();
+    let data = data_of(&page);
+    for path in ["/title", "/curves/0/name", "/views/0/name"] {
+        assert_eq!(data.pointer(path).unwrap(), HOSTILE, "{path}");
+    }
+    for fields in ["edgeFields", "junctionFields"] {
+        assert_eq!(data[fields][HOSTILE][0], 0.5);
+        assert_eq!(data[fields]["__proto__"][0], 0.5);
+    }
+    // Around the data and the title the page is as ever, and nothing is invisible.
+    let (_, rest) = page.split_once("<title>").unwrap();
+    let (title, _) = rest.split_once("</title>").unwrap();
+    assert_eq!(frame_of(&page, &format!("<title>{title}</title>")), frame);
+    assert!(!page.contains(|c: char| c.is_control() && c != '\n'));
+}
+
 fn hostile_text() -> impl Strategy<Value = String> {
     prop_oneof![
         any::<String>(),

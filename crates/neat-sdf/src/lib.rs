@@ -1,6 +1,8 @@
 //! Volume rendering of signed distance functions, as in VolSDF (Yariv et al.
 //! 2021): the geometry and colour that NEAT's segments are rendered with.
 
+#![forbid(unsafe_code)]
+
 pub mod density;
 pub mod implicit_network;
 pub mod losses;

@@ -2,6 +2,8 @@
 //!
 //! No learning framework: anything that proposes 3D segments can use this crate.
 
+#![forbid(unsafe_code)]
+
 pub mod attraction;
 pub mod attraction_hypotheses;
 pub mod bundle_adjustment;

@@ -182,7 +182,8 @@ fn row_major<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mutation::{CASES, awkward_array};
+    use crate::awkward_array::awkward_array;
+    use crate::mutation::CASES;
     use crate::npz::npz_bytes;
     use proptest::prelude::*;
 

@@ -162,7 +162,8 @@ pub fn decompose_projection(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mutation::{CASES, awkward_array};
+    use crate::awkward_array::awkward_array;
+    use crate::mutation::CASES;
     use crate::npz::npz_bytes;
     use nalgebra::{Rotation3, Vector3};
     use proptest::prelude::*;

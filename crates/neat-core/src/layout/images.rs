@@ -1,8 +1,7 @@
 //! Images on disk.
 
-use crate::{SceneError, file, hawp_json::file_stem};
-use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, RgbImage};
-use std::io::Cursor;
+use crate::{SceneError, file, hawp_json::file_stem, image_file};
+use image::{DynamicImage, ImageError, ImageFormat, RgbImage};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -82,20 +81,12 @@ pub(super) fn missing(path: &Path) -> SceneError {
 /// # Errors
 /// If it is missing or no image.
 pub fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
-    ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|source| file::read_error(path, REMEDY, source))?
-        .into_dimensions()
-        .map_err(|source| SceneError::Image {
-            path: path.into(),
-            source,
-        })
+    image_file::header(path, REMEDY, |image| image.dimensions())
 }
 
 /// Whether an image has transparency, from its first bytes.
 pub(super) fn has_alpha(path: &Path) -> Option<bool> {
-    let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
-    Some(reader.into_decoder().ok()?.color_type().has_alpha())
+    image_file::header(path, REMEDY, |image| image.color_type().has_alpha()).ok()
 }
 
 /// `image`, or where it does not exist the same with another ending that does:
@@ -170,20 +161,17 @@ pub(super) fn decode_rgb(
     path: &Path,
     background: [u8; 3],
 ) -> Result<RgbImage, SceneError> {
-    let image_error = |source| SceneError::Image {
-        path: path.into(),
-        source,
-    };
-    // By its first bytes: endings of converted data sets are not to be trusted.
-    let reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|source| image_error(source.into()))?;
-    // The decoder makes up what is missing.
-    if reader.format() == Some(ImageFormat::Jpeg) && !jpeg_is_complete(bytes) {
+    // By its first bytes: endings of converted data sets are not to be trusted. The
+    // decoder makes up what is missing.
+    let is_jpeg = image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Jpeg);
+    if is_jpeg && !jpeg_is_complete(bytes) {
         let error = io::Error::new(io::ErrorKind::UnexpectedEof, "the file is truncated");
-        return Err(image_error(ImageError::IoError(error)));
+        return Err(SceneError::Image {
+            path: path.into(),
+            source: ImageError::IoError(error),
+        });
     }
-    let image = reader.decode().map_err(image_error)?;
+    let image = image_file::decode(bytes, path, u32::MAX)?;
     if image.color().has_alpha() {
         return Ok(blend(&image, background));
     }

@@ -7,7 +7,8 @@ use super::poses::{self, PosedImage, Poses};
 use super::rectify::Rectification;
 use super::sphere::Evidence;
 use super::{
-    HAWP_DIR, Layout, LoadOptions, PixelCenter, SceneWarning, images, pixel_center, point_files,
+    HAWP_DIR, Layout, LoadOptions, PixelCenter, SceneWarning, images, links, pixel_center,
+    point_files,
 };
 use crate::file_cache::FileCache;
 use crate::scene::{check_image_size, check_names, keep_observations};
@@ -201,6 +202,7 @@ pub(super) fn load_posed(
         warnings.push(SceneWarning::SphereUnknown);
     }
     let files = input_files(dir, &poses.path, &poses.views, masks);
+    warnings.extend(links::outside(dir, &files));
     let scene = Scene {
         name: scene_name(dir),
         views,

@@ -7,8 +7,8 @@
 use super::images;
 use super::poses::PosedImage;
 use crate::scene_sphere::Mask;
-use crate::{MemoryLimit, SceneError, hawp_json::file_stem};
-use image::{GrayImage, ImageReader, imageops};
+use crate::{MemoryLimit, SceneError, file, hawp_json::file_stem, image_file};
+use image::{GrayImage, imageops};
 use std::path::{Path, PathBuf};
 
 const DIRS: [&str; 2] = ["mask", "masks"];
@@ -87,14 +87,8 @@ pub(super) fn read(masks: &MaskFiles) -> Result<Option<Vec<Mask>>, SceneError> {
 }
 
 fn read_one(path: &Path, by: Shown) -> Result<Mask, SceneError> {
-    let image = ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|source| crate::file::read_error(path, "put the mask there", source))?
-        .decode()
-        .map_err(|source| SceneError::Image {
-            path: path.into(),
-            source,
-        })?;
+    let bytes = file::read(path, "put the mask there")?;
+    let image = image_file::decode(&bytes, path, u32::MAX)?;
     let gray = match by {
         Shown::Brightness => image.into_luma8(),
         Shown::Opacity => {

@@ -10,6 +10,7 @@ pub mod cameras_json;
 pub mod colmap;
 pub mod dtu;
 mod images;
+mod links;
 mod load;
 mod load_options;
 mod masks;

@@ -29,6 +29,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 /// In the order in which they are looked for.
 const FILE_NAMES: [&str; 3] = [
@@ -157,30 +158,35 @@ fn parse(bytes: &[u8], path: &Path, dirs: &[PathBuf]) -> Result<Poses, SceneErro
     reconstruction.into_poses()
 }
 
-/// An object with the name of its class, where the file gives one.
+/// An object with the name of its class, where the file gives one. Both are
+/// shared: a file can name one large object from as many places as it likes.
 struct Typed {
-    class: Option<String>,
-    data: Value,
+    class: Option<Rc<str>>,
+    data: Rc<Value>,
 }
 
 /// The objects of a map by their keys; `types` are the names that the file has
 /// given to the numbers of classes so far.
 fn objects(
     entries: Vec<Entry<Pointer>>,
-    types: &mut BTreeMap<u32, String>,
+    types: &mut BTreeMap<u32, Rc<str>>,
 ) -> BTreeMap<u32, Typed> {
     let mut shared = BTreeMap::new();
     let mut objects = BTreeMap::new();
     for Entry { key, value } in entries {
         let type_id = value.polymorphic_id.map(|id| id & !FIRST_OCCURRENCE);
         if let (Some(id), Some(name)) = (type_id, value.polymorphic_name) {
-            types.insert(id, name);
+            types.insert(id, name.into());
         }
         let class = type_id.and_then(|id| types.get(&id)).cloned();
         let id = value.ptr_wrapper.id.map(|id| id & !FIRST_OCCURRENCE);
         let data = match (value.ptr_wrapper.data, id) {
-            (Some(data), Some(id)) => shared.entry(id).insert_entry(data).get().clone(),
-            (Some(data), None) => data,
+            (Some(data), Some(id)) => {
+                let data = Rc::new(data);
+                shared.insert(id, Rc::clone(&data));
+                data
+            }
+            (Some(data), None) => Rc::new(data),
             (None, id) => id
                 .and_then(|id| shared.get(&id))
                 .cloned()

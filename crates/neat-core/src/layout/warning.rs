@@ -19,6 +19,13 @@ pub enum SceneWarning {
         /// How many views.
         views: usize,
     },
+    /// Files of the scene are links to files outside of its folder.
+    LinksOutside {
+        /// The first of them.
+        first: PathBuf,
+        /// How many.
+        files: usize,
+    },
     /// Photographs were undistorted: the scene's cameras are the pinholes that
     /// took their place.
     Undistorted {
@@ -63,6 +70,12 @@ impl fmt::Display for SceneWarning {
             Self::ImagesMissing { first, views } => write!(
                 f,
                 "{views} views are left out because their images are not there, such as {}",
+                first.display()
+            ),
+            Self::LinksOutside { first, files } => write!(
+                f,
+                "{files} {} out of the folder of the scene by links, such as {}",
+                if *files == 1 { "file leads" } else { "files lead" },
                 first.display()
             ),
             Self::Undistorted { lenses, views } => write!(

@@ -242,6 +242,9 @@ impl Product<'_> {
     }
 
     /// The columns of one tile width for all rows; gives back the width `N`.
+    ///
+    /// # Safety
+    /// `check` must have held, and `N` vectors from `at.first` must lie in the panel.
     #[inline(always)]
     unsafe fn all_rows<S: Simd, const N: usize, const TRANSPOSED: bool>(
         &mut self,
@@ -268,6 +271,9 @@ impl Product<'_> {
     }
 
     /// One register tile: `M` rows from `row`, `N` vectors of columns.
+    ///
+    /// # Safety
+    /// As [`Self::all_rows`], and the rows must lie in the matrix.
     #[inline(always)]
     unsafe fn tile<S: Simd, const M: usize, const N: usize, const TRANSPOSED: bool>(
         &mut self,
@@ -277,9 +283,9 @@ impl Product<'_> {
     ) {
         let lanes = S::F32_LANES;
         let left_stride = self.left_stride;
-        // SAFETY (whole body): `check` made sure that rows `row..row + M`, the
-        // tile's columns and all of `depth` lie within the operands; vectors have
-        // the alignment of their elements.
+        // SAFETY: `check` made sure that rows `row..row + M`, the tile's columns and
+        // all of `depth` lie within the operands; vectors have the alignment of their
+        // elements.
         unsafe {
             let out = self.out.as_mut_ptr().add(row * self.out_stride + at.first);
             let mut sums = [[simd.splat_f32s(0.0); N]; M];

@@ -160,8 +160,16 @@ pub fn write_json(path: &Path, document: &WireframeDocument) -> Result<(), Expor
 /// If the file is missing, is not such JSON, or fails the checks of [`write_json`].
 pub fn read_json(path: &Path) -> Result<WireframeDocument, ExportError> {
     let bytes = file::read(path, "reconstruct a wireframe first, or give another path")?;
+    parse_json(&bytes, path)
+}
+
+/// [`read_json`] from bytes; `path` is for messages.
+///
+/// # Errors
+/// As [`read_json`].
+pub fn parse_json(bytes: &[u8], path: &Path) -> Result<WireframeDocument, ExportError> {
     let document: WireframeDocument =
-        serde_json::from_slice(&bytes).map_err(|source| ExportError::Json {
+        serde_json::from_slice(bytes).map_err(|source| ExportError::Json {
             path: path.into(),
             source,
         })?;

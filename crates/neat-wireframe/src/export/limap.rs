@@ -67,7 +67,15 @@ pub fn write_all_tracks(path: &Path, tracks: &[LineTrack]) -> Result<(), ExportE
 /// where one must be.
 pub fn read_all_tracks(path: &Path) -> Result<Vec<LineTrack>, ExportError> {
     let bytes = file::read(path, "write line tracks first, or give another path")?;
-    let mut fields = Fields::new(path, &bytes)?;
+    parse_all_tracks(&bytes, path)
+}
+
+/// [`read_all_tracks`] from bytes; `path` is for messages.
+///
+/// # Errors
+/// As [`read_all_tracks`].
+pub fn parse_all_tracks(bytes: &[u8], path: &Path) -> Result<Vec<LineTrack>, ExportError> {
+    let mut fields = Fields::new(path, bytes)?;
     let count: usize = fields.parse("the number of tracks")?;
     let mut tracks = Vec::new();
     for _ in 0..count {
@@ -157,7 +165,16 @@ pub fn read_track_folder(dir: &Path) -> Result<Vec<LineTrack>, ExportError> {
 
 fn read_track(path: &Path) -> Result<LineTrack, ExportError> {
     let bytes = file::read(path, "tracks are numbered from 0 without a gap")?;
-    let mut fields = Fields::new(path, &bytes)?;
+    parse_track(&bytes, path)
+}
+
+/// One track of [`read_track_folder`] from the bytes of its file; `path` is for
+/// messages.
+///
+/// # Errors
+/// If the file breaks the format.
+pub fn parse_track(bytes: &[u8], path: &Path) -> Result<LineTrack, ExportError> {
+    let mut fields = Fields::new(path, bytes)?;
     let segment = LineSegment3::new(fields.point()?, fields.point()?);
     let supports: usize = fields.parse("the number of supporting segments")?;
     let _images: usize = fields.parse("the number of supporting images")?;
@@ -208,7 +225,15 @@ pub fn write_image_list(path: &Path, names: &[String]) -> Result<(), ExportError
 /// If the file is missing or breaks the format.
 pub fn read_image_list(path: &Path) -> Result<Vec<(usize, String)>, ExportError> {
     let bytes = file::read(path, "write the list of images first, or give another path")?;
-    let text = text_of(path, &bytes)?;
+    parse_image_list(&bytes, path)
+}
+
+/// [`read_image_list`] from bytes; `path` is for messages.
+///
+/// # Errors
+/// As [`read_image_list`].
+pub fn parse_image_list(bytes: &[u8], path: &Path) -> Result<Vec<(usize, String)>, ExportError> {
+    let text = text_of(path, bytes)?;
     let mut lines = text.lines();
     let mut record = || {
         let (left, right) = lines.next()?.split_once(',')?;

@@ -9,10 +9,10 @@ mod limap;
 mod obj;
 mod ply;
 
-pub use json::{SupportingSegment, WireframeDocument, read_json, write_json};
+pub use json::{SupportingSegment, WireframeDocument, parse_json, read_json, write_json};
 pub use limap::{
-    LineTrack, TrackSegment, read_all_tracks, read_image_list, read_track_folder, write_all_tracks,
-    write_image_list, write_track_folder,
+    LineTrack, TrackSegment, parse_all_tracks, parse_image_list, parse_track, read_all_tracks,
+    read_image_list, read_track_folder, write_all_tracks, write_image_list, write_track_folder,
 };
 pub use obj::write_obj;
 pub use ply::write_ply;
