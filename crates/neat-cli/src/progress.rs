@@ -43,6 +43,7 @@ impl Progress {
             Event::StageProgress { fraction, .. } => self.update(fraction, ""),
             Event::Step { report, fraction } => self.update(fraction, &describe(report)),
             Event::StageFinished { stage, seconds } => {
+                tracing::info!("{stage} ends");
                 self.line(&format!("{stage:<10} {}", duration::display(seconds)));
             }
             Event::Note(note) => self.line(&note),
@@ -57,6 +58,7 @@ impl Progress {
     }
 
     fn start(&mut self, stage: Stage) {
+        tracing::info!("{stage} begins");
         self.stage_start = Instant::now();
         self.last_line = Instant::now();
         self.first_fraction = None;

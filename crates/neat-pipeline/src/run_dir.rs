@@ -179,6 +179,8 @@ impl RunDir {
     /// If there is something else in the folder, or a part of the run is missing.
     pub fn to_resume(root: &Path) -> Result<Option<Self>, RunDirError> {
         let dir = Self { root: root.into() };
+        // First of all: it must be a folder, if it is there.
+        let present = entries(root)?;
         let files = [CONFIG, MANIFEST];
         let missing: Vec<_> = (files.into_iter())
             .filter(|name| !root.join(name).is_file())
@@ -197,7 +199,7 @@ impl RunDir {
                 .any(|known| name == *known)
                 || file::is_temporary(path)
         };
-        match entries(root)?.iter().all(beginning) {
+        match present.iter().all(beginning) {
             true => Ok(None),
             false => Err(RunDirError::NotARun(root.into())),
         }

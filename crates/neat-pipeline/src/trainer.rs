@@ -648,7 +648,7 @@ fn median(mut values: Vec<f32>) -> f64 {
 }
 
 /// Refuses configurations that would fail or silently ignore something.
-fn validate(config: &Config) -> Result<(), TrainError> {
+pub(crate) fn validate(config: &Config) -> Result<(), TrainError> {
     let refuse = |reason: &str| Err(TrainError::Config(reason.to_owned()));
     let (implicit, train) = (&config.model.implicit, &config.train);
     let encoded = 3 * (1 + 2 * implicit.octaves);

@@ -10,6 +10,7 @@ use crate::field::TrainedField;
 use crate::image_io::write_png;
 use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe, spread_views};
 use neat_core::{View, Wireframe3d, file};
+use neat_report::ReportError;
 use neat_wireframe::export::{WireframeDocument, read_json, write_json, write_obj, write_ply};
 use neat_wireframe::metrics::ImageEvidence;
 use rayon::prelude::*;
@@ -83,6 +84,8 @@ impl Session<'_> {
         // without a page are results nevertheless.
         match self.write_report(document, agreement) {
             Ok(report) => self.written(report),
+            // Of a full disk, a later session can write it.
+            Err(PipelineError::Report(ReportError::File(error))) => return Err(error.into()),
             Err(error) => self.warn(&format!("{NO_REPORT}: {error}")),
         }
         Ok(Reconstruction {

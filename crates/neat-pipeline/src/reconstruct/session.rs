@@ -11,7 +11,7 @@ use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
 use crate::resources::Resources;
 use crate::run_dir::{Existing, RunDir, RunDirError, RunLock};
 use crate::scene::{examine_quickly, prepare_scene};
-use crate::trainer::TrainError;
+use crate::trainer::{TrainError, validate};
 use burn::tensor::Device;
 use neat_core::{Scene, SceneError, file, hawp_json};
 use neat_tensor::Backend;
@@ -52,6 +52,7 @@ impl<'a> Session<'a> {
         on_event: OnEvent<'a>,
     ) -> Result<Self, PipelineError> {
         RunDir::check(&options.out, options.existing)?;
+        validate(&options.config)?;
         // Once: looking for GPUs takes a while.
         let backend = options.backend.resolve();
         let device = backend.device()?;

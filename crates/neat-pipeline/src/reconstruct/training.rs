@@ -97,6 +97,14 @@ impl Session<'_> {
         loop {
             let mut trainer = self.trainer(options)?;
             let from = trainer.iteration();
+            // A kill may have come between the checkpoint and the manifest that tells
+            // of it.
+            self.manifest.steps = from;
+            if from > 0 {
+                let steps = progress.steps;
+                let note = format!("training goes on after step {from} of {steps}");
+                (self.on_event)(Event::Note(note));
+            }
             // Another checkpoint has been reached since the last failure, and holds
             // the rates that led there.
             if from != tried_from {
