@@ -52,7 +52,6 @@ impl<'a> Session<'a> {
         on_event: OnEvent<'a>,
     ) -> Result<Self, PipelineError> {
         RunDir::check(&options.out, options.existing)?;
-        validate(&options.config)?;
         // Once: looking for GPUs takes a while.
         let backend = options.backend.resolve();
         let device = backend.device()?;
@@ -74,6 +73,8 @@ impl<'a> Session<'a> {
             cancelled: Some(cancelled),
         };
         let prepared = prepare_scene(&scene_dir, &mut config, placed, resources, on_event)?;
+        // Before anything is written; what depends on the scene is decided now.
+        validate(&config)?;
         let limit = options.memory_limit;
         // A GPU has memory of its own.
         if backend != Backend::Wgpu {
