@@ -4,6 +4,7 @@
     scripts/measure_objects.py DATA OUT                        seeds 0, 1 and 2, all views
     scripts/measure_objects.py DATA OUT --views 50,25,12       fewer views
     scripts/measure_objects.py DATA OUT --budgets 1,2,4,8      quality over training time
+    scripts/measure_objects.py DATA OUT --refinement           what graph refinement is worth
 
 DATA holds one folder per object, with gt_wireframe.json; HAWP's 2D wireframes are not
 used, except with --hawp. OUT keeps every run, so that an interrupted measurement goes
@@ -13,8 +14,11 @@ and nothing else; --plot FILE.svg draws the mean F-scores over the training time
 
 import argparse
 import json
+import math
 import os
 import pathlib
+import shutil
+import statistics
 import subprocess
 import sys
 
@@ -30,6 +34,11 @@ def arguments():
     parser.add_argument("--budgets", default="", help="seconds of training, with commas")
     parser.add_argument("--hawp", action="store_true", help="use HAWP's wireframes")
     parser.add_argument("--threshold", type=float, default=0.01)
+    parser.add_argument(
+        "--refinement",
+        action="store_true",
+        help="distil every run again without refinement, and without each of its steps",
+    )
     parser.add_argument("--plot", type=pathlib.Path)
     return parser.parse_args()
 
@@ -85,13 +94,18 @@ def evaluate(options, scene, run):
     return scores
 
 
-def measure(options):
-    with_truth = sorted(p.parent for p in options.data.glob("*/gt_wireframe.json"))
+def scenes_with_truth(options):
+    scenes = sorted(p.parent for p in options.data.glob("*/gt_wireframe.json"))
     if options.objects:
         wanted = options.objects.split(",")
-        with_truth = [scene for scene in with_truth if scene.name in wanted]
-    if not with_truth:
+        scenes = [scene for scene in scenes if scene.name in wanted]
+    if not scenes:
         sys.exit(f"{options.data}: no folder holds a gt_wireframe.json")
+    return scenes
+
+
+def measure(options):
+    with_truth = scenes_with_truth(options)
     settings = [(views, None) for views in numbers(options.views)]
     settings += [(None, budget) for budget in numbers(options.budgets)]
     results = []
@@ -191,10 +205,107 @@ def plot(means, path):
     path.write_text("\n".join(lines + ["</svg>\n"]))
 
 
+# Runs of one trained field, by what distillation leaves out.
+WITHOUT = {
+    "refined": [],
+    "without adjustment": ["bundle_adjustment"],
+    "without re-triangulation": ["retriangulation", "junction_splitting"],
+    "unrefined": ["retriangulation", "junction_splitting", "bundle_adjustment"],
+}
+# A found junction farther away is another one, whatever the run; in world units.
+MAX_JUNCTION_ERROR = 0.1
+REFINEMENT_THRESHOLDS = [0.01, 0.005]
+
+
+def measure_refinement(options, scenes):
+    """Every trained run with ever less refinement, and prints the table."""
+    rows = []
+    for original in scenes:
+        scene = original if options.hawp else without_hawp(original, options.out)
+        for seed in (int(s) for s in numbers(options.seeds)):
+            run = options.out / "runs" / scene.name / f"all-views-full-budget-seed-{seed}"
+            reconstruct(options, scene, run, seed, None, None)
+            row = {"object": scene.name, "seed": seed}
+            for name, switches in WITHOUT.items():
+                copy = options.out / "refinement" / scene.name / f"seed-{seed}" / name.replace(" ", "-")
+                distill(options, scene, run, copy, switches)
+                row[name] = {
+                    "errors": junction_errors(scene, copy),
+                    "f": f_scores(options, scene, copy),
+                }
+            rows.append(row)
+            print(".", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
+    (options.out / "refinement.json").write_text(json.dumps(rows, indent=1))
+    refinement_table(rows)
+
+
+def distill(options, scene, run, copy, switches):
+    """Distils a copy of a run with some switches of the fast back end off."""
+    if copy.exists():
+        shutil.rmtree(copy)
+    shutil.copytree(run, copy)
+    command = [options.neat, "distill", copy, "--scene", scene, "--backend", "flex", "--quiet"]
+    for switch in switches:
+        command += ["--set", f"distill.fast.{switch}=false"]
+    subprocess.run([str(x) for x in command], check=True, stdout=subprocess.DEVNULL)
+
+
+def junction_errors(scene, run):
+    """The distance of each true junction from the nearest found one, in world units."""
+    truth = json.loads((scene / "gt_wireframe.json").read_text())["junctions"]
+    found = json.loads((run / "wireframe.json").read_text())["junctions"]
+    return [min((math.dist(x, y) for y in found), default=math.inf) for x in truth]
+
+
+def f_scores(options, scene, run):
+    command = [options.neat, "eval", "--pred", run / "wireframe.json"]
+    command += ["--gt", scene / "gt_wireframe.json", "--format", "json"]
+    command += ["--thresholds", ",".join(str(x) for x in REFINEMENT_THRESHOLDS)]
+    command += ["--matching", "per-threshold"]
+    text = subprocess.run([str(x) for x in command], check=True, capture_output=True, text=True)
+    graph = json.loads(text.stdout)[0]["scores"]["wireframe"]
+    harmonic = lambda p, r: 2 * p * r / (p + r) if p + r > 0 else 0.0
+    return {
+        key: [harmonic(score["precision"], score["recall"]) for score in graph[key]]
+        for key in ("junctions", "segments_max")
+    }
+
+
+def refinement_table(rows):
+    """Median errors of the junctions that all runs of a field have, and F-scores."""
+    print(
+        "| object | seed | junctions | "
+        + " | ".join(f"{name}, median error" for name in WITHOUT)
+        + " | gain | "
+        + " | ".join(f"F at {x:g}, refined / unrefined" for x in REFINEMENT_THRESHOLDS)
+        + " |"
+    )
+    print("| --- | --: | --: |" + " --: |" * (len(WITHOUT) + 1) + " --- |" * len(REFINEMENT_THRESHOLDS))
+    gains = []
+    for row in rows:
+        of_runs = [row[name]["errors"] for name in WITHOUT]
+        common = [errors for errors in zip(*of_runs) if max(errors) <= MAX_JUNCTION_ERROR]
+        medians = [statistics.median(errors) for errors in zip(*common)] or [math.nan] * len(WITHOUT)
+        gains.append(medians[-1] / medians[0] if medians[0] > 0 else math.inf)
+        cells = [f"{median:.5f}" for median in medians] + [f"**{gains[-1]:.1f}**"]
+        for index in range(len(REFINEMENT_THRESHOLDS)):
+            both = [
+                f"J {row[name]['f']['junctions'][index]:.2f} S {row[name]['f']['segments_max'][index]:.2f}"
+                for name in ("refined", "unrefined")
+            ]
+            cells.append(" / ".join(both))
+        print(f"| {row['object']} | {row['seed']} | {len(common)} | " + " | ".join(cells) + " |")
+    print(f"| **median, least** | | | | | | | **{statistics.median(gains):.1f}, {min(gains):.1f}** |" + " |" * len(REFINEMENT_THRESHOLDS))
+
+
 def main():
     options = arguments()
     options.out.mkdir(parents=True, exist_ok=True)
     os.environ.setdefault("NEAT_CACHE", str((options.out / "cache").absolute()))
+    if options.refinement:
+        measure_refinement(options, scenes_with_truth(options))
+        return
     means = table(measure(options))
     if options.plot:
         plot(means, options.plot)
