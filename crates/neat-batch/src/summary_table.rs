@@ -92,10 +92,10 @@ pub fn to_markdown(summary: &Summary) -> String {
     }
     if summary.totals.finished > 1 {
         let totals = &summary.totals;
-        for (name, row, extra) in [("mean", &totals.means, 1), ("median", &totals.medians, 0)] {
+        for (name, row) in [("mean", &totals.means), ("median", &totals.medians)] {
             let words = [format!("*{name}*"), "finished".to_owned(), String::new()];
-            // A mean of counts is seldom whole.
-            let numbers = columns.iter().map(|column| column.for_people(row, extra));
+            // Those of counts need not be whole.
+            let numbers = columns.iter().map(|column| column.for_people(row, 1));
             line(words.into_iter().chain(numbers).collect());
         }
     }

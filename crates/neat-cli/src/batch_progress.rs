@@ -13,6 +13,13 @@ use std::time::Duration;
 /// Rows show that time passes so often.
 const TICK: Duration = Duration::from_millis(500);
 
+/// A row of the table.
+const RUNNING: &str = "{prefix:20!} {elapsed:>4} {wide_msg}";
+/// A row whose worker has nothing to do.
+const IDLE: &str = "{wide_msg}";
+/// The last row.
+const TOTAL: &str = "{bar:24} {pos}/{len} jobs {elapsed:>4} {wide_msg}";
+
 /// Shows the events of a batch.
 pub struct BatchProgress {
     quiet: bool,
@@ -103,7 +110,7 @@ impl BatchProgress {
         let agreement = share.zip(figures.mean_reprojection_error_in_pixels);
         let agreement = agreement.map_or_else(String::new, |(share, error)| {
             let percent = 100.0 * share;
-            format!(", on {percent:.0} % of all 2D segments, {error:.2} px off")
+            format!(", on {percent:.0} % of the length of all 2D segments, {error:.2} px off")
         });
         let (junctions, edges) = (figures.junctions, figures.edges);
         format!(": {junctions} junctions, {edges} edges{agreement}")
@@ -134,19 +141,11 @@ impl Table {
         let drawn = MultiProgress::with_draw_target(ProgressDrawTarget::stderr());
         let row = |template: &str, length: u64| {
             let bar = drawn.add(ProgressBar::new(length));
-            // The templates are fixed; were they wrong, rows would look plain.
-            if let Ok(style) = ProgressStyle::with_template(template) {
-                bar.set_style(style);
-            }
+            restyle(&bar, template);
             bar
         };
-        let rows = (0..workers)
-            .map(|_| row("{prefix:20!} {elapsed:>4} {wide_msg}", 0))
-            .collect();
-        let total = row(
-            "{bar:24} {pos}/{len} jobs {elapsed:>4} {wide_msg}",
-            jobs as u64,
-        );
+        let rows = (0..workers).map(|_| row(IDLE, 0)).collect();
+        let total = row(TOTAL, jobs as u64);
         total.enable_steady_tick(TICK);
         Self {
             drawn,
@@ -163,6 +162,7 @@ impl Table {
                 let Some(row) = self.rows.get(*worker) else {
                     return;
                 };
+                restyle(row, RUNNING);
                 row.reset_elapsed();
                 row.set_prefix(job.name.clone());
                 row.set_message(match attempt {
@@ -191,8 +191,8 @@ impl Table {
         if let Some(worker) = self.running.remove(&job.name) {
             let row = &self.rows[worker];
             row.disable_steady_tick();
-            row.set_prefix("");
             row.set_message("");
+            restyle(row, IDLE);
         }
         if let JobEvent::Failed { .. } = event {
             self.failed += 1;
@@ -203,5 +203,13 @@ impl Table {
             JobEvent::Skipped | JobEvent::Finished { .. } | JobEvent::Failed { .. }
         );
         self.total.inc(u64::from(ended));
+    }
+}
+
+/// Draws a row in another way.
+fn restyle(row: &ProgressBar, template: &str) {
+    // The templates are fixed; were one wrong, its rows would look as before.
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        row.set_style(style);
     }
 }
