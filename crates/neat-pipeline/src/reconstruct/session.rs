@@ -77,7 +77,10 @@ impl<'a> Session<'a> {
         validate(&config)?;
         let limit = options.memory_limit;
         // A GPU has memory of its own.
-        if backend != Backend::Wgpu {
+        if let Some(earlier) = &earlier {
+            // A run keeps the passes that it began with, whatever memory is here.
+            config.train.ray_chunk = earlier.config.train.ray_chunk;
+        } else if backend != Backend::Wgpu {
             fit_memory(&mut config, limit, on_event);
         }
         warnings.extend(prepared.warnings);
