@@ -132,7 +132,7 @@ alone() {
     local solid
     for solid; do
         "$neat" --quiet --threads 1 reconstruct "$work/scenes/$solid" --out "$work/single/$solid" \
-            "${arguments[@]}" >"$work/single-$solid.log" 2>&1
+            "${arguments[@]}" >"$work/single-$solid.log" 2>&1 || return
     done
 }
 alone "${solids[@]:0:4}" &

@@ -103,7 +103,7 @@ pub struct BatchEnd {
 /// happens to them, on the thread of the caller.
 ///
 /// A job that fails, whatever the reason, does not keep others from running: see
-/// [`BatchEnd`] and the [`JobRecord`]s.
+/// [`BatchEnd`] and the [`JobRecord`](crate::JobRecord)s.
 ///
 /// # Errors
 /// If `out` cannot be created.

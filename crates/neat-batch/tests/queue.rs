@@ -103,11 +103,11 @@ fn options() -> BatchOptions {
 }
 
 fn reason(events: &[(String, JobEvent)], name: &str) -> String {
-    let reasons = events.iter().filter_map(|(job, event)| match event {
+    let mut reasons = events.iter().filter_map(|(job, event)| match event {
         JobEvent::Failed { reason } if job == name => Some(reason.clone()),
         _ => None,
     });
-    reasons.last().expect("a failure")
+    reasons.next_back().expect("a failure")
 }
 
 #[test]
