@@ -39,6 +39,8 @@
 //! # Ok::<(), neat_batch::BatchError>(())
 //! ```
 
+#![forbid(unsafe_code)]
+
 mod attempt;
 mod batch;
 mod error;
