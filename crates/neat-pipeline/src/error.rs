@@ -92,7 +92,7 @@ pub enum PipelineError {
         /// The folder of a run that shows the failure again.
         dump: PathBuf,
         /// The last failure.
-        source: TrainError,
+        source: Box<TrainError>,
     },
     /// The device failed, and so did all that it could be replaced by.
     #[error(

@@ -96,7 +96,7 @@ pub enum RunDirError {
         /// The folder of the run.
         path: PathBuf,
         /// What is wrong with the last one.
-        source: CheckpointError,
+        source: Box<CheckpointError>,
     },
     /// A run that ended before its first checkpoint.
     #[error("{0} has no checkpoint: train again with --overwrite")]
@@ -460,7 +460,7 @@ impl RunDir {
             None => Ok(None),
             Some((_, source)) => Err(RunDirError::NoUsableCheckpoint {
                 path: self.root.clone(),
-                source,
+                source: Box::new(source),
             }),
         }
     }

@@ -120,7 +120,7 @@ impl Session<'_> {
                 return Err(PipelineError::Diverged {
                     tries,
                     dump: self.dump(&trainer)?,
-                    source: failure,
+                    source: Box::new(failure),
                 });
             }
             tries += 1;
