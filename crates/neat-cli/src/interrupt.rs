@@ -16,14 +16,15 @@ pub fn repeated_flag() -> Result<Arc<AtomicBool>, CliError> {
     Ok(interrupted)
 }
 
-/// A flag that the first Ctrl-C, or a request to terminate, sets.
+/// A flag that the first Ctrl-C, or a request to terminate, sets. Requests to terminate
+/// may come twice, to a process and to its group: only a second Ctrl-C ends at once.
 pub fn flag() -> Result<Arc<AtomicBool>, CliError> {
     let interrupted = Arc::new(AtomicBool::new(false));
+    // Registered first, so that it acts on the second signal only.
+    flag::register_conditional_shutdown(SIGINT, INTERRUPTED.into(), Arc::clone(&interrupted))
+        .map_err(CliError::Interrupt)?;
     for signal in [SIGINT, SIGTERM] {
-        // Registered first, so that it acts on the second signal only.
-        flag::register_conditional_shutdown(signal, INTERRUPTED.into(), Arc::clone(&interrupted))
-            .and_then(|_| flag::register(signal, Arc::clone(&interrupted)))
-            .map_err(CliError::Interrupt)?;
+        flag::register(signal, Arc::clone(&interrupted)).map_err(CliError::Interrupt)?;
     }
     Ok(interrupted)
 }
