@@ -32,7 +32,7 @@ fn is_device(name: &str) -> bool {
         (base.strip_prefix(*device))
             .is_some_and(|number| matches!(number.as_bytes(), [b'1'..=b'9']))
     };
-    DEVICES.contains(&base.as_str()) || NUMBERED_DEVICES.iter().any(|device| numbered(&device))
+    DEVICES.contains(&base.as_str()) || NUMBERED_DEVICES.iter().any(numbered)
 }
 
 #[cfg(test)]
