@@ -104,8 +104,8 @@ mod tests {
         let mut bytes = small(ImageFormat::Png);
         bytes[16..20].copy_from_slice(&width.to_be_bytes());
         bytes[20..24].copy_from_slice(&height.to_be_bytes());
-        let mut crc = crc32(&bytes[12..29]);
-        bytes[29..33].swap_with_slice(&mut crc);
+        let checksum = crc32(&bytes[12..29]);
+        bytes[29..33].copy_from_slice(&checksum);
         bytes
     }
 
