@@ -30,7 +30,7 @@ fn checkpoint() -> Checkpoint {
 /// A folder with the files of a run, but for its results.
 fn run() -> (TempDir, RunDir) {
     let folder = tempfile::tempdir().unwrap();
-    let run = RunDir::create(folder.path(), Existing::Refuse).unwrap();
+    let (run, _lock) = RunDir::create(folder.path(), Existing::Refuse).unwrap();
     run.write_config(&Preset::Fast.config()).unwrap();
     let manifest = Manifest {
         neat: "0.1.0".into(),
