@@ -20,6 +20,11 @@ pub fn on_each_cpu_backend(test: impl Fn(Device)) {
     on_each_of(&[Backend::Flex, Backend::Ndarray], test);
 }
 
+/// Runs `test` on a device with autodiff of every backend of GPUs.
+pub fn on_each_gpu_backend(test: impl Fn(Device)) {
+    on_each_of(&[Backend::Wgpu], test);
+}
+
 /// The one device in float64 that gradients are checked on: flex, with autodiff.
 pub fn flex() -> Device {
     Device::flex().autodiff()

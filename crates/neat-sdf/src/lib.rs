@@ -4,6 +4,8 @@
 #![forbid(unsafe_code)]
 
 pub mod density;
+#[cfg(feature = "wgpu")]
+pub mod device_sampler;
 pub mod implicit_network;
 pub mod losses;
 pub mod ray_sampler;

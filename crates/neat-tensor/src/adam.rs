@@ -4,6 +4,8 @@
 //! them on the default device. A checkpoint that must resume to the same bytes
 //! on any device wants names and plain tensors.
 
+#[cfg(feature = "wgpu")]
+use crate::device_kernels::{self, adam::StepNumbers};
 use crate::fused;
 use crate::parameters::PathStack;
 use burn::module::{Module, ModuleMapper, Param};
@@ -202,6 +204,26 @@ impl<F: Fn(&str) -> f64> ModuleMapper for AdamStep<'_, F> {
                 let moments: [Tensor<D>; 2] = [tensor(row.first), tensor(row.second)];
                 self.adam.moments.insert(name, Box::new(moments));
                 Tensor::from_inner(tensor(row.value)).set_require_grad(tracked)
+            });
+        }
+        #[cfg(feature = "wgpu")]
+        if device_kernels::takes_kernels(&gradient.device(), gradient.dtype()) {
+            let moments =
+                previous.unwrap_or_else(|| [gradient.zeros_like(), gradient.zeros_like()]);
+            let numbers = StepNumbers {
+                beta1: beta1 as f32,
+                beta2: beta2 as f32,
+                rest1: (1.0 - beta1) as f32,
+                rest2: (1.0 - beta2) as f32,
+                rate: rate as f32,
+                epsilon: (epsilon * root_correction) as f32,
+            };
+            return param.map(|value| {
+                let tracked = value.is_require_grad();
+                let (value, moments) =
+                    device_kernels::adam::step(value.inner(), gradient, moments, numbers);
+                self.adam.moments.insert(name, Box::new(moments));
+                Tensor::from_inner(value).set_require_grad(tracked)
             });
         }
         let first = gradient.clone().mul_scalar(1.0 - beta1);

@@ -14,7 +14,7 @@ use crate::encoding::PositionalEncoding;
 use crate::fused::{self, KnownRows, SoftplusRequest};
 use crate::kernels::softplus_network::{SoftplusNetwork, SoftplusShape};
 use crate::linear::{Linear, affine, flat_parameters, layer_shapes};
-use crate::softplus::{softplus, softplus_derivative};
+use crate::softplus::{softplus, times_softplus_slope};
 use burn::module::Module;
 use burn::tensor::{DType, Tensor};
 use pulp::Arch;
@@ -205,8 +205,8 @@ impl Recorded {
         let mut to_encoding: Option<Tensor<2>> = None;
         for l in (0..=last).rev() {
             if l < last {
-                let slope = softplus_derivative(self.pre_activations[l].clone(), mlp.sharpness);
-                g = (g * slope).matmul(weights[l].clone());
+                let z = self.pre_activations[l].clone();
+                g = times_softplus_slope(g, z, mlp.sharpness).matmul(weights[l].clone());
             }
             if mlp.skip == Some(l) {
                 let scaled = g.div_scalar(std::f64::consts::SQRT_2);

@@ -34,6 +34,12 @@ pub fn set_enabled(enabled: bool) {
     ENABLED.store(enabled, Ordering::Relaxed);
 }
 
+/// See [`set_enabled`].
+#[cfg(feature = "wgpu")]
+pub(crate) fn enabled() -> bool {
+    ENABLED.load(Ordering::Relaxed)
+}
+
 /// Whether networks on `device` run as fused operations (in float32).
 pub fn is_fused(device: &Device) -> bool {
     ENABLED.load(Ordering::Relaxed) && is_on_host(device)

@@ -5,13 +5,17 @@
 //! encoding's Jacobian, softplus with its derivative, a multilayer perceptron
 //! that also returns the gradient of its output with respect to its input — is
 //! written in plain tensor operations, so that first-order reverse mode
-//! differentiates the input gradient once more; and, for the CPU, as fused
-//! operations ([`fused`]) over hand-written [`kernels`] that compute the same.
+//! differentiates the input gradient once more. Beside them stand hand-written
+//! twins that compute the same: for the CPU whole networks as single operations
+//! ([`fused`]) over [`kernels`], for GPUs `device_kernels`, one for what would
+//! take many.
 
 pub mod adam;
 pub mod backend;
 pub mod checkpoint;
 pub mod coordinate_mlp;
+#[cfg(feature = "wgpu")]
+pub mod device_kernels;
 pub mod encoding;
 pub mod fused;
 #[allow(

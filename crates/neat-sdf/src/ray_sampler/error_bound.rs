@@ -7,7 +7,7 @@
 mod opacity_error;
 #[cfg(test)]
 mod plain;
-mod refinement;
+pub(crate) mod refinement;
 #[cfg(test)]
 mod tests;
 
@@ -118,11 +118,10 @@ impl ErrorBoundConfig {
         noise: &mut impl SamplingNoise,
         mut trace: Option<&mut ErrorBoundTrace>,
     ) {
-        let (near, far) = (self.near as f32, self.far as f32);
         let epsilon = self.epsilon as f32;
         let n = self.samples_per_iteration;
         let most_iterations = self.max_iterations.max(1);
-        let first = jittered_linspace(near, far, n, rays.len(), noise);
+        let first = self.first_positions(rays.len(), noise);
         refinement.begin(&first, n, most_iterations, epsilon);
         for iteration in 1..=most_iterations {
             let wanted = refinement.wanted(rays);
@@ -141,6 +140,16 @@ impl ErrorBoundConfig {
                 refinement.upsample_each();
             }
         }
+    }
+
+    /// The positions of the first iteration, `[rays · samples_per_iteration]`.
+    pub(crate) fn first_positions(
+        &self,
+        rays: usize,
+        noise: &mut impl SamplingNoise,
+    ) -> Vec<f32> {
+        let (near, far) = (self.near as f32, self.far as f32);
+        jittered_linspace(near, far, self.samples_per_iteration, rays, noise)
     }
 
     /// The final samples: drawn from the rendering weights, near, far, and some of

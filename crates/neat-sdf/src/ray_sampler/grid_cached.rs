@@ -76,6 +76,16 @@ impl DistanceGrid {
         2.0 * self.radius / self.resolution as f32
     }
 
+    /// Nodes along each axis.
+    pub fn resolution(&self) -> usize {
+        self.resolution
+    }
+
+    /// Radius of the ball that the grid encloses.
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
     /// The distances at all nodes, `[x][y][z]`.
     pub fn values(&self) -> &[f32] {
         &self.values
@@ -101,6 +111,16 @@ impl DistanceGrid {
         ]
     }
 
+    fn interleaved(&self, offset: usize, stride: usize) -> impl Iterator<Item = usize> {
+        (offset..self.values.len()).step_by(stride)
+    }
+
+    /// Positions of the nodes `offset`, `offset + stride`, ….
+    pub fn interleaved_nodes(&self, offset: usize, stride: usize) -> Vec<[f32; 3]> {
+        let nodes = self.interleaved(offset, stride);
+        nodes.map(|node| self.node(node)).collect()
+    }
+
     /// Evaluates the nodes `offset`, `offset + stride`, ….
     pub fn update_interleaved(
         &mut self,
@@ -108,7 +128,7 @@ impl DistanceGrid {
         stride: usize,
         query: &mut impl DistanceQuery,
     ) {
-        let nodes: Vec<usize> = (offset..self.values.len()).step_by(stride).collect();
+        let nodes: Vec<usize> = self.interleaved(offset, stride).collect();
         for nodes in nodes.chunks(QUERY_CHUNK) {
             let points: Vec<[f32; 3]> = nodes.iter().map(|i| self.node(*i)).collect();
             for (node, value) in nodes.iter().zip(query.distances(&points)) {
@@ -153,12 +173,12 @@ fn mix(a: f32, b: f32, t: f32) -> f32 {
 const QUERY_CHUNK: usize = 16_384;
 
 /// Rays that miss the ball are treated as if they grazed it.
-const MIN_HALF_CHORD_SQUARED: f32 = 1e-4;
+pub(crate) const MIN_HALF_CHORD_SQUARED: f32 = 1e-4;
 /// Sampling starts at least this far from the camera.
-const MIN_NEAR: f32 = 0.01;
+pub(crate) const MIN_NEAR: f32 = 0.01;
 
 /// Cumulative steps below this are flat.
-const FLAT_STEP: f32 = 1e-8;
+pub(crate) const FLAT_STEP: f32 = 1e-8;
 
 /// Working memory of one ray after the other.
 #[derive(Default)]
@@ -179,12 +199,21 @@ impl GridCachedConfig {
         iteration: u64,
         query: &mut impl DistanceQuery,
     ) {
-        if iteration == 0 {
-            grid.update_interleaved(0, 1, query);
-        } else if iteration.is_multiple_of(self.refresh_interval) {
-            let turn = (iteration / self.refresh_interval) as usize % self.refresh_stride;
-            grid.update_interleaved(turn, self.refresh_stride, query);
+        if let Some((offset, stride)) = self.due(iteration) {
+            grid.update_interleaved(offset, stride, query);
         }
+    }
+
+    /// Which nodes are refreshed at `iteration`: the first, and every how many.
+    pub(crate) fn due(&self, iteration: u64) -> Option<(usize, usize)> {
+        if iteration == 0 {
+            return Some((0, 1));
+        }
+        if !iteration.is_multiple_of(self.refresh_interval) {
+            return None;
+        }
+        let turn = (iteration / self.refresh_interval) as usize % self.refresh_stride;
+        Some((turn, self.refresh_stride))
     }
 
     pub(super) fn sample(

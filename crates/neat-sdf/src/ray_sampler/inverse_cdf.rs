@@ -35,7 +35,7 @@ pub(super) fn invert(edges: &[f32], cdf: &[f32], flat: f32, u: f32) -> f32 {
 }
 
 /// The `i`-th of `n` evenly spaced numbers from 0 to 1, both included.
-pub(super) fn linspace(i: usize, n: usize) -> f32 {
+pub(crate) fn linspace(i: usize, n: usize) -> f32 {
     if n < 2 {
         return 0.0;
     }

@@ -2,11 +2,12 @@
 //!
 //! Samplers run on the host, without gradients: sorting, running sums and
 //! searches are short per ray and awkward on the tensor backends. They ask the
-//! network for distances in batches.
+//! network for distances in batches. While a model is trained on a GPU,
+//! `device_sampler` does the same there.
 
-mod error_bound;
-mod grid_cached;
-mod inverse_cdf;
+pub(crate) mod error_bound;
+pub(crate) mod grid_cached;
+pub(crate) mod inverse_cdf;
 mod noise;
 mod uniform;
 

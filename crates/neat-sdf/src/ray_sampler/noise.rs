@@ -27,7 +27,7 @@ impl SamplingNoise for Deterministic {
 }
 
 /// Random decisions from a seeded stream.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Seeded<R>(pub R);
 
 impl<R: Rng> SamplingNoise for Seeded<R> {

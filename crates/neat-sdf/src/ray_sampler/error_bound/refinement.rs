@@ -244,7 +244,7 @@ impl Samples<'_> {
 }
 
 /// β large enough for the bound to hold with any distances (VolSDF, Lemma 2).
-fn initial_beta(z: &[f32], epsilon: f32) -> f32 {
+pub(crate) fn initial_beta(z: &[f32], epsilon: f32) -> f32 {
     let squares: f32 = z.windows(2).map(|p| (p[1] - p[0]) * (p[1] - p[0])).sum();
     (squares / (4.0 * (epsilon + 1.0).ln())).sqrt()
 }

@@ -1,0 +1,152 @@
+//! Activations, encoding and optimiser in float32 against plain tensor operations in
+//! float64, which `finite_differences` checks: values and all gradients.
+
+use burn::module::{Module, Param};
+use burn::optim::GradientsParams;
+use burn::tensor::{DType, Device, Tensor, TensorData};
+use neat_tensor::PositionalEncoding;
+use neat_tensor::adam::{Adam, AdamConfig};
+use neat_tensor::random::{Purpose, standard_normal, stream};
+use neat_tensor::softplus::{
+    plain_softplus, plain_times_softplus_slope, softplus, times_softplus_slope,
+};
+use neat_tests::backends::{flex, on_each_gpu_backend};
+use neat_tests::comparison::assert_relatively_close;
+use neat_tests::tensors::numbers;
+
+/// Rows of the tensors: no multiple of any group of units.
+const ROWS: usize = 1003;
+
+/// Normal numbers of deviation `scale`.
+fn normal(columns: usize, scale: f64, which: u64) -> TensorData {
+    let mut rng = stream(which, Purpose::Weights, 0);
+    let values: Vec<f32> = (0..ROWS * columns)
+        .map(|_| (scale * standard_normal(&mut rng)) as f32)
+        .collect();
+    TensorData::new(values, [ROWS, columns])
+}
+
+/// Value and gradients of `function` at `inputs`, weighted by normal numbers.
+fn value_and_gradients<const K: usize>(
+    inputs: &[TensorData; K],
+    device: &Device,
+    dtype: DType,
+    function: impl Fn([Tensor<2>; K]) -> Tensor<2>,
+) -> Vec<Vec<f64>> {
+    let tensor = |data: &TensorData| Tensor::<2>::from_data(data.clone(), (device, dtype));
+    let leaves = inputs.each_ref().map(|data| tensor(data).require_grad());
+    let value = function(leaves.clone());
+    let weights = tensor(&normal(value.dims()[1], 1.0, 9));
+    let gradients = (value.clone() * weights).sum().backward();
+    let of_inputs = leaves.iter().map(|leaf| leaf.grad(&gradients));
+    let mut all = vec![numbers(value)];
+    all.extend(of_inputs.map(|gradient| numbers(gradient.expect("every input matters"))));
+    all
+}
+
+/// `kernel` on every GPU against `plain` in float64, and which functions they are.
+fn compare<const K: usize>(
+    what: &str,
+    inputs: &[TensorData; K],
+    tolerance: f64,
+    kernel: impl Fn([Tensor<2>; K]) -> Tensor<2>,
+    plain: impl Fn([Tensor<2>; K]) -> Tensor<2>,
+) {
+    let truth = value_and_gradients(inputs, &flex(), DType::F64, plain);
+    on_each_gpu_backend(|device| {
+        let found = value_and_gradients(inputs, &device, DType::F32, &kernel);
+        for (i, (found, truth)) in found.iter().zip(&truth).enumerate() {
+            let part = ["value", "1st gradient", "2nd gradient"][i];
+            assert_relatively_close(&format!("{what}, {part}"), found, truth, tolerance);
+        }
+    });
+}
+
+#[test]
+fn softplus_and_its_slopes() {
+    for sharpness in [1.0, 100.0] {
+        // Both the bend and the far ends.
+        for scale in [0.02, 3.0] {
+            let [z, g] = [normal(7, scale, 1), normal(7, 1.0, 2)];
+            compare(
+                &format!("softplus {sharpness} at {scale}"),
+                &[z.clone()],
+                2e-6,
+                |[z]| softplus(z, sharpness),
+                |[z]| plain_softplus(z, sharpness),
+            );
+            compare(
+                &format!("slope {sharpness} at {scale}"),
+                &[g, z],
+                5e-6,
+                |[g, z]| times_softplus_slope(g, z, sharpness),
+                |[g, z]| plain_times_softplus_slope(g, z, sharpness),
+            );
+        }
+    }
+}
+
+#[test]
+fn encoding_and_its_jacobian() {
+    for (width, octaves) in [(3, 6), (3, 4), (5, 1)] {
+        let encoding = PositionalEncoding { octaves };
+        let x = normal(width, 1.0, 3);
+        let gradient = normal(encoding.output_width(width), 1.0, 4);
+        compare(
+            &format!("encoding of {octaves} octaves"),
+            &[x.clone()],
+            2e-6,
+            |[x]| encoding.encode(x),
+            |[x]| encoding.plain_encode(x),
+        );
+        compare(
+            &format!("pulled back through {octaves} octaves"),
+            &[x, gradient],
+            2e-6,
+            |[x, gradient]| encoding.pull_back(x, gradient),
+            |[x, gradient]| encoding.plain_pull_back(x, gradient),
+        );
+    }
+}
+
+/// A parameter to be optimised.
+#[derive(Module, Debug)]
+struct Parameter {
+    matrix: Param<Tensor<2>>,
+}
+
+#[test]
+fn steps_of_adam() {
+    const STEPS: u64 = 3;
+    let start = normal(4, 1.0, 5);
+    let after_steps = |device: &Device, dtype: DType| {
+        let tensor = |data: TensorData| Tensor::<2>::from_data(data, (device, dtype));
+        let mut parameter = Parameter {
+            matrix: Param::from_tensor(tensor(start.clone()).require_grad()),
+        };
+        let mut adam = Adam::new(AdamConfig::default());
+        for step in 0..STEPS {
+            let weights = tensor(normal(4, 1.0, 6 + step));
+            let loss = (parameter.matrix.val() * weights).sum();
+            let mut gradients = GradientsParams::from_grads(loss.backward(), &parameter);
+            parameter = adam.step(parameter, &mut gradients, |_| 0.01);
+        }
+        let [first, second] = adam.state()["matrix"].clone();
+        let moved = numbers(parameter.matrix.val()).into_iter();
+        let start = start.iter::<f64>();
+        [
+            moved.zip(start).map(|(to, from)| to - from).collect(),
+            first.iter::<f64>().collect::<Vec<_>>(),
+            second.iter::<f64>().collect(),
+        ]
+    };
+    let truth = after_steps(&flex(), DType::F64);
+    on_each_gpu_backend(|device| {
+        let found = after_steps(&device, DType::F32);
+        // A move is the small difference of two parameters.
+        let parts = [("move", 2e-5), ("mean", 2e-6), ("square", 2e-6)];
+        for ((what, tolerance), (found, truth)) in parts.iter().zip(found.iter().zip(&truth)) {
+            assert_relatively_close(&format!("Adam's {what}"), found, truth, *tolerance);
+        }
+    });
+}
