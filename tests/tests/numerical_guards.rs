@@ -6,7 +6,7 @@ use neat_core::synthetic::{SyntheticScene, generate};
 use neat_pipeline::preset::Preset;
 use neat_pipeline::trainer::{TrainError, Trainer};
 use neat_tensor::linear::{Linear, LinearInit};
-use neat_tensor::parameters::gradients_are_finite;
+use neat_tensor::parameters::GradientCheck;
 use neat_tests::backends::{on_each_backend, on_each_cpu_backend};
 
 /// Whether the gradients of `Σ x W + b` are finite for the input `x` in one row.
@@ -18,7 +18,7 @@ fn finite_for(x: [f32; 3], device: &Device) -> bool {
     let layer = Linear::new(&init, 3, 2, false, device);
     let output = layer.forward(Tensor::from_data([x], device));
     let gradients = GradientsParams::from_grads(output.sum().backward(), &layer);
-    gradients_are_finite(&layer, &gradients)
+    GradientCheck::of(&layer, &gradients).all_finite()
 }
 
 #[test]

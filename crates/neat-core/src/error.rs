@@ -20,6 +20,14 @@ pub enum SceneError {
         /// How to provide it.
         remedy: String,
     },
+    /// A file where a folder must be.
+    #[error("{path} is a file, not a folder: {remedy}")]
+    NotAFolder {
+        /// The file.
+        path: PathBuf,
+        /// What folder is meant.
+        remedy: String,
+    },
     /// A file of zero bytes.
     #[error("{path} is empty: write or download it again")]
     Empty {

@@ -7,6 +7,9 @@ use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+/// Vertices lie within so many pixels of the image's corner, whatever the image.
+const MAX_COORDINATE: f64 = 1e6;
+
 /// A segment of a 2D wireframe with the detector's score.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ScoredSegment2 {
@@ -60,6 +63,18 @@ pub enum Wireframe2dError {
         /// Which one.
         index: usize,
     },
+    /// A vertex farther out than any image is large.
+    #[error(
+        "vertex number {index} of its wireframe lies at ({x:e}, {y:e}) pixels, far outside of any image"
+    )]
+    FarOutside {
+        /// Which one.
+        index: usize,
+        /// Where it lies.
+        x: f64,
+        /// Where it lies.
+        y: f64,
+    },
     /// An edge that names no vertex.
     #[error(
         "edge {edge} of its wireframe names vertex {vertex}, but there are {vertices} vertices"
@@ -101,6 +116,10 @@ impl Wireframe2d {
             if ![vertex.x, vertex.y, *score].iter().all(|x| x.is_finite()) {
                 let kind = "vertex";
                 return Err(Wireframe2dError::NotFinite { kind, index });
+            }
+            if vertex.x.abs().max(vertex.y.abs()) > MAX_COORDINATE {
+                let (x, y) = (vertex.x, vertex.y);
+                return Err(Wireframe2dError::FarOutside { index, x, y });
             }
         }
         for (index, (edge, score)) in self.edges.iter().zip(&self.edge_scores).enumerate() {

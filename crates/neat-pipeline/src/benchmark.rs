@@ -15,7 +15,7 @@ use neat_core::synthetic::{SyntheticScene, generate};
 use neat_sdf::ImplicitNetwork;
 use neat_tensor::Backend;
 use neat_tensor::backend::software_driver;
-use neat_tensor::fused::is_fused;
+use neat_tensor::fused::has_own_kernels;
 use neat_tensor::random::{Purpose, stream};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -52,7 +52,7 @@ pub struct Benchmark {
     pub device: String,
     /// Threads of the CPU that take part.
     pub threads: usize,
-    /// Whether networks ran as fused operations; else as plain tensor operations.
+    /// Whether hand-written kernels ran; else plain tensor operations alone.
     pub fused: bool,
     /// Side of the square matrices of the yardstick.
     pub yardstick_side: usize,
@@ -181,7 +181,7 @@ pub fn benchmark(
         backend,
         device: device_name(device),
         threads: rayon::current_num_threads(),
-        fused: is_fused(device),
+        fused: has_own_kernels(device),
         yardstick_side: side,
         yardstick,
         yardstick_again,

@@ -9,10 +9,11 @@
 use crate::config::TrainConfig;
 use crate::flops::StepRows;
 use crate::losses::{
-    Losses, RayTerms, RenderedSegments, StepInput, compared_rays, compared_with_observed,
-    eikonal_rows, junction_terms, point_term, ray_terms, render_batch, segment_gradient,
+    GlobalJunctions, Losses, RayTerms, RenderedSegments, StepInput, compared_rays,
+    compared_with_observed, eikonal_rows, junction_terms, point_term, ray_terms, render_batch,
+    segment_gradient,
 };
-use crate::model::{NeatModel, host_vec};
+use crate::model::{NeatModel, PlacedSamples, host_vec};
 use crate::training_data::Batch;
 use burn::module::Module;
 use burn::optim::{GradientsAccumulator, GradientsParams};
@@ -20,6 +21,7 @@ use burn::tensor::{Device, Tensor};
 use neat_core::assignment::AssignmentError;
 use neat_gjp::junction_loss::JunctionLoss;
 use neat_sdf::{RayBundle, RaySamples};
+use neat_tensor::parameters::GradientCheck;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
@@ -35,6 +37,8 @@ pub(crate) struct StepGradients {
     /// Time spent on gradients.
     pub backward: Duration,
     pub gradients: GradientsParams,
+    /// Whether they are numbers.
+    pub finite: bool,
 }
 
 /// Rays `range` of a batch; those through attraction regions come first in it too.
@@ -67,6 +71,9 @@ pub(crate) fn chunked_step(
     device: &Device,
     chunk: usize,
 ) -> Result<StepGradients, AssignmentError> {
+    let PlacedSamples::OnHost(samples, distances) = input.samples else {
+        unreachable!("chunked_step: samples of steps in passes are placed on the host");
+    };
     let rays = input.batch.rays.len();
     let ranges: Vec<Range<usize>> = (0..rays)
         .step_by(chunk.max(1))
@@ -83,7 +90,7 @@ pub(crate) fn chunked_step(
         .map(|range| {
             (
                 chunk_of(input.batch, range),
-                input.samples.of_rays(range.clone()),
+                samples.of_rays(range.clone()),
                 eikonal_points.next().unwrap_or_default(),
             )
         })
@@ -92,7 +99,7 @@ pub(crate) fn chunked_step(
         let (batch, samples, eikonal_points) = &parts[i];
         StepInput {
             batch,
-            samples,
+            samples: PlacedSamples::OnHost(samples, distances),
             eikonal_points,
             ..*input
         }
@@ -127,7 +134,8 @@ pub(crate) fn chunked_step(
     if input.junctions_due && !compared.counted.is_empty() {
         let start = Instant::now();
         let rays = compared_rays(&ends, &compared);
-        let matched = junction_terms(model, input, config, &rays, device)?;
+        let global = GlobalJunctions::of(model);
+        let matched = junction_terms(global, input, config, &rays, device)?;
         assignment = start.elapsed();
         targets = matched.0;
         if let Some(JunctionLoss {
@@ -183,6 +191,8 @@ pub(crate) fn chunked_step(
         }
         add(loss);
     }
+    let gradients = sum.grads();
+    let finite = GradientCheck::of(model, &gradients).all_finite();
     let weights = &config.loss;
     losses.total = weights.rgb * losses.rgb
         + weights.eikonal * losses.eikonal
@@ -198,6 +208,7 @@ pub(crate) fn chunked_step(
         targets,
         assignment,
         backward,
-        gradients: sum.grads(),
+        gradients,
+        finite,
     })
 }

@@ -1,7 +1,9 @@
 //! A trained field: what distillation and rendering ask.
 
 use crate::config::Config;
-use crate::model::{NeatModel, RenderRequest, Rendering, host_points, host_vec, point_tensor};
+use crate::model::{
+    NeatModel, PlacedSamples, RenderRequest, Rendering, host_points, host_vec, point_tensor,
+};
 use crate::trainer::{TrainError, metadata};
 use burn::tensor::{Device, Tensor};
 use nalgebra::Vector3;
@@ -97,8 +99,7 @@ impl TrainedField {
     pub fn render(&self, rays: &RayBundle, samples: &RaySamples, color: bool) -> Rendering {
         let request = RenderRequest {
             rays,
-            samples,
-            distances: &self.distances,
+            samples: PlacedSamples::OnHost(samples, &self.distances),
             beta: Tensor::from_data([self.beta], &self.device),
             min_sample_weight: self.min_sample_weight,
             segment_rays: rays.len(),

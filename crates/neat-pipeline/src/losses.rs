@@ -2,7 +2,9 @@
 
 use crate::config::TrainConfig;
 use crate::flops::StepRows;
-use crate::model::{NeatModel, RenderRequest, Rendering, host_points, host_vec, point_tensor};
+use crate::model::{
+    NeatModel, PlacedSamples, RenderRequest, Rendering, host_points, host_vec, point_tensor,
+};
 use crate::training_data::Batch;
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::Vector2;
@@ -13,8 +15,7 @@ use neat_field::segment_loss::{SegmentLossConfig, segment_loss};
 use neat_field::segment_rendering::{RayCameras, project_calibrated};
 use neat_gjp::candidates::{JunctionView, RenderedSegment, matching_cost};
 use neat_gjp::junction_loss::{JunctionLoss, MatchedJunctions, junction_loss};
-use neat_sdf::losses::{eikonal_loss, mask_loss, point_loss, rgb_loss};
-use neat_sdf::{Distances, RaySamples};
+use neat_sdf::losses::{eikonal_loss, eikonal_loss_where, mask_loss, point_loss, rgb_loss};
 use neat_tensor::fused::is_fused;
 use serde::{Deserialize, Serialize};
 use std::time::{Duration, Instant};
@@ -47,12 +48,12 @@ pub struct Losses {
 pub struct StepInput<'a> {
     /// The rays and what was observed.
     pub batch: &'a Batch,
-    /// Where the rays are sampled.
-    pub samples: &'a RaySamples,
-    /// Distances of the model as it is now.
-    pub distances: &'a Distances,
+    /// Where the rays are sampled, by the model as it is now.
+    pub samples: PlacedSamples<'a>,
     /// Points of the eikonal term besides rendered samples.
     pub eikonal_points: &'a [[f32; 3]],
+    /// More of them that only the device knows, `[K, 3]`, without gradient.
+    pub eikonal_samples: Option<&'a Tensor<2>>,
     /// Points that should lie on the surface.
     pub surface_points: &'a [[f32; 3]],
     /// The views that [`Batch::view_of_ray`] speaks of: camera and 2D junctions.
@@ -126,7 +127,6 @@ pub(crate) fn render_batch(
         &RenderRequest {
             rays: &batch.rays,
             samples: input.samples,
-            distances: input.distances,
             beta,
             min_sample_weight: config.min_sample_weight,
             segment_rays: batch.segment_of_ray.len(),
@@ -134,13 +134,14 @@ pub(crate) fn render_batch(
         },
         device,
     );
-    let samples = batch.rays.len() * input.samples.per_ray;
+    let samples = batch.rays.len() * input.samples.per_ray();
+    let eikonal_samples = input.eikonal_samples.map_or(0, |points| points.dims()[0]);
     let rows = StepRows {
         sampler: 0,
         samples,
         full: rendering.evaluated.as_ref().map_or(samples, Vec::len),
         segment: rendering.segment_samples,
-        eikonal: input.eikonal_points.len(),
+        eikonal: input.eikonal_points.len() + eikonal_samples,
     };
     (rendering, rows)
 }
@@ -167,23 +168,10 @@ pub(crate) fn ray_terms(
     let zero = || Tensor::<1>::zeros([1], device);
     let rays = batch.rays.len();
 
-    let color = rendering.color.expect("colour was asked for");
+    let color = rendering.color.clone().expect("colour was asked for");
     let rgb = rgb_loss(color.clone(), point_tensor(&batch.colors, device));
 
-    let mut gradients = Vec::new();
-    if !input.eikonal_points.is_empty() {
-        let points = point_tensor(input.eikonal_points, device);
-        gradients.push(model.implicit_network.gradient_uncapped(points));
-    }
-    if config.eikonal.rendered_samples {
-        // The bounding sphere has a slope of its own, which nothing can change.
-        gradients.push(rendering.gradients_uncapped);
-    }
-    let eikonal = match gradients.is_empty() {
-        true => zero(),
-        false => eikonal_loss(Tensor::cat(gradients, 0)),
-    };
-
+    let eikonal = eikonal_term(model, input, &rendering, config, device).unwrap_or_else(zero);
     let mask = match config.loss.mask > 0.0 {
         false => zero(),
         true => mask_loss(
@@ -199,6 +187,48 @@ pub(crate) fn ray_terms(
         segments,
         rows,
     }
+}
+
+/// The eikonal term; `None` where no gradient is asked for.
+fn eikonal_term(
+    model: &NeatModel,
+    input: &StepInput<'_>,
+    rendering: &Rendering,
+    config: &TrainConfig,
+    device: &Device,
+) -> Option<Tensor<1>> {
+    let on_device = |points: &Tensor<2>| match device.is_autodiff() {
+        true => Tensor::from_inner(points.clone()),
+        false => points.clone(),
+    };
+    let mut points = Vec::new();
+    if !input.eikonal_points.is_empty() {
+        points.push(point_tensor(input.eikonal_points, device));
+    }
+    points.extend(input.eikonal_samples.map(on_device));
+    let mut gradients = Vec::new();
+    if !points.is_empty() {
+        let points = Tensor::cat(points, 0);
+        gradients.push(model.implicit_network.gradient_uncapped(points));
+    }
+    // The bounding sphere has a slope of its own, which nothing can change.
+    let rendered = (config.eikonal.rendered_samples).then(|| rendering.gradients_uncapped.clone());
+    let counts = rendering.counts.clone().filter(|_| rendered.is_some());
+    let counts = counts.map(|counts| {
+        let all_count = gradients
+            .iter()
+            .map(|g| Tensor::ones([g.dims()[0], 1], device));
+        Tensor::cat(all_count.chain([counts]).collect(), 0)
+    });
+    gradients.extend(rendered);
+    if gradients.is_empty() {
+        return None;
+    }
+    let gradients = Tensor::cat(gradients, 0);
+    Some(match counts {
+        Some(counts) => eikonal_loss_where(gradients, counts),
+        None => eikonal_loss(gradients),
+    })
 }
 
 /// Mean distance of the surface from the points that should lie on it; `None`
@@ -241,14 +271,16 @@ pub fn step_loss(
     let (mut junction_3d, mut junction_2d, mut targets) = (zero(), zero(), 0);
     let mut assignment = Duration::ZERO;
     if let Some(RenderedSegments { ends, opacity }) = segments {
+        let global = input.junctions_due.then(|| model.perceiver.junctions());
         let compared = match is_fused(device) && ends.dtype() == DType::F32 {
-            true => compare_on_host(ends, opacity, input, config),
-            false => compare_on_device(ends, opacity, input, config, device),
+            true => compare_on_host(ends, opacity, global.as_ref(), input, config),
+            false => compare_on_device(ends, opacity, global.as_ref(), input, config, device),
         };
         segment = compared.loss;
-        if input.junctions_due {
+        if let (Some(global), Some(in_world)) = (global, compared.global_in_world) {
             let start = Instant::now();
-            let matched = junction_terms(model, input, config, &compared.rays, device)?;
+            let global = GlobalJunctions { global, in_world };
+            let matched = junction_terms(global, input, config, &compared.rays, device)?;
             assignment = start.elapsed();
             targets = matched.0;
             if let Some(JunctionLoss {
@@ -302,6 +334,26 @@ struct Compared {
     loss: Tensor<1>,
     /// One entry per ray that carries a segment.
     rays: Vec<ComparedRay>,
+    /// Where the global junctions are, if they were given.
+    global_in_world: Option<Vec<[f32; 3]>>,
+}
+
+/// The global junctions.
+pub(crate) struct GlobalJunctions {
+    /// `[N, 3]`.
+    global: Tensor<2>,
+    in_world: Vec<[f32; 3]>,
+}
+
+impl GlobalJunctions {
+    /// Those of a model as it is.
+    pub(crate) fn of(model: &NeatModel) -> Self {
+        let global = model.perceiver.junctions();
+        Self {
+            in_world: host_points(global.clone()),
+            global,
+        }
+    }
 }
 
 pub(crate) struct ComparedRay {
@@ -323,6 +375,7 @@ fn segment_loss_config(config: &TrainConfig) -> SegmentLossConfig {
 fn compare_on_device(
     ends: Tensor<2>,
     opacity: Tensor<2>,
+    global: Option<&Tensor<2>>,
     input: &StepInput<'_>,
     config: &TrainConfig,
     device: &Device,
@@ -338,12 +391,20 @@ fn compare_on_device(
         &cameras,
         segment_loss_config(config),
     );
-    // The one gathered transfer of an iteration: ends, error, counted or not.
-    let gathered = host_vec(Tensor::cat(
-        vec![ends.detach(), loss.error_in_pixels, loss.counted],
-        1,
-    ));
-    let rays = gathered.chunks_exact(8).map(|row| ComparedRay {
+    // The one transfer before the assignment: ends, error, counted or not; and the
+    // global junctions.
+    const COLUMNS: usize = 8;
+    let columns = vec![ends.detach(), loss.error_in_pixels, loss.counted];
+    let flat = |t: Tensor<2>| {
+        let numbers = t.shape().num_elements();
+        t.detach().reshape([numbers])
+    };
+    let rays = Tensor::cat(columns, 1);
+    let of_rays = rays.dims()[0] * COLUMNS;
+    let both = std::iter::once(rays).chain(global.cloned());
+    let gathered = host_vec(Tensor::<1>::cat(both.map(flat).collect(), 0));
+    let (rays, junctions) = gathered.split_at(of_rays);
+    let rays = rays.chunks_exact(COLUMNS).map(|row| ComparedRay {
         ends: std::array::from_fn(|i| row[i]),
         error_in_pixels: row[6],
         counted: row[7] > 0.0,
@@ -351,6 +412,7 @@ fn compare_on_device(
     Compared {
         loss: loss.loss,
         rays: rays.collect(),
+        global_in_world: global.map(|_| junctions.as_chunks().0.to_vec()),
     }
 }
 
@@ -358,6 +420,7 @@ fn compare_on_device(
 fn compare_on_host(
     ends: Tensor<2>,
     opacity: Tensor<2>,
+    global: Option<&Tensor<2>>,
     input: &StepInput<'_>,
     config: &TrainConfig,
 ) -> Compared {
@@ -369,6 +432,7 @@ fn compare_on_host(
     Compared {
         loss: linear.add_scalar(offset),
         rays,
+        global_in_world: global.map(|global| host_points(global.clone())),
     }
 }
 
@@ -417,12 +481,11 @@ pub(crate) fn segment_gradient(ends: Tensor<2>, gradient: Vec<f32>) -> Tensor<1>
     (ends * Tensor::from_data(TensorData::new(gradient, shape), &device)).sum()
 }
 
-impl StepLoss {
-    /// The terms on the host.
-    pub fn losses(&self) -> Losses {
-        let terms = host_vec(self.terms.clone());
+impl Losses {
+    /// From the numbers of [`StepLoss::terms`].
+    pub fn from_terms(terms: &[f32]) -> Self {
         let term = |i: usize| f64::from(terms[i]);
-        Losses {
+        Self {
             total: term(0),
             rgb: term(1),
             eikonal: term(2),
@@ -435,9 +498,19 @@ impl StepLoss {
     }
 }
 
+impl StepLoss {
+    /// The terms on the host.
+    pub fn losses(&self) -> Losses {
+        Losses::from_terms(&host_vec(self.terms.clone()))
+    }
+}
+
 /// Local junctions from the rendered ends, matched with the global ones.
 pub(crate) fn junction_terms(
-    model: &NeatModel,
+    GlobalJunctions {
+        global,
+        in_world: global_in_world,
+    }: GlobalJunctions,
     input: &StepInput<'_>,
     config: &TrainConfig,
     rays: &[ComparedRay],
@@ -460,8 +533,6 @@ pub(crate) fn junction_terms(
     if local.is_empty() {
         return Ok((0, None));
     }
-    let global = model.perceiver.junctions();
-    let global_in_world = host_points(global.clone());
     let local_in_world: Vec<[f32; 3]> = local.iter().map(|l| l.in_world).collect();
 
     // The 2D terms need a view per junction: they are those of a batch from one

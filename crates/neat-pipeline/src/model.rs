@@ -10,7 +10,8 @@ use neat_sdf::volume_rendering::{
     integrate, integrate_selected, rendering_weights, rendering_weights_on_host,
 };
 use neat_sdf::{
-    Distances, ImplicitNetwork, LaplaceDensity, RayBundle, RaySamples, RenderingNetwork,
+    DeviceSamples, Distances, ImplicitNetwork, ImplicitOutput, LaplaceDensity, RayBundle,
+    RaySamples, RenderingNetwork,
 };
 use neat_tensor::fused::KnownRows;
 use neat_tensor::random::{Purpose, stream};
@@ -46,19 +47,39 @@ impl NeatModel {
     }
 }
 
+/// Where rays are sampled.
+#[derive(Clone, Copy, Debug)]
+pub enum PlacedSamples<'a> {
+    /// Placed on the host; and the distances of the model that renders, to tell
+    /// which samples matter.
+    OnHost(&'a RaySamples, &'a Distances),
+    /// Placed where the networks are. All samples are evaluated there, and those
+    /// that do not matter count nothing: to leave them out, the host would have to
+    /// know them.
+    OnDevice(&'a DeviceSamples),
+}
+
+impl PlacedSamples<'_> {
+    /// Samples per ray.
+    pub fn per_ray(&self) -> usize {
+        match self {
+            Self::OnHost(samples, _) => samples.per_ray,
+            Self::OnDevice(samples) => samples.z.dims()[1],
+        }
+    }
+}
+
 /// What to render along which rays.
 #[derive(Clone, Debug)]
 pub struct RenderRequest<'a> {
     /// The rays.
     pub rays: &'a RayBundle,
     /// Where they are sampled.
-    pub samples: &'a RaySamples,
-    /// Distances of the model that renders, to tell which samples matter.
-    pub distances: &'a Distances,
+    pub samples: PlacedSamples<'a>,
     /// Scale of the density, `[1]`.
     pub beta: Tensor<1>,
-    /// Networks other than the distance are evaluated only at samples with a
-    /// larger weight; `None` evaluates all.
+    /// Networks other than the distance are evaluated, or count, only at samples
+    /// with a larger weight; `None` takes all.
     pub min_sample_weight: Option<f64>,
     /// Segments are rendered for so many first rays.
     pub segment_rays: usize,
@@ -84,6 +105,8 @@ pub struct Rendering {
     pub gradients_uncapped: Tensor<2>,
     /// Index `ray · S + sample` of those samples; `None` where it is all.
     pub evaluated: Option<Vec<u32>>,
+    /// 1 for those of them that count, else 0, `[M, 1]`; `None` where all do.
+    pub counts: Option<Tensor<2>>,
     /// How many samples the segments were rendered from.
     pub segment_samples: usize,
 }
@@ -96,7 +119,11 @@ pub fn point_tensor(points: &[[f32; 3]], device: &Device) -> Tensor<2> {
     )
 }
 
-fn index_tensor(indices: impl Iterator<Item = usize>, device: &Device) -> Tensor<1, Int> {
+/// Indices as a tensor `[N]`.
+pub(crate) fn index_tensor(
+    indices: impl Iterator<Item = usize>,
+    device: &Device,
+) -> Tensor<1, Int> {
     let indices: Vec<i64> = indices.map(|i| i as i64).collect();
     let len = indices.len();
     Tensor::from_data(TensorData::new(indices, [len]), device)
@@ -105,7 +132,23 @@ fn index_tensor(indices: impl Iterator<Item = usize>, device: &Device) -> Tensor
 impl NeatModel {
     /// Renders rays (paper eq. 1 and 4).
     pub fn render(&self, request: &RenderRequest<'_>, device: &Device) -> Rendering {
-        let RenderRequest { rays, samples, .. } = *request;
+        match request.samples {
+            PlacedSamples::OnHost(samples, distances) => {
+                self.render_on_host(request, samples, distances, device)
+            }
+            PlacedSamples::OnDevice(samples) => self.render_on_device(request, samples, device),
+        }
+    }
+
+    /// [`Self::render`] of samples that the host knows.
+    fn render_on_host(
+        &self,
+        request: &RenderRequest<'_>,
+        samples: &RaySamples,
+        distances: &Distances,
+        device: &Device,
+    ) -> Rendering {
+        let rays = request.rays;
         let per_ray = samples.per_ray;
         let count = rays.len();
         let total = count * per_ray;
@@ -113,9 +156,10 @@ impl NeatModel {
 
         // Which samples are evaluated in full has to be known before; the
         // distances that tell it are not computed again for the others.
-        let selection = request
-            .min_sample_weight
-            .map(|min_weight| select(request, &points, min_weight));
+        let selection = request.min_sample_weight.map(|min_weight| {
+            let beta = host_vec(request.beta.clone())[0];
+            select(samples, distances, beta, &points, min_weight)
+        });
         let (sdf, output) = match &selection {
             None => self
                 .implicit_network
@@ -137,10 +181,8 @@ impl NeatModel {
                 )
             }
         };
-        let deltas = Tensor::<2>::from_data(
-            TensorData::new(samples.deltas.clone(), [count, per_ray]),
-            device,
-        );
+        let deltas = TensorData::new(samples.deltas.clone(), [count, per_ray]);
+        let deltas = Tensor::<2>::from_data(deltas, device);
         let density = laplace_density(sdf.reshape([count, per_ray]), request.beta.clone());
         let weights = rendering_weights(density, deltas);
 
@@ -149,6 +191,10 @@ impl NeatModel {
         let evaluated = full.as_ref().map_or(total, Vec::len);
         let index = |i: usize| full.as_ref().map_or(i, |full| full[i] as usize);
         let ray_columns = ray_columns(rays, &points, (0..evaluated).map(index), per_ray, device);
+        let of_segments = request.segment_rays * per_ray;
+        let segment_rows = full.as_ref().map_or(of_segments, |full| {
+            full.partition_point(|i| (*i as usize) < of_segments)
+        });
         let integral = |values: Tensor<2>, weights: Tensor<2>, ray_count: usize| match &full {
             None => integrate(weights.narrow(0, 0, ray_count), values),
             Some(full) => {
@@ -164,6 +210,72 @@ impl NeatModel {
                 )
             }
         };
+        let evaluated = Evaluated {
+            ray_columns,
+            output,
+            weights,
+            segment_rows,
+        };
+        Rendering {
+            evaluated: full.clone(),
+            ..self.integrals(request, evaluated, integral, device)
+        }
+    }
+
+    /// [`Self::render`] of samples that the host does not know.
+    fn render_on_device(
+        &self,
+        request: &RenderRequest<'_>,
+        samples: &DeviceSamples,
+        device: &Device,
+    ) -> Rendering {
+        let placed = |tensor: &Tensor<2>| match device.is_autodiff() {
+            true => Tensor::from_inner(tensor.clone()),
+            false => tensor.clone(),
+        };
+        let [count, per_ray] = samples.z.dims();
+        let points = placed(&samples.points);
+        let (sdf, output) = self.implicit_network.evaluate_rows(points.clone(), 0, None);
+        let density = laplace_density(sdf.reshape([count, per_ray]), request.beta.clone());
+        let weights = rendering_weights(density, placed(&samples.deltas));
+        let counts = request.min_sample_weight.map(|min_weight| {
+            let heavier = weights.clone().detach().greater_elem(min_weight as f32);
+            heavier.float()
+        });
+        let integral = |values: Tensor<2>, weights: Tensor<2>, ray_count: usize| {
+            let weights = match &counts {
+                Some(counts) => weights * counts.clone(),
+                None => weights,
+            };
+            integrate(weights.narrow(0, 0, ray_count), values)
+        };
+        let evaluated = Evaluated {
+            ray_columns: Tensor::cat(vec![points, placed(&samples.directions)], 1),
+            output,
+            weights,
+            segment_rows: request.segment_rays * per_ray,
+        };
+        let rendering = self.integrals(request, evaluated, integral, device);
+        Rendering {
+            counts: counts.map(|counts| counts.reshape([count * per_ray, 1])),
+            ..rendering
+        }
+    }
+
+    /// Colour and segments: `integral` of what the networks say over so many rays.
+    fn integrals(
+        &self,
+        request: &RenderRequest<'_>,
+        evaluated: Evaluated,
+        integral: impl Fn(Tensor<2>, Tensor<2>, usize) -> Tensor<2>,
+        device: &Device,
+    ) -> Rendering {
+        let Evaluated {
+            ray_columns,
+            output,
+            weights,
+            segment_rows,
+        } = evaluated;
         let gradients = output.gradient;
         let color = request.color.then(|| {
             let color = self.rendering_network.forward(
@@ -171,19 +283,15 @@ impl NeatModel {
                 gradients.clone(),
                 output.features.clone(),
             );
-            integral(color, weights.clone(), count)
-        });
-        let of_segments = request.segment_rays * per_ray;
-        let rows = full.as_ref().map_or(of_segments, |full| {
-            full.partition_point(|i| (*i as usize) < of_segments)
+            integral(color, weights.clone(), request.rays.len())
         });
         let segments = (request.segment_rays > 0).then(|| {
-            if rows == 0 {
+            if segment_rows == 0 {
                 return Tensor::zeros([request.segment_rays, 6], device);
             }
-            let head = |t: Tensor<2>| match t.dims()[0] == rows {
+            let head = |t: Tensor<2>| match t.dims()[0] == segment_rows {
                 true => t,
-                false => t.narrow(0, 0, rows),
+                false => t.narrow(0, 0, segment_rows),
             };
             let ends = self.attraction_network.forward(
                 head(ray_columns),
@@ -199,19 +307,36 @@ impl NeatModel {
             segments,
             gradients,
             gradients_uncapped: output.gradient_uncapped,
-            evaluated: full,
-            segment_samples: rows,
+            evaluated: None,
+            counts: None,
+            segment_samples: segment_rows,
         }
     }
 }
 
+/// What the first network says of the samples of a batch.
+struct Evaluated {
+    /// Points and directions `[M, 6]`.
+    ray_columns: Tensor<2>,
+    output: ImplicitOutput,
+    /// Weights of all samples `[R, S]`.
+    weights: Tensor<2>,
+    /// So many first samples belong to rays that carry a segment.
+    segment_rows: usize,
+}
+
 /// Samples heavier than `min_weight`; never none (the heaviest stays), so that no
 /// tensor is empty.
-fn select(request: &RenderRequest<'_>, points: &[[f32; 3]], min_weight: f64) -> Selection {
-    let (mut distances, pass) = request.distances.pass(points);
-    request.distances.cap(points, &mut distances);
-    let beta = host_vec(request.beta.clone())[0];
-    let weights = rendering_weights_on_host(&distances, request.samples, beta);
+fn select(
+    samples: &RaySamples,
+    network: &Distances,
+    beta: f32,
+    points: &[[f32; 3]],
+    min_weight: f64,
+) -> Selection {
+    let (mut distances, pass) = network.pass(points);
+    network.cap(points, &mut distances);
+    let weights = rendering_weights_on_host(&distances, samples, beta);
     let samples = 0..weights.len() as u32;
     let weight = |i: u32| weights[i as usize];
     let (mut full, mut light): (Vec<u32>, Vec<u32>) = samples

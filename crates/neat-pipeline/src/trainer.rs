@@ -7,23 +7,22 @@ pub use crate::field::TrainedField;
 use crate::flops::StepRows;
 use crate::losses::{Losses, StepInput, StepLoss, step_loss};
 use crate::model::{NeatModel, host_points, host_vec};
+use crate::sample_placement::{SamplePlacement, StepSamples, StepToSample};
 use crate::surface_points::SurfacePoints;
 use crate::training_data::{Batch, TrainingData};
+use crate::validation::validate;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
 use neat_core::assignment::AssignmentError;
 use neat_core::{Scene, SceneError};
 use neat_gjp::candidates::JunctionView;
+use neat_sdf::ImplicitNetwork;
 use neat_sdf::density::BetaSchedule;
-use neat_sdf::ray_sampler::{RaySampler, RaySamples, Seeded};
-use neat_sdf::{Distances, ImplicitNetwork};
 use neat_tensor::adam::Adam;
 use neat_tensor::checkpoint::Checkpoint;
 use neat_tensor::fused::is_fused;
-use neat_tensor::parameters::{
-    ParameterError, gradients_are_finite, load_parameters, named_parameters,
-};
+use neat_tensor::parameters::{GradientCheck, ParameterError, load_parameters, named_parameters};
 use neat_tensor::random::{Purpose, stream};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
@@ -147,7 +146,7 @@ pub struct Trainer {
     scene_radius: f64,
     model: NeatModel,
     adam: Adam,
-    sampler: RaySampler,
+    sampling: SamplePlacement,
     iteration: u64,
     /// Factor on all learning rates: below 1 after a numerical failure.
     learning_rate_scale: f64,
@@ -162,9 +161,9 @@ pub struct Trainer {
 /// Everything random or observed of one iteration.
 struct Prepared {
     batch: Batch,
-    samples: RaySamples,
-    distances: Distances,
+    samples: StepSamples,
     eikonal_points: Vec<[f32; 3]>,
+    eikonal_samples: Option<Tensor<2>>,
     surface_points: Vec<[f32; 3]>,
     /// Distances that the sampler asked for.
     asked: usize,
@@ -174,9 +173,9 @@ impl Prepared {
     fn input<'a>(&'a self, views: &'a [JunctionView<'a>], junctions_due: bool) -> StepInput<'a> {
         StepInput {
             batch: &self.batch,
-            samples: &self.samples,
-            distances: &self.distances,
+            samples: self.samples.placed(),
             eikonal_points: &self.eikonal_points,
+            eikonal_samples: self.eikonal_samples.as_ref(),
             surface_points: &self.surface_points,
             views,
             junctions_due,
@@ -231,11 +230,12 @@ impl Trainer {
         let device = device.clone().autodiff();
         let model = NeatModel::new(&config.model, scene_radius, seed, &device);
         let initial_radius = config.model.implicit.initial_sphere * scene_radius;
+        let sampler = config.train.sampler.init(scene_radius, initial_radius);
         Ok(Self {
+            sampling: SamplePlacement::new(&config.train, sampler, &device),
             data,
             surface_points: SurfacePoints::of(scene, scene_radius),
             adam: Adam::new(config.train.adam),
-            sampler: config.train.sampler.init(scene_radius, initial_radius),
             beta: config.model.density.initial_beta,
             config: config.clone(),
             seed,
@@ -278,7 +278,7 @@ impl Trainer {
                 moments.entry(name.to_owned()).or_default()[1] = Some(data);
             } else if name == "sampler.grid" {
                 let values = data.convert::<f32>().try_into_vec_as::<f32>();
-                if !values.is_ok_and(|values| trainer.sampler.restore(values)) {
+                if !values.is_ok_and(|values| trainer.sampling.restore(values)) {
                     return Err(TrainError::Checkpoint(name));
                 }
             }
@@ -334,6 +334,7 @@ impl Trainer {
             segment_errors,
             targets,
             mut gradients,
+            finite,
             ..
         } = self.gradients(schedule)?;
         if !losses.total.is_finite() {
@@ -342,7 +343,7 @@ impl Trainer {
                 value: losses.total,
             });
         }
-        if !gradients_are_finite(&self.model, &gradients) {
+        if !finite {
             return Err(TrainError::NonFiniteGradient {
                 iteration: self.iteration + 1,
             });
@@ -380,7 +381,16 @@ impl Trainer {
     /// # Errors
     /// As [`Self::step`].
     pub fn probe(&mut self, schedule: f64) -> Result<Probe, TrainError> {
-        let loss = self.whole_loss(schedule)?;
+        let loss = loop {
+            let (loss, progress) = self.whole_loss(schedule)?;
+            let Some(progress) = progress else {
+                break loss;
+            };
+            let progress = host_vec(progress);
+            if self.sampling.sufficed([progress[0], progress[1]]) {
+                break loss;
+            }
+        };
         let losses = loss.losses();
         let color = host_vec(loss.color.clone());
         let mut gradients = GradientsParams::from_grads(loss.total.backward(), &self.model);
@@ -395,23 +405,7 @@ impl Trainer {
     fn gradients(&mut self, schedule: f64) -> Result<StepGradients, TrainError> {
         let chunk = self.config.train.ray_chunk;
         let Some(chunk) = chunk.filter(|chunk| *chunk < self.config.train.rays) else {
-            let loss = self.whole_loss(schedule)?;
-            let start = Instant::now();
-            let losses = loss.losses();
-            let gradients = match losses.total.is_finite() {
-                true => GradientsParams::from_grads(loss.total.backward(), &self.model),
-                false => GradientsParams::new(),
-            };
-            self.timings.backward = start.elapsed();
-            return Ok(StepGradients {
-                losses,
-                segment_errors: loss.segment_errors,
-                rows: self.rows,
-                targets: loss.targets,
-                assignment: loss.assignment,
-                backward: self.timings.backward,
-                gradients,
-            });
+            return self.whole_gradients(schedule);
         };
         let (prepared, start) = (self.prepare(schedule)?, Instant::now());
         let views = self.junction_views();
@@ -435,8 +429,58 @@ impl Trainer {
         Ok(step)
     }
 
-    /// The loss of the next iteration, all rays at once.
-    fn whole_loss(&mut self, schedule: f64) -> Result<StepLoss, TrainError> {
+    /// Losses and gradients of the next iteration, all rays at once.
+    fn whole_gradients(&mut self, schedule: f64) -> Result<StepGradients, TrainError> {
+        loop {
+            let (loss, progress) = self.whole_loss(schedule)?;
+            let start = Instant::now();
+            let gradients = GradientsParams::from_grads(loss.total.backward(), &self.model);
+            let check = GradientCheck::of(&self.model, &gradients);
+            // Of a device, everything is read at once when the step is over.
+            let beta = (self.is_beta_unknown()).then(|| self.beta_tensor(schedule).inner());
+            let parts = [Some(loss.terms.inner()), beta, progress, check.on_device];
+            let lengths = parts.each_ref().map(|part| match part {
+                Some(part) => part.dims()[0],
+                None => 0,
+            });
+            let report = host_vec(Tensor::cat(parts.into_iter().flatten().collect(), 0));
+            let mut rest = report.as_slice();
+            let [terms, beta, progress, sum] = lengths.map(|length| {
+                let (part, others) = rest.split_at(length);
+                rest = others;
+                part
+            });
+            if let [needed, more_wanted] = *progress
+                && !self.sampling.sufficed([needed, more_wanted])
+            {
+                continue;
+            }
+            if let [beta] = *beta {
+                self.beta = f64::from(beta);
+            }
+            self.timings.backward = start.elapsed();
+            return Ok(StepGradients {
+                losses: Losses::from_terms(terms),
+                segment_errors: loss.segment_errors,
+                rows: self.rows,
+                targets: loss.targets,
+                assignment: loss.assignment,
+                backward: self.timings.backward,
+                gradients,
+                finite: check.on_host && sum.iter().all(|sum| sum.is_finite()),
+            });
+        }
+    }
+
+    /// Whether β is learned and only the device knows it.
+    fn is_beta_unknown(&self) -> bool {
+        let learned = self.config.model.density.schedule == BetaSchedule::Learned;
+        learned && self.sampling.is_on_device()
+    }
+
+    /// The loss of the next iteration, all rays at once, and how far Algorithm 1
+    /// came if nobody knows yet whether that was enough.
+    fn whole_loss(&mut self, schedule: f64) -> Result<(StepLoss, Option<Tensor<1>>), TrainError> {
         let (prepared, start) = (self.prepare(schedule)?, Instant::now());
         let views = self.junction_views();
         let input = prepared.input(&views, self.junctions_due());
@@ -449,7 +493,7 @@ impl Trainer {
         };
         self.timings.assignment = loss.assignment;
         self.timings.forward = start.elapsed() - loss.assignment;
-        Ok(loss)
+        Ok((loss, prepared.samples.progress()))
     }
 
     fn unmatched(&self, source: AssignmentError) -> TrainError {
@@ -488,18 +532,30 @@ impl Trainer {
     /// Draws and places everything random of the next iteration.
     fn prepare(&mut self, schedule: f64) -> Result<Prepared, TrainError> {
         let density = &self.config.model.density;
-        self.beta = match density.schedule {
-            BetaSchedule::Learned => f64::from(host_vec(self.beta_tensor(schedule))[0]),
-            BetaSchedule::Annealed => f64::from(density.annealed_beta(schedule) as f32),
-        };
+        match density.schedule {
+            BetaSchedule::Annealed => {
+                self.beta = f64::from(density.annealed_beta(schedule) as f32);
+            }
+            BetaSchedule::Learned if self.sampling.is_on_device() => {}
+            BetaSchedule::Learned => {
+                self.beta = f64::from(host_vec(self.beta_tensor(schedule))[0]);
+            }
+        }
         let start = Instant::now();
         let batch = (self.data).batch(&self.config, self.seed, self.iteration)?;
         self.timings.batch = start.elapsed();
         let start = Instant::now();
-        let distances = self.model.implicit_network.distances(&self.device);
-        let (samples, asked) = self.sample(&batch, &distances);
+        let to_sample = StepToSample {
+            seed: self.seed,
+            iteration: self.iteration,
+            rays: &batch.rays,
+            beta: self.beta,
+            beta_tensor: self.beta_tensor(schedule),
+            network: &self.model.implicit_network,
+        };
+        let (samples, asked) = self.sampling.place(&to_sample, &self.device);
         self.timings.sampler = start.elapsed();
-        let eikonal_points = self.eikonal_points(&batch, &samples);
+        let (eikonal_points, eikonal_samples) = self.eikonal_points(&batch, &samples);
         let train = &self.config.train;
         let wanted = match train.loss.points > 0.0 {
             true => train.surface_points,
@@ -508,8 +564,8 @@ impl Trainer {
         Ok(Prepared {
             batch,
             samples,
-            distances,
             eikonal_points,
+            eikonal_samples,
             surface_points: (self.surface_points).draw(wanted, self.seed, self.iteration),
             asked,
         })
@@ -530,23 +586,13 @@ impl Trainer {
         self.rows
     }
 
-    /// Samples along the rays of a batch, and how many distances that took.
-    fn sample(&mut self, batch: &Batch, distances: &Distances) -> (RaySamples, usize) {
-        let mut asked = 0;
-        let mut query = |points: &[[f32; 3]]| {
-            asked += points.len();
-            distances.capped(points)
-        };
-        self.sampler.refresh(self.iteration, &mut query);
-        let mut noise = Seeded(stream(self.seed, Purpose::Samples, self.iteration));
-        let samples = self
-            .sampler
-            .sample(&batch.rays, self.beta as f32, &mut query, &mut noise);
-        (samples, asked)
-    }
-
-    /// The points of the eikonal term besides rendered samples.
-    fn eikonal_points(&self, batch: &Batch, samples: &RaySamples) -> Vec<[f32; 3]> {
+    /// The points of the eikonal term besides rendered samples: those that the host
+    /// knows, and those that only the device knows.
+    fn eikonal_points(
+        &self,
+        batch: &Batch,
+        samples: &StepSamples,
+    ) -> (Vec<[f32; 3]>, Option<Tensor<2>>) {
         let config = &self.config.train.eikonal;
         let mut rng = stream(self.seed, Purpose::Eikonal, self.iteration);
         let radius = self.scene_radius as f32;
@@ -554,15 +600,16 @@ impl Trainer {
         let mut points: Vec<[f32; 3]> = (0..count)
             .map(|_| std::array::from_fn(|_| (rng.random::<f32>() * 2.0 - 1.0) * radius))
             .collect();
-        if config.one_sample_per_ray {
-            points.extend((0..batch.rays.len()).map(|ray| {
-                let sample = rng.random_range(0..samples.per_ray);
-                batch
-                    .rays
-                    .point(ray, samples.z[ray * samples.per_ray + sample])
-            }));
+        if !config.one_sample_per_ray {
+            return (points, None);
         }
-        points
+        let per_ray = samples.placed().per_ray();
+        let picks: Vec<usize> = (0..batch.rays.len())
+            .map(|_| rng.random_range(0..per_ray))
+            .collect();
+        let (picked, on_device) = samples.pick(&batch.rays, &picks);
+        points.extend(picked);
+        (points, on_device)
     }
 
     /// Everything that [`Self::resume`] needs.
@@ -579,7 +626,7 @@ impl Trainer {
                 .tensors
                 .insert(format!("adam.second.{name}"), second);
         }
-        if let Some(grid) = self.sampler.state() {
+        if let Some(grid) = self.sampling.sampler().state() {
             let len = grid.len();
             checkpoint.tensors.insert(
                 "sampler.grid".to_owned(),
@@ -609,7 +656,7 @@ impl Trainer {
     pub fn field(&self) -> TrainedField {
         TrainedField::new(
             self.model.valid(),
-            self.sampler.clone(),
+            self.sampling.sampler(),
             self.beta as f32,
             self.scene_radius,
             self.config.train.min_sample_weight,
@@ -645,69 +692,4 @@ fn median(mut values: Vec<f32>) -> f64 {
     }
     values.sort_unstable_by(f32::total_cmp);
     f64::from(values[values.len() / 2])
-}
-
-/// Refuses configurations that would fail or silently ignore something.
-pub(crate) fn validate(config: &Config) -> Result<(), TrainError> {
-    let refuse = |reason: &str| Err(TrainError::Config(reason.to_owned()));
-    let (implicit, train) = (&config.model.implicit, &config.train);
-    let encoded = 3 * (1 + 2 * implicit.octaves);
-    if implicit.hidden_layers == 0 || implicit.width == 0 {
-        return refuse("model.implicit needs at least one hidden layer and a width above 0");
-    }
-    if implicit.skip_layer > 0 {
-        if implicit.skip_layer >= implicit.hidden_layers {
-            return refuse("model.implicit.skip_layer must come before the last hidden layer");
-        }
-        if implicit.width <= encoded {
-            return refuse(
-                "model.implicit.width must exceed the width of the encoding, 3 + 6 octaves, where a skip layer is used",
-            );
-        }
-    }
-    if implicit.octaves > 24 || config.model.attraction.octaves > 24 {
-        return refuse("more than 24 octaves exceed what float32 resolves");
-    }
-    if train.rays == 0 || !(0.0..1.0).contains(&train.background_share) {
-        return refuse("train.rays must be positive and train.background_share in [0, 1)");
-    }
-    if train.ray_chunk == Some(0) {
-        return refuse("train.ray_chunk must be positive");
-    }
-    if train.steps == 0 {
-        return refuse("train.steps must be positive");
-    }
-    if train.checkpoint_interval == 0 || train.kept_checkpoints == 0 {
-        return refuse("train.checkpoint_interval and kept_checkpoints must be positive");
-    }
-    if train.checkpoint_seconds.is_nan() || train.checkpoint_seconds <= 0.0 {
-        return refuse("train.checkpoint_seconds must be positive");
-    }
-    match config.model.perceiver.junctions.fixed() {
-        None => return refuse("model.perceiver.junctions is not decided for this scene"),
-        Some(0) => return refuse("model.perceiver needs junctions"),
-        Some(_) if config.model.perceiver.width == 0 => {
-            return refuse("model.perceiver needs a width");
-        }
-        Some(_) => {}
-    }
-    let positive = |x: f64| x.is_finite() && x > 0.0;
-    let density = &config.model.density;
-    if !positive(density.initial_beta) || !positive(density.final_beta) {
-        return refuse("model.density.initial_beta and final_beta must be positive");
-    }
-    if config.data.scene_radius.is_some_and(|r| !positive(r)) {
-        return refuse("data.scene_radius must be positive");
-    }
-    if !positive(train.learning_rate) || !positive(train.learning_rate_decay) {
-        return refuse("train.learning_rate and learning_rate_decay must be positive");
-    }
-    if train.views == crate::config::BatchViews::All
-        && (train.loss.junction_2d > 0.0 || train.matching.weight_2d > 0.0)
-    {
-        return refuse(
-            "train.loss.junction_2d and train.matching.weight_2d need train.views = \"one\": a junction from many views has no single image",
-        );
-    }
-    Ok(())
 }

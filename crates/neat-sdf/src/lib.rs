@@ -14,5 +14,5 @@ pub mod volume_rendering;
 
 pub use density::{DensityConfig, LaplaceDensity};
 pub use implicit_network::{Distances, ImplicitNetwork, ImplicitNetworkConfig, ImplicitOutput};
-pub use ray_sampler::{RayBundle, RaySampler, RaySamplerConfig, RaySamples};
+pub use ray_sampler::{DeviceSamples, RayBundle, RaySampler, RaySamplerConfig, RaySamples};
 pub use rendering_network::{RenderingNetwork, RenderingNetworkConfig};

@@ -9,6 +9,17 @@ pub fn rgb_loss(rendered: Tensor<2>, observed: Tensor<2>) -> Tensor<1> {
 
 /// Mean of `(|∇sdf| − 1)²` over `gradient` `[N, 3]`.
 pub fn eikonal_loss(gradient: Tensor<2>) -> Tensor<1> {
+    eikonal_terms(gradient).mean()
+}
+
+/// [`eikonal_loss`] over those rows only whose `counts` `[N, 1]` is 1, not 0.
+pub fn eikonal_loss_where(gradient: Tensor<2>, counts: Tensor<2>) -> Tensor<1> {
+    let sum = (eikonal_terms(gradient) * counts.clone()).sum();
+    sum / counts.sum().clamp_min(1.0)
+}
+
+/// `(|∇sdf| − 1)²` of each row, `[N, 1]`.
+fn eikonal_terms(gradient: Tensor<2>) -> Tensor<2> {
     gradient
         .square()
         .sum_dim(1)
@@ -17,7 +28,6 @@ pub fn eikonal_loss(gradient: Tensor<2>) -> Tensor<1> {
         .sqrt()
         .sub_scalar(1.0)
         .square()
-        .mean()
 }
 
 /// Mean absolute distance `sdf` `[N, 1]` at points that lie on the surface, as in

@@ -27,7 +27,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// See [`set_enabled`].
 static ENABLED: AtomicBool = AtomicBool::new(true);
 
-/// Turns fused operations off, or on again, in the whole process: for
+/// Turns fused operations and kernels of GPUs off, or on again, in the whole process: for
 /// measurements and tests that want the plain tensor operations. Set it before
 /// the first network is evaluated; a pass under way may mix both.
 pub fn set_enabled(enabled: bool) {
@@ -43,6 +43,16 @@ pub(crate) fn enabled() -> bool {
 /// Whether networks on `device` run as fused operations (in float32).
 pub fn is_fused(device: &Device) -> bool {
     ENABLED.load(Ordering::Relaxed) && is_on_host(device)
+}
+
+/// Whether tensors on `device` (in float32) go through hand-written twins of tensor
+/// operations: fused networks, or kernels of a GPU.
+pub fn has_own_kernels(device: &Device) -> bool {
+    #[cfg(feature = "wgpu")]
+    if crate::device_kernels::has_kernels(device) {
+        return true;
+    }
+    is_fused(device)
 }
 
 /// Whether `device` is the CPU, whose memory is the host's.

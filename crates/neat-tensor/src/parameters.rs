@@ -118,20 +118,36 @@ impl ModuleVisitor for FiniteGradients<'_> {
     }
 }
 
-/// Whether all gradients of a module's parameters are numbers. Of a GPU one value is
-/// read.
-pub fn gradients_are_finite<M: Module>(module: &M, gradients: &GradientsParams) -> bool {
-    let mut visitor = FiniteGradients {
-        gradients,
-        finite: true,
-        sums: Vec::new(),
-    };
-    module.visit(&mut visitor);
-    if visitor.sums.is_empty() {
-        return visitor.finite;
+/// Whether all gradients of a module's parameters are numbers.
+#[derive(Clone, Debug)]
+pub struct GradientCheck {
+    /// Whether those on the host are.
+    pub on_host: bool,
+    /// A sum `[1]` that is finite only if those on a device are.
+    pub on_device: Option<Tensor<1>>,
+}
+
+impl GradientCheck {
+    /// Looks at the gradients of `module`, without waiting for a device.
+    pub fn of<M: Module>(module: &M, gradients: &GradientsParams) -> Self {
+        let mut visitor = FiniteGradients {
+            gradients,
+            finite: true,
+            sums: Vec::new(),
+        };
+        module.visit(&mut visitor);
+        let sums = visitor.sums;
+        Self {
+            on_host: visitor.finite,
+            on_device: (!sums.is_empty()).then(|| Tensor::cat(sums, 0).sum()),
+        }
     }
-    let total = Tensor::cat(visitor.sums, 0).sum().into_data();
-    visitor.finite && total.iter::<f64>().all(f64::is_finite)
+
+    /// The answer; it may have to be read from the device.
+    pub fn all_finite(self) -> bool {
+        let is_finite = |sum: Tensor<1>| sum.into_data().iter::<f64>().all(f64::is_finite);
+        self.on_host && self.on_device.is_none_or(is_finite)
+    }
 }
 
 /// Why parameters could not be put into a module.

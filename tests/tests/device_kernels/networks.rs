@@ -70,7 +70,7 @@ fn softplus_and_its_slopes() {
             let [z, g] = [normal(7, scale, 1), normal(7, 1.0, 2)];
             compare(
                 &format!("softplus {sharpness} at {scale}"),
-                &[z.clone()],
+                std::array::from_ref(&z),
                 2e-6,
                 |[z]| softplus(z, sharpness),
                 |[z]| plain_softplus(z, sharpness),
@@ -87,6 +87,28 @@ fn softplus_and_its_slopes() {
 }
 
 #[test]
+fn softplus_overflows_nowhere() {
+    let far: [f64; 5] = [-1e30, -1e4, 0.0, 1e4, 1e30];
+    on_each_gpu_backend(|device| {
+        let z = Tensor::<1>::from_data(far.map(|z| z as f32), &device);
+        let values = numbers(softplus(z.clone(), 100.0));
+        let slopes = numbers(times_softplus_slope(z.ones_like(), z, 100.0));
+        for (i, z) in far.into_iter().enumerate() {
+            let (value, slope) = match z {
+                0.0 => (2f64.ln() / 100.0, 0.5),
+                z => (z.max(0.0), f64::from(u8::from(z > 0.0))),
+            };
+            assert!(
+                (values[i] - value).abs() <= 1e-6 * value,
+                "{z}: {}",
+                values[i]
+            );
+            assert!((slopes[i] - slope).abs() <= 1e-6, "{z}: {}", slopes[i]);
+        }
+    });
+}
+
+#[test]
 fn encoding_and_its_jacobian() {
     for (width, octaves) in [(3, 6), (3, 4), (5, 1)] {
         let encoding = PositionalEncoding { octaves };
@@ -94,7 +116,7 @@ fn encoding_and_its_jacobian() {
         let gradient = normal(encoding.output_width(width), 1.0, 4);
         compare(
             &format!("encoding of {octaves} octaves"),
-            &[x.clone()],
+            std::array::from_ref(&x),
             2e-6,
             |[x]| encoding.encode(x),
             |[x]| encoding.plain_encode(x),

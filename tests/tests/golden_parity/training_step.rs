@@ -12,7 +12,7 @@ use neat_gjp::candidates::{CandidateConfig, JunctionView};
 use neat_pipeline::config::Config;
 use neat_pipeline::distill::support_point;
 use neat_pipeline::losses::{StepInput, StepLoss, step_loss};
-use neat_pipeline::model::{NeatModel, RenderRequest};
+use neat_pipeline::model::{NeatModel, PlacedSamples, RenderRequest};
 use neat_pipeline::preset::Preset;
 use neat_pipeline::trainer::learning_rate_factor;
 use neat_pipeline::training_data::{Batch, push_ray_through};
@@ -121,9 +121,12 @@ impl RecordedStep {
         }];
         let input = StepInput {
             batch: &self.batch,
-            samples: &self.samples,
-            distances: &model.implicit_network.distances(device),
+            samples: PlacedSamples::OnHost(
+                &self.samples,
+                &model.implicit_network.distances(device),
+            ),
             eikonal_points: &self.eikonal_points,
+            eikonal_samples: None,
             surface_points: &[],
             views: &views,
             junctions_due: true,
@@ -142,8 +145,10 @@ fn rendering() {
         let rendering = model.render(
             &RenderRequest {
                 rays: &step.batch.rays,
-                samples: &step.samples,
-                distances: &model.implicit_network.distances(&device),
+                samples: PlacedSamples::OnHost(
+                    &step.samples,
+                    &model.implicit_network.distances(&device),
+                ),
                 beta: model.density.beta(),
                 min_sample_weight: None,
                 segment_rays: step.batch.rays.len(),

@@ -16,6 +16,15 @@ fn files_of_scenes() {
                 names: &["scene does not exist", "give the folder of a scene"],
             },
             Case {
+                kind: "a file in place of the folder",
+                spoil: |scene| {
+                    fs::remove_dir_all(scene.file("scene")).unwrap();
+                    fs::write(scene.file("scene"), "?").unwrap();
+                },
+                command: TRAIN,
+                names: &["scene is a file, not a folder", "give the folder of a scene"],
+            },
+            Case {
                 kind: "no file of poses",
                 spoil: |scene| fs::remove_file(scene.file("scene/cameras.npz")).unwrap(),
                 command: TRAIN,

@@ -64,6 +64,11 @@ fn options_of_runs() {
                 &["train.rays", "positive"],
             ),
             option(
+                "more rays than any machine holds",
+                "train scene --out run --backend flex --set train.rays=100000000000",
+                &["train.rays", "the most that neat takes is 67108864"],
+            ),
+            option(
                 "no steps",
                 "train scene --out run --steps 0",
                 &["'0'", "--steps"],

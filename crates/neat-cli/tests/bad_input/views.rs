@@ -53,6 +53,14 @@ fn views() {
                 names: &["image_0001", "edge 0", "4096"],
             },
             Case {
+                kind: "a 2D junction far outside of the image",
+                spoil: |scene| {
+                    change_wireframe(scene, 1, |json| json["vertices"][0] = json!([1e30, 1]));
+                },
+                command: TRAIN,
+                names: &["image_0001", "vertex number 0", "1e30"],
+            },
+            Case {
                 kind: "a 2D junction that is no number",
                 spoil: |scene| {
                     change_wireframe(scene, 1, |json| json["vertices"][0] = json!(["x", 1]));

@@ -108,10 +108,17 @@ impl Layout {
     /// # Errors
     /// If the folder does not exist or follows no known layout.
     pub fn detect(dir: &Path) -> Result<Self, SceneError> {
+        let remedy = "give the folder of a scene";
+        if dir.is_file() {
+            return Err(SceneError::NotAFolder {
+                path: dir.into(),
+                remedy: remedy.into(),
+            });
+        }
         if !dir.is_dir() {
             return Err(SceneError::Missing {
                 path: dir.into(),
-                remedy: "give the folder of a scene".into(),
+                remedy: remedy.into(),
             });
         }
         for npz_path in dtu::candidates(dir) {

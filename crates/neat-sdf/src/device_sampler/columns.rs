@@ -26,7 +26,13 @@ pub(super) fn linspace(i: usize, n: usize) -> f32 {
 /// Turns the `masses` masses after row `first` into the cumulative distribution
 /// from row `first` on; without any mass, all are alike.
 #[cube]
-pub(super) fn cumulate(cdf: &mut Tensor<f32>, first: usize, masses: usize, ray: usize, rays: usize) {
+pub(super) fn cumulate(
+    cdf: &mut Tensor<f32>,
+    first: usize,
+    masses: usize,
+    ray: usize,
+    rays: usize,
+) {
     let mut total = 0.0f32;
     for i in 1..masses + 1 {
         total += cdf[(first + i) * rays + ray];

@@ -97,7 +97,10 @@ fn holds(
 /// `scratch` are `[2 · (len + step), R]`; `state` is β, then whether the bound
 /// holds, `[2, R]`.
 #[cube(launch)]
-#[expect(clippy::too_many_arguments, reason = "a kernel's arguments are its bindings")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "a kernel's arguments are its bindings"
+)]
 fn refine_kernel(
     samples: &Tensor<f32>,
     fresh: &Tensor<f32>,
@@ -158,14 +161,17 @@ fn refine_kernel(
 
             // Once reached, β stays.
             if beta != beta0 {
-                if holds(merged, scratch, room, count, beta0, epsilon, opaque, ray, rays) {
+                if holds(
+                    merged, scratch, room, count, beta0, epsilon, opaque, ray, rays,
+                ) {
                     beta = beta0;
                 } else {
                     let mut low = beta0;
                     for _ in 0..bisections {
                         let middle = (low + beta) / 2.0;
-                        if holds(merged, scratch, room, count, middle, epsilon, opaque, ray, rays)
-                        {
+                        if holds(
+                            merged, scratch, room, count, middle, epsilon, opaque, ray, rays,
+                        ) {
                             beta = middle;
                         } else {
                             low = middle;
@@ -209,7 +215,10 @@ fn refine_kernel(
 /// of the rendering weights, the columns `kept` `[iterations, extras]` of those that
 /// the bound was computed with, far.
 #[cube(launch)]
-#[expect(clippy::too_many_arguments, reason = "a kernel's arguments are its bindings")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "a kernel's arguments are its bindings"
+)]
 fn draw_kernel(
     samples: &Tensor<f32>,
     betas: &Tensor<f32>,

@@ -56,7 +56,10 @@ fn lookup(grid: &Tensor<f32>, nodes: usize, radius: f32, x: f32, y: f32, z: f32)
 /// `noise` `[lookups + drawn + even, R]` moves each within its stratum; `edges`
 /// `[2 (lookups + 1), R]` is scratch for the edges and the cumulative distribution.
 #[cube(launch)]
-#[expect(clippy::too_many_arguments, reason = "a kernel's arguments are its bindings")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "a kernel's arguments are its bindings"
+)]
 fn grid_kernel(
     ray_columns: &Tensor<f32>,
     grid: &Tensor<f32>,

@@ -13,7 +13,8 @@ use crate::ImplicitNetwork;
 use crate::ray_sampler::error_bound::refinement::initial_beta;
 use crate::ray_sampler::inverse_cdf::linspace;
 use crate::ray_sampler::{
-    DistanceGrid, ErrorBoundConfig, GridCachedConfig, RayBundle, SamplingNoise, StopRule,
+    DeviceSamples, DistanceGrid, ErrorBoundConfig, GridCachedConfig, RayBundle, SamplingNoise,
+    StopRule,
 };
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, TensorMetadata, backend_extension};
@@ -30,19 +31,6 @@ const POINT_CHUNK: usize = 65_536;
 pub struct DeviceRays {
     /// Origins and directions side by side, `[R, 6]`.
     columns: Tensor<2>,
-}
-
-/// Sorted samples along rays on a device, without gradients.
-#[derive(Clone, Debug)]
-pub struct DeviceSamples {
-    /// Distances along the rays `[R, S]`, ascending within a ray.
-    pub z: Tensor<2>,
-    /// Length of the interval that begins at each sample `[R, S]`.
-    pub deltas: Tensor<2>,
-    /// The samples' positions `[R · S, 3]`.
-    pub points: Tensor<2>,
-    /// The rays' directions at each sample `[R · S, 3]`.
-    pub directions: Tensor<2>,
 }
 
 /// How far Algorithm 1 came, as a tensor `[2]`: iterations that were needed among
@@ -257,10 +245,7 @@ impl ErrorBoundConfig {
             let sdf = distances(network, rays.points_by_sample(new_z.clone()));
             let fresh = Tensor::cat(vec![new_z, sdf.reshape([step, count])], 0);
             let [iterations, wanted] = [0, 1].map(|i| progress.clone().narrow(0, i, 1));
-            let control = Tensor::cat(
-                vec![beta0.clone(), wanted.clone(), iterations.clone()],
-                0,
-            );
+            let control = Tensor::cat(vec![beta0.clone(), wanted.clone(), iterations.clone()], 0);
             let (merged, next_z, state) = <Dispatch as DeviceSampling>::refine(
                 samples.into_dispatch(),
                 fresh.into_dispatch(),
@@ -371,6 +356,11 @@ impl DeviceGrid {
 }
 
 impl GridCachedConfig {
+    /// Whether a GPU can sample so: there are two nodes to look between.
+    pub fn runs_on_device(&self, grid: &DistanceGrid) -> bool {
+        grid.resolution() >= 2 && self.lookups >= 1
+    }
+
     /// [`crate::RaySampler::refresh`] where the network is. Returns the number of
     /// distances that it took.
     pub fn refresh_on_device(

@@ -143,11 +143,7 @@ impl ErrorBoundConfig {
     }
 
     /// The positions of the first iteration, `[rays · samples_per_iteration]`.
-    pub(crate) fn first_positions(
-        &self,
-        rays: usize,
-        noise: &mut impl SamplingNoise,
-    ) -> Vec<f32> {
+    pub(crate) fn first_positions(&self, rays: usize, noise: &mut impl SamplingNoise) -> Vec<f32> {
         let (near, far) = (self.near as f32, self.far as f32);
         jittered_linspace(near, far, self.samples_per_iteration, rays, noise)
     }

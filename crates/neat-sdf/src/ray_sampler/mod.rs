@@ -16,6 +16,7 @@ pub use grid_cached::{DistanceGrid, GridCachedConfig};
 pub use noise::{Deterministic, SamplingNoise, Seeded};
 pub use uniform::UniformConfig;
 
+use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};
 
 /// Rays, and the stretch of each that is sampled.
@@ -86,6 +87,19 @@ impl RaySamples {
             deltas: self.deltas[samples].to_vec(),
         }
     }
+}
+
+/// Sorted sample positions along rays where the networks are, without gradients.
+#[derive(Clone, Debug)]
+pub struct DeviceSamples {
+    /// Distances along the rays `[R, S]`, ascending within a ray.
+    pub z: Tensor<2>,
+    /// Length of the interval that begins at each sample `[R, S]`.
+    pub deltas: Tensor<2>,
+    /// The samples' positions `[R · S, 3]`.
+    pub points: Tensor<2>,
+    /// The rays' directions at each sample `[R · S, 3]`.
+    pub directions: Tensor<2>,
 }
 
 /// A batched signed distance query.

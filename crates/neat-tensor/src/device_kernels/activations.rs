@@ -11,9 +11,9 @@ use burn_autodiff::checkpoint::base::Checkpointer;
 use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn_autodiff::grads::Gradients;
 use burn_autodiff::ops::{Backward, Ops, OpsKind};
+use burn_cubecl::CubeBackend;
 use burn_cubecl::cubecl::{self, prelude::*};
 use burn_cubecl::kernel::into_contiguous;
-use burn_cubecl::CubeBackend;
 
 /// Activations of a softplus network as operations of a backend; tensors are
 /// float32, all of the same shape.
@@ -23,8 +23,11 @@ pub trait DeviceActivations: Backend {
     fn device_softplus(z: FloatTensor<Self>, sharpness: f32) -> FloatTensor<Self>;
 
     /// `g` times the slope of softplus at `z`.
-    fn device_slope(g: FloatTensor<Self>, z: FloatTensor<Self>, sharpness: f32)
-    -> FloatTensor<Self>;
+    fn device_slope(
+        g: FloatTensor<Self>,
+        z: FloatTensor<Self>,
+        sharpness: f32,
+    ) -> FloatTensor<Self>;
 }
 
 /// What the derivative of [`DeviceActivations::device_slope`] needs besides.

@@ -39,7 +39,10 @@ pub trait DeviceAdam: Backend {
 }
 
 #[cube(launch)]
-#[expect(clippy::too_many_arguments, reason = "a kernel's arguments are its bindings")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "a kernel's arguments are its bindings"
+)]
 fn adam_kernel(
     value: &Tensor<f32>,
     gradient: &Tensor<f32>,
@@ -113,6 +116,9 @@ pub(crate) fn step<const D: usize>(
         second.into_dispatch(),
         numbers,
     );
-    let moments = [burn::Tensor::from_dispatch(first), burn::Tensor::from_dispatch(second)];
+    let moments = [
+        burn::Tensor::from_dispatch(first),
+        burn::Tensor::from_dispatch(second),
+    ];
     (burn::Tensor::from_dispatch(value), moments)
 }

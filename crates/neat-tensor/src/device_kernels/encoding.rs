@@ -353,7 +353,11 @@ pub(crate) fn encode(x: burn::Tensor<2>, octaves: usize) -> burn::Tensor<2> {
 }
 
 /// [`DeviceEncoding::device_pull_back`] for tensors of a GPU.
-pub(crate) fn pull_back(x: burn::Tensor<2>, gradient: burn::Tensor<2>, octaves: usize) -> burn::Tensor<2> {
+pub(crate) fn pull_back(
+    x: burn::Tensor<2>,
+    gradient: burn::Tensor<2>,
+    octaves: usize,
+) -> burn::Tensor<2> {
     use burn::backend::Dispatch;
     let (x, gradient) = (x.into_dispatch(), gradient.into_dispatch());
     burn::Tensor::from_dispatch(<Dispatch as DeviceEncoding>::device_pull_back(

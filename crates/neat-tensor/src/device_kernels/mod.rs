@@ -15,11 +15,20 @@ use burn_cubecl::cubecl::prelude::{CubeCount, CubeDim};
 use burn_cubecl::ops::numeric::empty_device_contiguous_dtype;
 use burn_cubecl::tensor::CubeTensor;
 
-/// Whether tensors of `device` and `dtype` can go through these kernels.
-pub(crate) fn takes_kernels(device: &Device, dtype: DType) -> bool {
+/// Whether float32 tensors of `device` go through these kernels: it is a GPU, and
+/// [`crate::fused::set_enabled`] did not turn them off.
+pub fn has_kernels(device: &Device) -> bool {
     use burn::backend::DispatchDevice;
-    let on_gpu = matches!(device.clone().inner().as_dispatch(), DispatchDevice::Cube(_));
-    dtype == DType::F32 && on_gpu && crate::fused::enabled()
+    let on_gpu = matches!(
+        device.clone().inner().as_dispatch(),
+        DispatchDevice::Cube(_)
+    );
+    on_gpu && crate::fused::enabled()
+}
+
+/// Whether tensors of `device` and `dtype` go through these kernels.
+pub(crate) fn takes_kernels(device: &Device, dtype: DType) -> bool {
+    dtype == DType::F32 && has_kernels(device)
 }
 
 /// A tensor of the same shape and device as `like`, to be written by a kernel.
@@ -37,5 +46,8 @@ fn empty_of(like: &CubeTensor, shape: impl Into<Shape>) -> CubeTensor {
 fn elementwise(tensor: &CubeTensor) -> (CubeCount, CubeDim) {
     let units = tensor.shape().num_elements();
     let dim = CubeDim::new(&tensor.client, units);
-    (calculate_cube_count_elemwise(&tensor.client, units, dim), dim)
+    (
+        calculate_cube_count_elemwise(&tensor.client, units, dim),
+        dim,
+    )
 }

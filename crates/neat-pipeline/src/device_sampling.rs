@@ -1,0 +1,121 @@
+//! Placing the samples of training steps on a GPU, without waiting for it.
+
+use crate::config::TrainConfig;
+use crate::sample_placement::StepToSample;
+use burn::module::Module;
+use burn::tensor::Device;
+use neat_sdf::DeviceSamples;
+use neat_sdf::device_sampler::{DeviceGrid, DeviceRays, Progress};
+use neat_sdf::ray_sampler::{RaySampler, Seeded};
+use neat_tensor::device_kernels::has_kernels;
+use rand::Rng;
+
+/// After so many steps that needed fewer iterations than were launched, one less
+/// is launched.
+const PATIENCE: u64 = 100;
+
+/// What sampling on a device keeps between steps.
+pub(crate) struct DeviceSampling {
+    device: Device,
+    /// The grid of [`RaySampler::GridCached`].
+    grid: Option<DeviceGrid>,
+    /// Iterations of Algorithm 1 that a step launches. How many are needed is known
+    /// only when the step is over.
+    launched: usize,
+    /// Steps in a row that needed fewer.
+    fewer: u64,
+}
+
+/// Samples of one step.
+pub(crate) struct SamplesOnDevice {
+    pub samples: DeviceSamples,
+    /// Of Algorithm 1.
+    pub progress: Option<Progress>,
+    /// Distances that it took.
+    pub asked: usize,
+}
+
+impl DeviceSampling {
+    /// Where `device` has kernels that can sample so.
+    pub fn new(train: &TrainConfig, sampler: &RaySampler, device: &Device) -> Option<Self> {
+        let in_passes = train.ray_chunk.is_some_and(|chunk| chunk < train.rays);
+        let can = match sampler {
+            RaySampler::ErrorBound(config) => config.runs_on_device(),
+            RaySampler::GridCached(config, grid) => config.runs_on_device(grid),
+            RaySampler::Uniform(_) => false,
+        };
+        (can && !in_passes && has_kernels(device)).then(|| {
+            let mut sampling = Self {
+                device: device.clone(),
+                grid: None,
+                launched: 1,
+                fewer: 0,
+            };
+            sampling.take_over(sampler);
+            sampling
+        })
+    }
+
+    /// Goes on with the state of `sampler`.
+    pub fn take_over(&mut self, sampler: &RaySampler) {
+        if let RaySampler::GridCached(_, grid) = sampler {
+            self.grid = Some(DeviceGrid::new(grid, &self.device));
+        }
+    }
+
+    /// The state that [`RaySampler::restore`] takes.
+    pub fn state(&self) -> Option<Vec<f32>> {
+        self.grid.as_ref().map(DeviceGrid::values)
+    }
+
+    /// The samples of `step`, with the parameters of its network as they are.
+    pub fn sample(
+        &mut self,
+        sampler: &RaySampler,
+        step: &StepToSample<'_>,
+        mut noise: Seeded<impl Rng + Clone>,
+    ) -> SamplesOnDevice {
+        let (rays, beta) = (step.rays, step.beta_tensor.clone().inner());
+        let network = &step.network.valid();
+        let on_device = DeviceRays::new(rays, &self.device);
+        match (sampler, &mut self.grid) {
+            (RaySampler::ErrorBound(config), _) => {
+                let (samples, progress) =
+                    config.sample_on_device(&on_device, beta, network, self.launched, &mut noise);
+                SamplesOnDevice {
+                    samples,
+                    progress: Some(progress),
+                    asked: rays.len() * config.samples_per_iteration * self.launched,
+                }
+            }
+            (RaySampler::GridCached(config, like), Some(grid)) => {
+                let asked = config.refresh_on_device(like, grid, step.iteration, network);
+                SamplesOnDevice {
+                    samples: config.sample_on_device(&on_device, beta, like, grid, &mut noise),
+                    progress: None,
+                    asked,
+                }
+            }
+            _ => unreachable!("DeviceSampling::new refuses other samplers"),
+        }
+    }
+
+    /// Hears what became of a step; `false` if it has to be done again because more
+    /// iterations were wanted than were launched.
+    pub fn sufficed(&mut self, [needed, more_wanted]: [f32; 2]) -> bool {
+        if more_wanted > 0.0 {
+            self.launched += 1;
+            self.fewer = 0;
+            return false;
+        }
+        match (needed as usize) < self.launched {
+            true => self.fewer += 1,
+            false => self.fewer = 0,
+        }
+        if self.fewer >= PATIENCE {
+            self.launched -= 1;
+            self.fewer = 0;
+        }
+        true
+    }
+}
