@@ -22,7 +22,10 @@ fn files_of_scenes() {
                     fs::write(scene.file("scene"), "?").unwrap();
                 },
                 command: TRAIN,
-                names: &["scene is a file, not a folder", "give the folder of a scene"],
+                names: &[
+                    "scene is a file, not a folder",
+                    "give the folder of a scene",
+                ],
             },
             Case {
                 kind: "no file of poses",
