@@ -27,7 +27,8 @@ pub(crate) struct StepToSample<'a> {
     pub rays: &'a RayBundle,
     /// Scale of the density; only a placement on the host asks for it.
     pub beta: f64,
-    /// The same as a tensor `[1]`.
+    /// The same as a tensor `[1]`, for a placement on the device.
+    #[cfg(feature = "wgpu")]
     pub beta_tensor: Tensor<1>,
     pub network: &'a ImplicitNetwork,
 }

@@ -550,6 +550,7 @@ impl Trainer {
             iteration: self.iteration,
             rays: &batch.rays,
             beta: self.beta,
+            #[cfg(feature = "wgpu")]
             beta_tensor: self.beta_tensor(schedule),
             network: &self.model.implicit_network,
         };
