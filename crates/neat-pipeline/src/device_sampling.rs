@@ -40,8 +40,8 @@ impl DeviceSampling {
     pub fn new(train: &TrainConfig, sampler: &RaySampler, device: &Device) -> Option<Self> {
         let in_passes = train.ray_chunk.is_some_and(|chunk| chunk < train.rays);
         let can = match sampler {
-            RaySampler::ErrorBound(config) => config.runs_on_device(),
-            RaySampler::GridCached(config, grid) => config.runs_on_device(grid),
+            RaySampler::ErrorBound(config) => config.runs_on_device(train.rays),
+            RaySampler::GridCached(config, grid) => config.runs_on_device(grid, train.rays),
             RaySampler::Uniform(_) => false,
         };
         (can && !in_passes && has_kernels(device)).then(|| {

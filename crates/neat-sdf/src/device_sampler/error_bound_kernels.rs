@@ -292,7 +292,7 @@ fn draw_kernel(
 }
 
 /// Units of a group; the rays of a batch are many groups.
-const UNITS: u32 = 32;
+pub(super) const UNITS: u32 = 32;
 
 pub(super) fn launch_size(rays: usize) -> (CubeCount, CubeDim) {
     let groups = (rays as u32).div_ceil(UNITS);

@@ -26,6 +26,9 @@ use burn_cubecl::tensor::CubeTensor;
 /// Points per pass of the network: bounds the memory of a query.
 const POINT_CHUNK: usize = 65_536;
 
+/// Most rays of a call: groups of units along one axis are at most 65 535.
+const MAX_RAYS: usize = error_bound_kernels::UNITS as usize * 65_535;
+
 /// Rays on a device, without gradients.
 #[derive(Clone, Debug)]
 pub struct DeviceRays {
@@ -207,13 +210,14 @@ fn distances(network: &ImplicitNetwork, points: Tensor<2>) -> Tensor<2> {
 }
 
 impl ErrorBoundConfig {
-    /// Whether a GPU can sample so: all rays stop together, and every iteration has
-    /// enough samples to keep some of.
-    pub fn runs_on_device(&self) -> bool {
+    /// Whether a GPU can sample so many rays so: all stop together, every iteration
+    /// has enough samples to keep some of, and no tensor is empty.
+    pub fn runs_on_device(&self, rays: usize) -> bool {
         self.stop == StopRule::Batch
-            && self.extra_samples <= self.samples_per_iteration
+            && (1..=self.samples_per_iteration).contains(&self.extra_samples)
             && self.samples_per_iteration >= 2
             && self.samples >= 1
+            && (1..=MAX_RAYS).contains(&rays)
     }
 
     /// [`Self::sample`] where the networks are, with at most `launched` iterations.
@@ -356,9 +360,13 @@ impl DeviceGrid {
 }
 
 impl GridCachedConfig {
-    /// Whether a GPU can sample so: there are two nodes to look between.
-    pub fn runs_on_device(&self, grid: &DistanceGrid) -> bool {
-        grid.resolution() >= 2 && self.lookups >= 1
+    /// Whether a GPU can sample so many rays so: there are two nodes to look between,
+    /// and no tensor is empty.
+    pub fn runs_on_device(&self, grid: &DistanceGrid, rays: usize) -> bool {
+        grid.resolution() >= 2
+            && self.lookups >= 1
+            && self.importance_samples + self.uniform_samples >= 1
+            && (1..=MAX_RAYS).contains(&rays)
     }
 
     /// [`crate::RaySampler::refresh`] where the network is. Returns the number of
