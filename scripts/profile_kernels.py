@@ -4,7 +4,8 @@
 CubeCL logs every kernel that it runs, one after the other, where its environment
 variables ask for it. Two trainings that differ by some steps are run so; the
 difference of their logs is what those steps did. Times are of kernels that wait for
-each other, so they say what is large, not how long a step takes.
+each other, so they say what is large, not how long a step takes; few steps give exact
+counts and poor times.
 
     scripts/profile_kernels.py SCENE [--neat target/release/neat] [--steps N]
         [-- OPTION...]              options of `neat train`, such as --preset fast
