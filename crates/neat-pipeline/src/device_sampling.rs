@@ -75,7 +75,11 @@ impl DeviceSampling {
         step: &StepToSample<'_>,
         mut noise: Seeded<impl Rng + Clone>,
     ) -> SamplesOnDevice {
-        let (rays, beta) = (step.rays, step.beta_tensor.clone().inner());
+        let rays = step.rays;
+        let beta = step.beta_tensor.clone();
+        let beta = beta
+            .expect("a step placed on the device has β there")
+            .inner();
         let network = &step.network.valid();
         let on_device = DeviceRays::new(rays, &self.device);
         match (sampler, &mut self.grid) {

@@ -3,7 +3,8 @@
 use crate::config::TrainConfig;
 use crate::flops::StepRows;
 use crate::model::{
-    NeatModel, PlacedSamples, RenderRequest, Rendering, host_points, host_vec, point_tensor,
+    NeatModel, PlacedSamples, RenderRequest, Rendering, constant_on, host_points, host_vec,
+    point_tensor,
 };
 use crate::training_data::Batch;
 use burn::tensor::{DType, Device, Tensor, TensorData};
@@ -197,15 +198,11 @@ fn eikonal_term(
     config: &TrainConfig,
     device: &Device,
 ) -> Option<Tensor<1>> {
-    let on_device = |points: &Tensor<2>| match device.is_autodiff() {
-        true => Tensor::from_inner(points.clone()),
-        false => points.clone(),
-    };
     let mut points = Vec::new();
     if !input.eikonal_points.is_empty() {
         points.push(point_tensor(input.eikonal_points, device));
     }
-    points.extend(input.eikonal_samples.map(on_device));
+    points.extend((input.eikonal_samples).map(|points| constant_on(device, points)));
     let mut gradients = Vec::new();
     if !points.is_empty() {
         let points = Tensor::cat(points, 0);

@@ -119,6 +119,14 @@ pub fn point_tensor(points: &[[f32; 3]], device: &Device) -> Tensor<2> {
     )
 }
 
+/// A constant without gradient, for the graph of `device` if that keeps one.
+pub(crate) fn constant_on(device: &Device, tensor: &Tensor<2>) -> Tensor<2> {
+    match device.is_autodiff() {
+        true => Tensor::from_inner(tensor.clone()),
+        false => tensor.clone(),
+    }
+}
+
 /// Indices as a tensor `[N]`.
 pub(crate) fn index_tensor(
     indices: impl Iterator<Item = usize>,
@@ -229,10 +237,7 @@ impl NeatModel {
         samples: &DeviceSamples,
         device: &Device,
     ) -> Rendering {
-        let placed = |tensor: &Tensor<2>| match device.is_autodiff() {
-            true => Tensor::from_inner(tensor.clone()),
-            false => tensor.clone(),
-        };
+        let placed = |tensor: &Tensor<2>| constant_on(device, tensor);
         let [count, per_ray] = samples.z.dims();
         let points = placed(&samples.points);
         let (sdf, output) = self.implicit_network.evaluate_rows(points.clone(), 0, None);

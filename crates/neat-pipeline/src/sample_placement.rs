@@ -27,9 +27,9 @@ pub(crate) struct StepToSample<'a> {
     pub rays: &'a RayBundle,
     /// Scale of the density; only a placement on the host asks for it.
     pub beta: f64,
-    /// The same as a tensor `[1]`, for a placement on the device.
+    /// The same as a tensor `[1]`, for a placement on the device only.
     #[cfg(feature = "wgpu")]
-    pub beta_tensor: Tensor<1>,
+    pub beta_tensor: Option<Tensor<1>>,
     pub network: &'a ImplicitNetwork,
 }
 

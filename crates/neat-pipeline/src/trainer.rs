@@ -551,7 +551,7 @@ impl Trainer {
             rays: &batch.rays,
             beta: self.beta,
             #[cfg(feature = "wgpu")]
-            beta_tensor: self.beta_tensor(schedule),
+            beta_tensor: (self.sampling.is_on_device()).then(|| self.beta_tensor(schedule)),
             network: &self.model.implicit_network,
         };
         let (samples, asked) = self.sampling.place(&to_sample, &self.device);

@@ -6,16 +6,12 @@ use super::columns::{
     between, count_up_to, cumulate, laplace_density, linspace, sort_almost_sorted,
 };
 use super::{DrawNumbers, RefineNumbers};
+use crate::ray_sampler::error_bound::opacity_error::{MAX_ERROR_FACTOR, SATURATED, opaque_energy};
+use crate::ray_sampler::error_bound::refinement::{FINAL_MASS_FLOOR, FLAT_STEP};
 use burn_cubecl::cubecl::{self, prelude::*};
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
-
-/// Largest value of the exponential inside the bound, as published.
-const MAX_ERROR_FACTOR: f32 = 1e6;
-/// Added to every interval's mass before the last draw, as published.
-const FINAL_MASS_FLOOR: f32 = 1e-5;
-/// Cumulative steps below this are flat, as published.
-const FLAT_STEP: f32 = 1e-5;
+use neat_tensor::device_kernels::empty_of;
 
 /// Lower bound of the distance to the surface within a section (VolSDF Theorem 1).
 #[cube]
@@ -46,8 +42,7 @@ fn section_error(length: f32, d_star: f32, beta: f32) -> f32 {
 /// The bound on the opacity's error behind sections with the given integrals.
 #[cube]
 fn opacity_error(error: f32, energy: f32) -> f32 {
-    // e¹⁴ exceeds the largest factor.
-    let factor = f32::min(f32::exp(f32::min(error, 14.0)), MAX_ERROR_FACTOR);
+    let factor = f32::min(f32::exp(f32::min(error, SATURATED)), MAX_ERROR_FACTOR);
     (factor - 1.0) * f32::exp(-energy)
 }
 
@@ -311,7 +306,7 @@ pub(super) fn refine(
         bisections,
         epsilon,
     } = numbers;
-    let empty = |rows| super::empty_of(&fresh, [rows, rays]);
+    let empty = |rows| empty_of(&fresh, [rows, rays]);
     let room = 2 * (len + step);
     let [merged, scratch, next_z, state] = [room, room, step, 2].map(empty);
     let (count, dim) = launch_size(rays);
@@ -332,8 +327,7 @@ pub(super) fn refine(
         rays,
         bisections,
         epsilon,
-        // From this free energy on the bound holds whatever the error.
-        (MAX_ERROR_FACTOR / epsilon).ln() + 0.01,
+        opaque_energy(epsilon) as f32,
     );
     (merged, next_z, state)
 }
@@ -353,8 +347,8 @@ pub(super) fn draw(
         near,
         far,
     } = numbers;
-    let cdf = super::empty_of(&samples, [len, rays]);
-    let out = super::empty_of(&samples, [rays, drawn + extras + 2]);
+    let cdf = empty_of(&samples, [len, rays]);
+    let out = empty_of(&samples, [rays, drawn + extras + 2]);
     let (count, dim) = launch_size(rays);
     draw_kernel::launch(
         &out.client,

@@ -8,6 +8,7 @@ use crate::ray_sampler::grid_cached::{FLAT_STEP, MIN_HALF_CHORD_SQUARED, MIN_NEA
 use burn_cubecl::cubecl::{self, prelude::*};
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
+use neat_tensor::device_kernels::empty_of;
 
 #[cube]
 fn mix(a: f32, b: f32, t: f32) -> f32 {
@@ -160,8 +161,8 @@ pub(super) fn sample(
         min_beta,
         weight_floor,
     } = numbers;
-    let edges = super::empty_of(&noise, [2 * (lookups + 1), rays]);
-    let [out, deltas] = std::array::from_fn(|_| super::empty_of(&noise, [rays, drawn + even]));
+    let edges = empty_of(&noise, [2 * (lookups + 1), rays]);
+    let [out, deltas] = std::array::from_fn(|_| empty_of(&noise, [rays, drawn + even]));
     let (count, dim) = launch_size(rays);
     grid_kernel::launch(
         &out.client,

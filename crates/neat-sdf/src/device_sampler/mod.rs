@@ -17,11 +17,9 @@ use crate::ray_sampler::{
     StopRule,
 };
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, Dispatch, TensorMetadata, backend_extension};
+use burn::backend::{Backend, Dispatch, backend_extension};
 use burn::tensor::{Device, Tensor, TensorData, s};
 use burn_cubecl::CubeBackend;
-use burn_cubecl::ops::numeric::empty_device_contiguous_dtype;
-use burn_cubecl::tensor::CubeTensor;
 
 /// Points per pass of the network: bounds the memory of a query.
 const POINT_CHUNK: usize = 65_536;
@@ -140,12 +138,6 @@ impl DeviceSampling for CubeBackend {
     ) -> (FloatTensor<Self>, FloatTensor<Self>) {
         grid_kernel::sample([ray_columns, grid, beta, noise], numbers)
     }
-}
-
-/// A matrix where `like` lies, to be written by a kernel.
-fn empty_of(like: &CubeTensor, shape: [usize; 2]) -> CubeTensor {
-    let (client, device) = (like.client.clone(), like.device.clone());
-    empty_device_contiguous_dtype(client, device, shape.into(), like.dtype())
 }
 
 fn matrix(values: Vec<f32>, shape: [usize; 2], device: &Device) -> Tensor<2> {

@@ -4,7 +4,7 @@
 //! distances at the new samples of all rays at once; the rest is done ray by ray,
 //! in memory that is kept between calls.
 
-mod opacity_error;
+pub(crate) mod opacity_error;
 #[cfg(test)]
 mod plain;
 pub(crate) mod refinement;

@@ -37,7 +37,7 @@ fn empty_like(like: &CubeTensor) -> CubeTensor {
 }
 
 /// A tensor of `shape` where `like` lies, to be written by a kernel.
-fn empty_of(like: &CubeTensor, shape: impl Into<Shape>) -> CubeTensor {
+pub fn empty_of(like: &CubeTensor, shape: impl Into<Shape>) -> CubeTensor {
     let (client, device) = (like.client.clone(), like.device.clone());
     empty_device_contiguous_dtype(client, device, shape.into(), like.dtype)
 }

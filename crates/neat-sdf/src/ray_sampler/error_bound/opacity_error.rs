@@ -7,9 +7,9 @@
 use crate::density::laplace_density_scalar;
 
 /// Largest value of the exponential inside the bound, as published.
-const MAX_ERROR_FACTOR: f32 = 1e6;
+pub(crate) const MAX_ERROR_FACTOR: f32 = 1e6;
 /// Error integrals from here on reach [`MAX_ERROR_FACTOR`]: e¹⁴ = 1.2 · 10⁶.
-const SATURATED: f32 = 14.0;
+pub(crate) const SATURATED: f32 = 14.0;
 /// The exponential of anything below rounds to 0 in float32.
 const NOTHING_PASSES: f32 = -104.5;
 
@@ -143,7 +143,7 @@ fn harmless_error(epsilon: f32) -> f32 {
 }
 
 /// Free energy from which every bound is within `epsilon`, on the safe side too.
-fn opaque_energy(epsilon: f32) -> f64 {
+pub(crate) fn opaque_energy(epsilon: f32) -> f64 {
     f64::from(MAX_ERROR_FACTOR / epsilon).ln() + 0.01
 }
 

@@ -9,9 +9,9 @@ use crate::ray_sampler::inverse_cdf::{cumulate, invert, linspace};
 use rayon::prelude::*;
 
 /// Added to every interval's mass before the last draw, as published.
-const FINAL_MASS_FLOOR: f32 = 1e-5;
+pub(crate) const FINAL_MASS_FLOOR: f32 = 1e-5;
 /// Cumulative steps below this are flat, as published.
-const FLAT_STEP: f32 = 1e-5;
+pub(crate) const FLAT_STEP: f32 = 1e-5;
 
 /// The rays of a call. Buffers are `[R · capacity]`, `new_z` is `[R · step]`.
 #[derive(Default)]
