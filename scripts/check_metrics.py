@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """The evaluation protocols once more, with NumPy, SciPy and trimesh.
 
-An implementation that shares nothing with crates/neat-eval. The scores of a small
-synthetic result lie beside it in crates/neat-eval/tests/data, where the test
+An implementation that shares nothing with neat-eval. The scores of a small
+synthetic result lie beside it in neat-eval/tests/data, where the test
 `independent` compares them with those of Rust.
 
     check_metrics.py            computes them again and compares
@@ -22,7 +22,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
-DATA = Path(__file__).resolve().parent.parent / "crates/neat-eval/tests/data"
+DATA = Path(__file__).resolve().parent.parent / "neat-eval/tests/data"
 MILLIMETRES = 100.0  # the unit cube is 10 cm on DTU's table
 METRES = 10.0  # and 10 m as a building
 

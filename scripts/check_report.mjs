@@ -6,7 +6,7 @@
 //
 // Any error or warning on the console, any request to the network, and anything that
 // does not react as it should is a failure. Screenshots are compared, coarsely, with
-// those in crates/neat-report/tests/screenshots; --update replaces these. Needs Node 18
+// those in neat-report/tests/screenshots; --update replaces these. Needs Node 18
 // and Chromium (or CHROMIUM=path), nothing else.
 
 import assert from "node:assert/strict";
@@ -25,7 +25,7 @@ if (options.length !== 1) {
   console.error("usage: check_report.mjs FOLDER [--screenshots DIR] [--update]");
   process.exit(2);
 }
-const references = fileURLToPath(new URL("../crates/neat-report/tests/screenshots", import.meta.url));
+const references = fileURLToPath(new URL("../neat-report/tests/screenshots", import.meta.url));
 const screenshots = new Screenshots({ references, kept, update });
 const [sample, hostile, empty] = ["sample", "hostile", "empty"].map(
   (name) => pathToFileURL(resolve(options[0], `${name}.html`)).href);

@@ -1,7 +1,7 @@
 //! Damaged files of a run folder: checkpoints, configuration, manifest and logs are
 //! read or refused, and nothing else.
 
-#[path = "../../crates/neat-core/src/mutation.rs"]
+#[path = "../../neat-core/src/mutation.rs"]
 mod mutation;
 
 use burn::tensor::TensorData;

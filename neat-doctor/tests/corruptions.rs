@@ -1,0 +1,412 @@
+//! Good scenes pass, and of spoilt ones the right cause is named.
+
+mod corruption;
+
+use corruption::{Base, Corruption, judged, load_options};
+use neat_core::layout::{CameraAxes, Layout, PoseConvention, abc};
+use neat_core::synthetic::{Solid, SyntheticScene, generate};
+use neat_core::{LoadOptions, Scene, load_scene};
+use neat_doctor::{
+    Cause, Check, Depth, ExamineOptions, Level, Repair, Verdict, examine, examine_folder,
+};
+use proptest::prelude::*;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The folder of a real scene, or `None`, said aloud, where there is none.
+#[expect(clippy::print_stderr, reason = "a skipped test must be seen")]
+fn real(scene: &str) -> Option<PathBuf> {
+    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
+    let root = std::env::var_os("NEAT_DATA").map_or_else(|| default.into(), PathBuf::from);
+    let dir = root.join(scene);
+    if dir.is_dir() {
+        return Some(dir);
+    }
+    eprintln!("skipped: no real data at {}", dir.display());
+    None
+}
+
+fn synthetic(solid: Solid, views: usize) -> Scene {
+    let config = SyntheticScene {
+        solid,
+        views,
+        image_size: 400,
+        ..SyntheticScene::default()
+    };
+    generate(&config).unwrap().scene
+}
+
+/// All corruptions of a scene that are not judged right.
+fn misjudged(base: &Base) -> Vec<(Corruption, String)> {
+    let judge = |corruption: Corruption| {
+        let dir = corruption.write(base);
+        let options = ExamineOptions::default();
+        let examination = examine_folder(dir.path(), &load_options(), &options);
+        Some((corruption, judged(corruption, &examination).err()?))
+    };
+    Corruption::ALL.into_iter().filter_map(judge).collect()
+}
+
+#[test]
+fn every_corruption_of_a_synthetic_scene_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    abc::write_scene(&synthetic(Solid::LPrism, 30), dir.path()).unwrap();
+    let scene = load_scene(dir.path(), &load_options()).unwrap().scene;
+    let wrong = misjudged(&Base::new(scene, dir.path()));
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+fn assert_every_corruption_is_named(name: &str) {
+    let Some(dir) = real(name) else {
+        return;
+    };
+    let scene = load_scene(&dir, &load_options()).unwrap().scene;
+    let wrong = misjudged(&Base::new(scene, &dir));
+    assert!(wrong.is_empty(), "{name}: {wrong:#?}");
+}
+
+#[test]
+fn every_corruption_of_the_toy_object_is_named() {
+    assert_every_corruption_is_named("abc-00075213");
+}
+
+#[test]
+fn every_corruption_of_ten_photographs_is_named() {
+    assert_every_corruption_is_named("strecha-entry-P10");
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn every_corruption_of_49_photographs_is_named() {
+    assert_every_corruption_is_named("dtu-scan24");
+}
+
+#[test]
+fn all_solids_pass_at_both_depths() {
+    for solid in Solid::ALL {
+        let scene = synthetic(solid, 40);
+        for depth in [Depth::Quick, Depth::Full] {
+            let options = ExamineOptions {
+                depth,
+                ..ExamineOptions::default()
+            };
+            let examination = examine(&scene, &options);
+            assert_eq!(
+                examination.verdict,
+                Verdict::Ready,
+                "{depth:?} {examination}"
+            );
+        }
+    }
+}
+
+#[test]
+fn real_scenes_pass_at_both_depths() {
+    let scenes = [
+        "abc-00075213",
+        "abc-00001776",
+        "abc-00003173",
+        "cad-0406",
+        "cad-three-concave",
+        "abcnef-00000952",
+        "abcnef-00004926",
+        "dtu-scan24",
+        "strecha-entry-P10",
+        "sceaux-castle",
+    ];
+    for name in scenes {
+        let Some(dir) = real(name) else {
+            continue;
+        };
+        let load = LoadOptions {
+            layout: Some(Layout::CamerasJson),
+            ..load_options()
+        };
+        for depth in [Depth::Quick, Depth::Full] {
+            let options = ExamineOptions {
+                depth,
+                ..ExamineOptions::default()
+            };
+            let examination = examine_folder(&dir, &load, &options);
+            assert_eq!(examination.problems().count(), 0, "{depth:?} {examination}");
+            let poses = examination
+                .findings
+                .iter()
+                .find(|f| f.check == Check::Poses);
+            assert_eq!(
+                poses.map(|f| f.level),
+                Some(Level::Good),
+                "{depth:?} {examination}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_quick_look_at_a_bad_scene_becomes_a_thorough_one() {
+    let mut scene = synthetic(Solid::StairPrism, 40);
+    for view in &mut scene.views {
+        view.camera.intrinsics.fx *= 1.5;
+        view.camera.intrinsics.fy *= 1.5;
+    }
+    let options = ExamineOptions {
+        depth: Depth::Quick,
+        ..ExamineOptions::default()
+    };
+    let examination = examine(&scene, &options);
+    let problem = examination.problems().next().unwrap();
+    assert_eq!(problem.cause, Some(Cause::FocalLength), "{examination}");
+}
+
+#[test]
+fn two_images_that_traded_places_are_both_named() {
+    let mut scene = synthetic(Solid::LPrism, 40);
+    let (first, second) = (scene.views[4].camera, scene.views[9].camera);
+    scene.views[4].camera = second;
+    scene.views[9].camera = first;
+    let examination = examine(&scene, &ExamineOptions::default());
+    let problem = examination.problems().next().unwrap();
+    assert_eq!(problem.cause, Some(Cause::ImageOrder), "{examination}");
+    assert_eq!(problem.views, ["image_0004", "image_0009"]);
+}
+
+#[test]
+fn rarer_faults_are_named_too() {
+    type Spoil = fn(&mut Scene);
+    let faults: [(Spoil, Cause); 3] = [
+        (
+            |scene| {
+                for view in &mut scene.views {
+                    view.camera.world_from_camera.transpose_mut();
+                }
+            },
+            Cause::TransposedRotations,
+        ),
+        (
+            |scene| {
+                let cameras: Vec<_> = scene.views.iter().map(|view| view.camera).collect();
+                for (view, camera) in scene.views.iter_mut().zip(cameras.into_iter().rev()) {
+                    view.camera = camera;
+                }
+            },
+            Cause::ImageOrder,
+        ),
+        (
+            |scene| {
+                for view in &mut scene.views {
+                    view.camera.intrinsics.cx *= 0.5;
+                }
+            },
+            Cause::PrincipalPoint,
+        ),
+    ];
+    for (spoil, cause) in faults {
+        let mut scene = synthetic(Solid::UPrism, 30);
+        spoil(&mut scene);
+        let examination = examine(&scene, &ExamineOptions::default());
+        let problem = examination.problems().next().unwrap();
+        assert_eq!(problem.cause, Some(cause), "{examination}");
+    }
+}
+
+#[test]
+fn images_sorted_as_text_and_poses_by_number_are_told_apart() {
+    let mut scene = synthetic(Solid::LPrism, 40);
+    for (index, view) in scene.views.iter_mut().enumerate() {
+        view.name = format!("photo{}", index + 1);
+    }
+    // The poses stay in the order of the numbers, as from a list.
+    let cameras: Vec<_> = scene.views.iter().map(|view| view.camera).collect();
+    scene.views.sort_by(|a, b| a.name.cmp(&b.name));
+    for (view, camera) in scene.views.iter_mut().zip(cameras) {
+        view.camera = camera;
+    }
+    let examination = examine(&scene, &ExamineOptions::default());
+    let problem = examination.problems().next().unwrap();
+    assert_eq!(problem.cause, Some(Cause::ImageOrder), "{examination}");
+    assert!(problem.message.contains("follow the numbers"), "{problem}");
+}
+
+#[test]
+fn remedies_take_the_place_of_flags_that_were_given() {
+    let mut scene = synthetic(Solid::LPrism, 30);
+    // OpenCV axes, but read as OpenGL's, and focal lengths doubled by a flag.
+    let flip = nalgebra::Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, -1.0, -1.0));
+    for view in &mut scene.views {
+        view.camera.world_from_camera *= flip;
+        view.camera.intrinsics.fx *= 2.0;
+        view.camera.intrinsics.fy *= 2.0;
+    }
+    let read_with = Repair {
+        pose_convention: Some("right-up-back".parse().map(axes).unwrap()),
+        focal_scale: Some(2.0),
+        ..Repair::default()
+    };
+    let options = ExamineOptions {
+        read_with,
+        ..ExamineOptions::default()
+    };
+    let examination = examine(&scene, &options);
+    let repair = examination.problems().next().unwrap().repair.unwrap();
+    assert_eq!(repair.pose_convention, Some(PoseConvention::default()));
+    assert!((repair.focal_scale.unwrap() - 1.0).abs() < 0.01, "{repair}");
+}
+
+fn axes(axes: CameraAxes) -> PoseConvention {
+    PoseConvention {
+        axes,
+        ..PoseConvention::default()
+    }
+}
+
+#[test]
+fn images_without_anything_to_see_are_no_false_alarm() {
+    let mut scene = synthetic(Solid::Box, 20);
+    for view in &mut scene.views {
+        // A round, soft spot: no corners.
+        let (width, height) = view.image.dimensions();
+        view.image = image::RgbImage::from_fn(width, height, |x, y| {
+            let [x, y] = [(x, width), (y, height)]
+                .map(|(at, extent)| f64::from(at) / f64::from(extent) - 0.5);
+            image::Rgb([(255.0 * (-8.0 * (x * x + y * y)).exp()) as u8; 3])
+        })
+        .into();
+    }
+    let examination = examine(&scene, &ExamineOptions::default());
+    let poses = examination
+        .findings
+        .iter()
+        .find(|f| f.check == Check::Poses)
+        .unwrap();
+    assert_eq!(poses.cause, Some(Cause::TooLittleEvidence), "{examination}");
+    assert_eq!(poses.level, Level::Note);
+}
+
+#[test]
+fn scenes_of_one_or_two_views_are_examined() {
+    for views in [1, 2, 3] {
+        let examination = examine(&synthetic(Solid::Wedge, views), &ExamineOptions::default());
+        assert_eq!(examination.views, views);
+    }
+}
+
+#[test]
+fn images_of_half_size_with_sizes_in_the_file_are_repaired_by_a_flag() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = synthetic(Solid::LPrism, 24);
+    fs::create_dir(dir.path().join("images")).unwrap();
+    let mut frames = Vec::new();
+    for view in &scene.views {
+        let file = format!("images/{}.png", view.name);
+        let (width, height) = view.image.dimensions();
+        let filter = image::imageops::FilterType::Triangle;
+        let half =
+            image::imageops::resize(&*view.image.read().unwrap(), width / 2, height / 2, filter);
+        half.save(dir.path().join(&file)).unwrap();
+        let rows = |m: &dyn Fn(usize, usize) -> f64, side: usize| -> Vec<Vec<f64>> {
+            (0..side)
+                .map(|i| (0..side).map(|j| m(i, j)).collect())
+                .collect()
+        };
+        let (k, pose) = (
+            view.camera.intrinsics.matrix(),
+            view.camera.matrix_world_from_camera(),
+        );
+        frames.push(serde_json::json!({
+            "file": file, "width": width, "height": height,
+            "K": rows(&|i, j| k[(i, j)], 3), "c2w": rows(&|i, j| pose[(i, j)], 4),
+        }));
+    }
+    let cameras = dir.path().join("cameras.json");
+    fs::write(
+        &cameras,
+        serde_json::json!({ "frames": frames }).to_string(),
+    )
+    .unwrap();
+    let examination = examine_folder(dir.path(), &load_options(), &ExamineOptions::default());
+    let problem = examination.problems().next().unwrap();
+    assert_eq!(problem.cause, Some(Cause::ResizedImages), "{examination}");
+    let repair = problem.repair.unwrap();
+    assert_eq!(repair.to_string(), "--intrinsics-scale 0.5");
+    let repaired = repair.apply(&load_options());
+    let examination = examine_folder(dir.path(), &repaired, &ExamineOptions::default());
+    assert_eq!(examination.problems().count(), 0, "{examination}");
+
+    // What Python writes for numbers that are none.
+    let text = fs::read_to_string(&cameras)
+        .unwrap()
+        .replacen("1.0", "NaN", 1);
+    fs::write(&cameras, text).unwrap();
+    assert_eq!(first_cause(dir.path()), Some(Cause::NotFinite));
+    fs::write(&cameras, "{\"frames\": [").unwrap();
+    assert_eq!(first_cause(dir.path()), Some(Cause::DamagedFile));
+    fs::remove_file(&cameras).unwrap();
+    assert_eq!(first_cause(dir.path()), Some(Cause::MissingFile));
+}
+
+fn first_cause(dir: &Path) -> Option<Cause> {
+    let examination = examine_folder(dir, &load_options(), &ExamineOptions::default());
+    examination.problems().next()?.cause
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn cameras_of_any_kind_are_examined_without_panic(
+        size in (1u32..70, 1u32..70),
+        focal in -3.0..9.0f64,
+        principal in prop::array::uniform2(-1e9..1e9f64),
+        centers in prop::collection::vec(prop::array::uniform3(-1e12..1e12f64), 1..12),
+        texture: u32,
+    ) {
+        let (width, height) = size;
+        let mut scene = synthetic_frame(width, height, texture, centers.len());
+        for (view, center) in scene.views.iter_mut().zip(&centers) {
+            view.camera.intrinsics.fx = 10f64.powf(focal);
+            [view.camera.intrinsics.cx, view.camera.intrinsics.cy] = principal;
+            view.camera.center_in_world = (*center).into();
+        }
+        let examination = examine(&scene, &ExamineOptions::default());
+        prop_assert!(examination.to_string().contains("Verdict"));
+    }
+}
+
+/// Views of noise from one place.
+fn synthetic_frame(width: u32, height: u32, texture: u32, views: usize) -> Scene {
+    let config = SyntheticScene {
+        views: 1,
+        image_size: 16,
+        ..SyntheticScene::default()
+    };
+    let mut scene = generate(&config).unwrap().scene;
+    let first = scene.views.remove(0);
+    for index in 0..views {
+        let mut view = first.clone();
+        view.name = format!("view{index:02}");
+        (view.camera.width, view.camera.height) = (width, height);
+        view.wireframe = neat_core::Wireframe2d::empty(width, height);
+        view.image = image::RgbImage::from_fn(width, height, |x, y| {
+            let mixed = (x * 7919 + y * 104_729)
+                .wrapping_add(texture)
+                .wrapping_mul(2_654_435_761);
+            image::Rgb([(mixed >> 24) as u8; 3])
+        })
+        .into();
+        scene.views.push(view);
+    }
+    scene
+}
+
+#[test]
+fn the_number_of_threads_does_not_change_what_is_found() {
+    let mut scene = synthetic(Solid::TPrism, 24);
+    scene.views[5].camera = scene.views[6].camera;
+    let examined = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| examine(&scene, &ExamineOptions::default()))
+    };
+    assert_eq!(examined(1), examined(3));
+}
