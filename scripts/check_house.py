@@ -6,12 +6,14 @@
 
 Counts production lines: Rust below `src`, without tests, comments, attributes of
 documentation and blank lines. Fails if a function of a library is longer than
-80 such lines, if a crate has more than a dozen public modules, or if the modules of a
-crate import each other in a circle.
+80 such lines, if a crate has more than a dozen public modules, if the modules of a
+crate import each other in a circle, or if a crate depends on another that the list
+"layers" of docs/architecture.md does not name beside it, or the other way round.
 """
 
 import re
 import sys
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -154,8 +156,33 @@ def circles(graph):
     return found
 
 
+def layers():
+    """What the documentation and the manifests say differently of who depends on whom."""
+    text = (ROOT / "docs/architecture.md").read_text()
+    block = re.search(r"```text\n(neat-core\n.*?)```", text, re.S)
+    if not block:
+        return ["docs/architecture.md has no list of crates that begins with neat-core"]
+    told, seen, broken = {}, set(), []
+    for line in block.group(1).splitlines():
+        crate, _, below = line.partition("→")
+        crate = crate.strip()
+        told[crate] = set(below.split())
+        for other in sorted(told[crate] - seen):
+            broken.append(f"docs/architecture.md lists {crate} above {other}")
+        seen.add(crate)
+    for manifest in sorted(ROOT.glob("neat-*/Cargo.toml")):
+        crate = manifest.parent.name
+        names = tomllib.loads(manifest.read_text()).get("dependencies", {})
+        real = {name for name in names if name.startswith("neat-")}
+        for other in sorted(real - told.get(crate, set())):
+            broken.append(f"{crate} depends on {other}: not in docs/architecture.md")
+        for other in sorted(told.get(crate, set()) - real):
+            broken.append(f"{crate} does not depend on {other}: docs/architecture.md says so")
+    return broken
+
+
 def main():
-    broken, total = [], 0
+    broken, total = layers(), 0
     print(f"{'crate':16} {'lines':>6} {'files':>5} {'public modules':>14}  longest function")
     for source in sorted(ROOT.glob("neat-*/src")):
         crate = source.parent.name
