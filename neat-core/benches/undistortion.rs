@@ -2,9 +2,7 @@
 //! one thread. `cargo bench -p neat-core --bench undistortion`
 
 use image::{Rgb, RgbImage};
-use neat_core::downscaling::Downscaling;
-use neat_core::undistortion::Undistortion;
-use neat_core::{Distortion, Intrinsics};
+use neat_core::{Distortion, Downscaling, Intrinsics, Undistortion};
 use rayon::ThreadPoolBuilder;
 
 fn main() {

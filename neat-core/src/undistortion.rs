@@ -17,7 +17,7 @@ use rayon::prelude::*;
 /// # Example
 /// ```
 /// use image::RgbImage;
-/// use neat_core::{Distortion, Intrinsics, undistortion::Undistortion};
+/// use neat_core::{Distortion, Intrinsics, Undistortion};
 /// let intrinsics = Intrinsics { fx: 90.0, fy: 90.0, cx: 60.0, cy: 40.0, skew: 0.0 };
 /// let barrel = Distortion::Brown { radial: [-0.2, 0.0, 0.0, 0.0, 0.0, 0.0], tangential: [0.0; 2] };
 /// let undistortion = Undistortion::new(&intrinsics, &barrel, (120, 80), 0.5)?;

@@ -7,8 +7,9 @@ use neat_core::convert::{SceneFormat, convert};
 use neat_core::ground_truth::{read_ground_truth, read_wireframe};
 use neat_core::layout::Layout;
 use neat_core::point_cloud::read_ply;
-use neat_core::scene_sphere::SphereSource;
-use neat_core::{Camera, LoadOptions, Scene, SceneError, SphereChoice, View, load_scene};
+use neat_core::{
+    Camera, LoadOptions, Scene, SceneError, SphereChoice, SphereSource, View, load_scene,
+};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -4,8 +4,7 @@ use crate::ReportError;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::Vector3;
-use neat_core::downscaling::Downscaling;
-use neat_core::{Scene, View};
+use neat_core::{Downscaling, Scene, View};
 use rayon::prelude::*;
 
 /// How many photographs a report has, and how large they are.
