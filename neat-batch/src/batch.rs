@@ -1,11 +1,10 @@
 //! A list of jobs without two of one name.
 
 use crate::error::BatchError;
-use crate::job::Job;
+use crate::job::{Job, JobNames};
 use crate::manifest_file;
 use crate::scene_folders;
 use crate::shard::Shard;
-use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A list of jobs without two of one name, in the order of their source.
@@ -21,17 +20,8 @@ impl Batch {
     /// If a name occurs twice or cannot be a folder, or a job has an argument that
     /// the batch gives itself.
     pub fn new(jobs: Vec<Job>) -> Result<Self, BatchError> {
-        let mut by_name: BTreeMap<String, &Job> = BTreeMap::new();
-        for job in &jobs {
-            job.check()?;
-            if let Some(first) = by_name.insert(job.name.to_lowercase(), job) {
-                return Err(BatchError::SameName {
-                    name: job.name.clone(),
-                    first: first.scene.clone(),
-                    second: job.scene.clone(),
-                });
-            }
-        }
+        let mut names = JobNames::default();
+        jobs.iter().try_for_each(|job| names.add(job))?;
         Ok(Self { jobs })
     }
 
@@ -61,7 +51,7 @@ impl Batch {
     /// # Errors
     /// If the file cannot be read, or breaks the rules; the message has the line.
     pub fn from_manifest(path: &Path) -> Result<Self, BatchError> {
-        manifest_file::read(path)
+        manifest_file::read(path).map(|jobs| Self { jobs })
     }
 
     /// A job for every folder that is named or that a pattern such as `scenes/*`

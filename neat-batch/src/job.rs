@@ -1,6 +1,7 @@
 //! One job: a scene and how to reconstruct it.
 
 use crate::error::BatchError;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Names in OUT that are no job's.
@@ -64,7 +65,7 @@ impl Job {
         self.arguments.iter().find(is_it)
     }
 
-    pub(crate) fn check(&self) -> Result<(), BatchError> {
+    fn check(&self) -> Result<(), BatchError> {
         if let Some(reason) = name_flaw(&self.name) {
             return Err(BatchError::Name {
                 name: self.name.clone(),
@@ -82,6 +83,34 @@ impl Job {
         }
         Ok(())
     }
+}
+
+/// The names of jobs so far, in lower case, with their scenes.
+#[derive(Default)]
+pub(crate) struct JobNames(BTreeMap<String, PathBuf>);
+
+impl JobNames {
+    /// Takes in one more job.
+    ///
+    /// # Errors
+    /// If another one has its name, the name cannot be a folder, or the job has an
+    /// argument that the batch gives itself.
+    pub fn add(&mut self, job: &Job) -> Result<(), BatchError> {
+        job.check()?;
+        match self.0.insert(job.name.to_lowercase(), job.scene.clone()) {
+            None => Ok(()),
+            Some(first) => Err(BatchError::SameName {
+                name: job.name.clone(),
+                first,
+                second: job.scene.clone(),
+            }),
+        }
+    }
+}
+
+/// The last part of a path, as text.
+pub(crate) fn folder_name(path: &Path) -> Option<String> {
+    Some(path.file_name()?.to_string_lossy().into_owned())
 }
 
 /// Why a name cannot be that of a folder in OUT on every system.

@@ -127,9 +127,10 @@ impl JobFolder {
         if let Some(difference) = record.difference(job) {
             return Plan::Changed(difference);
         }
-        match record.state == JobState::Finished && self.wireframe().is_file() {
-            true => Plan::Finished,
-            false => Plan::Continue,
+        if record.state == JobState::Finished && self.wireframe().is_file() {
+            Plan::Finished
+        } else {
+            Plan::Continue
         }
     }
 

@@ -1,8 +1,7 @@
-//! Manifests: batches as TOML, see [`Batch::from_manifest`].
+//! Manifests: batches as TOML, see [`Batch::from_manifest`](crate::Batch::from_manifest).
 
-use crate::batch::Batch;
 use crate::error::BatchError;
-use crate::job::Job;
+use crate::job::{Job, JobNames, folder_name};
 use neat_core::{SceneError, file};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -44,8 +43,8 @@ struct JobTable {
     args: Vec<String>,
 }
 
-/// See [`Batch::from_manifest`].
-pub fn read(path: &Path) -> Result<Batch, BatchError> {
+/// The jobs of a manifest, of which no two have one name.
+pub fn read(path: &Path) -> Result<Vec<Job>, BatchError> {
     let bytes = file::read(path, REMEDY)?;
     let text = String::from_utf8(bytes).map_err(|error| BatchError::Manifest {
         path: path.into(),
@@ -60,8 +59,8 @@ pub fn read(path: &Path) -> Result<Batch, BatchError> {
     parse(&text, path, absolute.parent().unwrap_or(Path::new("/")))
 }
 
-/// The batch of a manifest's text; paths in it are relative to `folder`.
-fn parse(text: &str, path: &Path, folder: &Path) -> Result<Batch, BatchError> {
+/// The jobs of a manifest's text; paths in it are relative to `folder`.
+fn parse(text: &str, path: &Path, folder: &Path) -> Result<Vec<Job>, BatchError> {
     let at = |offset: usize, reason: String| BatchError::Manifest {
         path: path.into(),
         line: line_of(text.as_bytes(), offset),
@@ -74,14 +73,16 @@ fn parse(text: &str, path: &Path, folder: &Path) -> Result<Batch, BatchError> {
     if manifest.defaults.preset.is_some() && manifest.defaults.config.is_some() {
         return Err(at(0, TWO_BASES.to_owned()));
     }
-    let mut jobs: Vec<Job> = Vec::with_capacity(manifest.job.len());
+    let mut jobs = Vec::with_capacity(manifest.job.len());
+    let mut names = JobNames::default();
     for table in manifest.job {
         let offset = table.span().start;
         let job = job(table.into_inner(), &manifest.defaults, folder)
             .map_err(|reason| at(offset, reason.to_owned()))?;
+        // Here, while the line is known.
+        let named = names.add(&job);
+        named.map_err(|error| at(offset, error.to_string()))?;
         jobs.push(job);
-        // Here, while the line is known. Quadratic, in names of a few hundred jobs.
-        Batch::new(jobs.clone()).map_err(|error| at(offset, error.to_string()))?;
     }
     if jobs.is_empty() {
         return Err(BatchError::NoJob {
@@ -89,7 +90,7 @@ fn parse(text: &str, path: &Path, folder: &Path) -> Result<Batch, BatchError> {
             remedy: "add a table [[job]] with `scene = \"FOLDER\"` for each",
         });
     }
-    Batch::new(jobs)
+    Ok(jobs)
 }
 
 const TWO_BASES: &str = "`preset` and `config` exclude each other: keep one of them";
@@ -104,10 +105,10 @@ fn job(table: JobTable, defaults: &Defaults, folder: &Path) -> Result<Job, &'sta
         None => folder_name(&scene).ok_or("the scene has no folder name: give the job a `name`")?,
     };
     // Either one replaces either default.
-    let own_base = table.preset.is_some() || table.config.is_some();
-    let (preset, config) = match own_base {
-        true => (table.preset.as_ref(), table.config.as_ref()),
-        false => (defaults.preset.as_ref(), defaults.config.as_ref()),
+    let (preset, config) = if table.preset.is_some() || table.config.is_some() {
+        (&table.preset, &table.config)
+    } else {
+        (&defaults.preset, &defaults.config)
     };
     let mut arguments = Vec::new();
     let mut option = |name: &str, value: String| arguments.extend([name.to_owned(), value]);
@@ -115,10 +116,8 @@ fn job(table: JobTable, defaults: &Defaults, folder: &Path) -> Result<Job, &'sta
         option("--preset", preset.clone());
     }
     if let Some(config) = config {
-        option(
-            "--config",
-            folder.join(config).to_string_lossy().into_owned(),
-        );
+        let config = folder.join(config);
+        option("--config", config.to_string_lossy().into_owned());
     }
     if let Some(seed) = table.seed.or(defaults.seed) {
         option("--seed", seed.to_string());
@@ -135,11 +134,6 @@ fn job(table: JobTable, defaults: &Defaults, folder: &Path) -> Result<Job, &'sta
     })
 }
 
-/// The last part of a path, as text.
-pub fn folder_name(path: &Path) -> Option<String> {
-    Some(path.file_name()?.to_string_lossy().into_owned())
-}
-
 /// The line of a byte, from 1.
 fn line_of(text: &[u8], offset: usize) -> usize {
     let before = &text[..offset.min(text.len())];
@@ -150,13 +144,13 @@ fn line_of(text: &[u8], offset: usize) -> usize {
 mod tests {
     use super::*;
 
-    fn parsed(text: &str) -> Result<Batch, BatchError> {
+    fn parsed(text: &str) -> Result<Vec<Job>, BatchError> {
         parse(text, Path::new("jobs.toml"), Path::new("/data"))
     }
 
     #[test]
     fn jobs_go_on_from_the_defaults() {
-        let batch = parsed(
+        let jobs = parsed(
             r#"
             [defaults]
             preset = "fast"
@@ -178,9 +172,7 @@ mod tests {
             "#,
         )
         .unwrap();
-        let [first, second] = batch.jobs() else {
-            panic!()
-        };
+        let [first, second] = &jobs[..] else { panic!() };
         assert_eq!((first.name.as_str(), first.truth.as_ref()), ("house", None));
         assert_eq!(first.scene, Path::new("/data/scenes/house"));
         let text = "--preset fast --seed 3 --set train.rays=512 --no-doctor";

@@ -3,88 +3,15 @@
 use crate::batch::Batch;
 use crate::error::BatchError;
 use crate::job::Job;
+use crate::job_event::JobEvent;
+use crate::options::BatchOptions;
 use crate::queue::Queue;
-use crate::retry::Retry;
 use crate::stop::StopSwitch;
 use crate::worker::Worker;
 use neat_core::{SceneError, file};
-use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::channel;
 use std::thread;
-use std::time::Duration;
-
-/// How a batch is run.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BatchOptions {
-    /// The program, `neat`. It is given the arguments of [`Job::command_line`] and
-    /// `--threads N`. Exit codes: 0 done, 2 bad input, 130 interrupted, others failed.
-    pub program: PathBuf,
-    /// So many jobs run at a time.
-    pub workers: NonZeroUsize,
-    /// CPU threads, which the workers share. A job with a `--threads` of its own is
-    /// left alone.
-    pub threads: NonZeroUsize,
-    /// How often failures are tried again.
-    pub retry: Retry,
-    /// Remove the run of a job that has other arguments now, and begin it anew;
-    /// otherwise such a job fails, and its run is untouched.
-    pub restart_changed: bool,
-}
-
-impl BatchOptions {
-    /// One job at a time on all CPU threads: what is fastest for large scenes, and
-    /// for any on one GPU.
-    pub fn new(program: impl Into<PathBuf>) -> Self {
-        Self {
-            program: program.into(),
-            workers: NonZeroUsize::MIN,
-            threads: thread::available_parallelism().unwrap_or(NonZeroUsize::MIN),
-            retry: Retry::default(),
-            restart_changed: false,
-        }
-    }
-}
-
-/// What happens to a job.
-#[derive(Clone, Debug, PartialEq)]
-pub enum JobEvent {
-    /// It was finished before.
-    Skipped,
-    /// Another process works on it; it is looked at again until that has ended.
-    Waiting,
-    /// An attempt begins.
-    Started {
-        /// Which one, from 1, over all batches so far.
-        attempt: usize,
-        /// The worker that runs it, from 0.
-        worker: usize,
-    },
-    /// The program said something.
-    Progress {
-        /// Its last line.
-        line: String,
-    },
-    /// An attempt failed, and there will be another.
-    Retrying {
-        /// How it failed.
-        reason: String,
-        /// When the next one comes.
-        pause: Duration,
-    },
-    /// Its results are on disk.
-    Finished {
-        /// The time of all attempts.
-        seconds: f64,
-    },
-    /// It is given up.
-    Failed {
-        /// Why.
-        reason: String,
-    },
-    /// It was stopped; the next batch goes on with it.
-    Interrupted,
-}
 
 /// How many jobs came to which end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,8 +1,7 @@
 //! Folders of scenes as jobs.
 
 use crate::error::BatchError;
-use crate::job::Job;
-use crate::manifest_file::folder_name;
+use crate::job::{Job, folder_name};
 use neat_core::SceneError;
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! What has become of all jobs of a batch: `summary.json`, `.md` and `.csv`.
+//! What has become of all jobs of a batch.
 
 use crate::batch::Batch;
 use crate::error::BatchError;
@@ -6,10 +6,7 @@ use crate::job::Job;
 use crate::job_folder::JobFolder;
 use crate::job_record::JobState;
 use crate::result_files::{ResultFigures, read_result, read_state};
-use crate::summary_table::{to_csv, to_markdown};
-use neat_core::{SceneError, file};
 use serde::{Deserialize, Serialize};
-use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 
 /// What has become of all jobs of a batch, by the files in OUT: whoever ran them,
@@ -229,36 +226,6 @@ impl Summary {
             totals: Totals::of(&jobs),
             jobs,
         }
-    }
-
-    /// [`Self::read`], and writes `summary.json`, `summary.md` and `summary.csv`. Of
-    /// several processes that do so, the last one has seen the work of all.
-    ///
-    /// # Errors
-    /// If `out` cannot be written.
-    pub fn write(batch: &Batch, out: &Path) -> Result<Self, BatchError> {
-        file::create_dir(out)?;
-        let path = out.join(".summary.lock");
-        let locked = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(&path)
-            .and_then(|file| file.lock().map(|()| file));
-        // Held until the end of the function.
-        let _lock = locked.map_err(|source| SceneError::Write { path, source })?;
-        let summary = Self::read(batch, out);
-        let json = out.join("summary.json");
-        let mut text = serde_json::to_vec_pretty(&summary).map_err(|source| SceneError::Json {
-            path: json.clone(),
-            format: "summary of a batch",
-            source,
-        })?;
-        text.push(b'\n');
-        file::write_atomically(&json, &text)?;
-        file::write_atomically(&out.join("summary.md"), to_markdown(&summary).as_bytes())?;
-        file::write_atomically(&out.join("summary.csv"), to_csv(&summary).as_bytes())?;
-        Ok(summary)
     }
 
     /// Whether every job is finished.

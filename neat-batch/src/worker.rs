@@ -3,10 +3,11 @@
 use crate::attempt::{Attempt, POLL_INTERVAL};
 use crate::error::BatchError;
 use crate::job::Job;
+use crate::job_event::JobEvent;
 use crate::job_folder::{JobFolder, JobLock, Plan};
 use crate::job_record::{self, JobRecord, JobState, Outcome};
+use crate::options::BatchOptions;
 use crate::queue::{Entry, Next, Queue};
-use crate::run::{BatchOptions, JobEvent};
 use crate::stop::{Stop, StopSwitch};
 use neat_core::SceneError;
 use std::error::Error;

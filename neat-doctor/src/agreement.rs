@@ -1,8 +1,5 @@
 //! How much of what the images show is explained by given cameras.
 
-use crate::corner_consensus::CornerEvidence;
-use crate::tracks::{self, Track};
-use neat_core::Camera;
 use std::ops::AddAssign;
 
 /// How many of how many.
@@ -60,32 +57,5 @@ impl Agreement {
 
     pub fn share(&self) -> f64 {
         self.all.share()
-    }
-}
-
-/// What the images show that cameras have to explain.
-pub(crate) enum Evidence {
-    /// Points of textured things, matched by their looks.
-    Tracks(Vec<Track>),
-    /// Corners of things without texture, which all look alike.
-    Corners(CornerEvidence),
-}
-
-impl Evidence {
-    /// How well `cameras`, one for each view of the scene, explain what the
-    /// `trusted` views show together.
-    pub fn agreement(&self, cameras: &[Camera], trusted: &[bool]) -> Agreement {
-        match self {
-            Self::Tracks(tracks) => tracks::agreement(tracks, cameras, trusted),
-            Self::Corners(corners) => corners.agreement(cameras, trusted),
-        }
-    }
-
-    /// What is counted, in words.
-    pub fn noun(&self) -> &'static str {
-        match self {
-            Self::Tracks(_) => "points matched through three views",
-            Self::Corners(_) => "corners",
-        }
     }
 }

@@ -1,20 +1,47 @@
 //! Gathers what the images show, without looking at the poses.
 
-use crate::agreement::Evidence;
+use crate::agreement::Agreement;
 use crate::corner_consensus::{CornerEvidence, MAX_CORNERS, ViewCorners};
 use crate::corners::{corners, refined};
 use crate::descriptor::keypoints;
 use crate::gray_image::GrayImage;
-use crate::tracks::{ViewKeypoints, matching};
+use crate::tracks::{self, Track, ViewKeypoints, matching};
 use crate::working_copies::WorkingCopies;
 use nalgebra::Vector2;
-use neat_core::{Scene, SceneError, View};
+use neat_core::{Camera, Scene, SceneError, View};
 
 /// Images with more corners than this show texture, which tells points apart.
 const TEXTURE: usize = 120;
 
 /// Corners that are refined; some are dropped then.
 const CANDIDATES: usize = 2 * MAX_CORNERS;
+
+/// What the images show that cameras have to explain.
+pub(crate) enum Evidence {
+    /// Points of textured things, matched by their looks.
+    Tracks(Vec<Track>),
+    /// Corners of things without texture, which all look alike.
+    Corners(CornerEvidence),
+}
+
+impl Evidence {
+    /// How well `cameras`, one for each view of the scene, explain what the
+    /// `trusted` views show together.
+    pub fn agreement(&self, cameras: &[Camera], trusted: &[bool]) -> Agreement {
+        match self {
+            Self::Tracks(tracks) => tracks::agreement(tracks, cameras, trusted),
+            Self::Corners(corners) => corners.agreement(cameras, trusted),
+        }
+    }
+
+    /// What is counted, in words.
+    pub fn noun(&self) -> &'static str {
+        match self {
+            Self::Tracks(_) => "points matched through three views",
+            Self::Corners(_) => "corners",
+        }
+    }
+}
 
 /// What the images of some views show.
 pub(crate) struct Gathered {
@@ -23,6 +50,12 @@ pub(crate) struct Gathered {
     pub evidence: Evidence,
     /// How alike the views i < j look, in the order (0, 1), (0, 2), …, (1, 2), ….
     pub likeness: Vec<f64>,
+}
+
+/// At most `limit` of `count` views, evenly spread.
+pub(crate) fn evenly(count: usize, limit: usize) -> Vec<usize> {
+    let step = count.div_ceil(limit).max(1);
+    (0..count).step_by(step).collect()
 }
 
 /// Whether most of the given views show texture.

@@ -1,7 +1,7 @@
 //! The examination of a scene, and of a folder that should hold one.
 
 use crate::capture_checks::capture_findings;
-use crate::evidence::{gather, is_textured};
+use crate::evidence::{evenly, gather, is_textured};
 use crate::examination::{Check, Examination, Finding, Level, Repair};
 use crate::image_checks::image_findings;
 use crate::load_failure::{explain, size_factor};
@@ -110,12 +110,6 @@ fn pose_findings(
     };
     let gathered = gather(scene, working, evenly(count, limit), textured)?;
     Ok(Diagnosis::new(scene, &gathered, options.read_with, mirrored).findings())
-}
-
-/// At most `limit` of `count` views, evenly spread.
-pub(crate) fn evenly(count: usize, limit: usize) -> Vec<usize> {
-    let step = count.div_ceil(limit).max(1);
-    (0..count).step_by(step).collect()
 }
 
 /// Reads the scene in the folder `dir` and examines it. A scene that cannot be

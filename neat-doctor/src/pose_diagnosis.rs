@@ -1,9 +1,8 @@
 //! Poses and intrinsics against the images: if they disagree, why.
 
-use crate::agreement::{Agreement, Evidence};
-use crate::evidence::Gathered;
+use crate::agreement::Agreement;
+use crate::evidence::{Evidence, Gathered, evenly};
 use crate::examination::{Finding, Repair};
-use crate::examine::evenly;
 use crate::hypothesis::{Hypothesis, PoseOrder, conventions, of_intrinsics};
 use neat_core::layout::PoseConvention;
 use neat_core::{Camera, Scene};

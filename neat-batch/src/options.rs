@@ -1,6 +1,41 @@
-//! How often, and after how long, a failed job is tried again.
+//! How a batch is run, and how often a failed job is tried again.
 
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::thread;
 use std::time::Duration;
+
+/// How a batch is run. Begin with [`BatchOptions::new`] and change what you mean to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct BatchOptions {
+    /// The program, `neat`. It is given the arguments of [`Job::command_line`](crate::Job::command_line) and
+    /// `--threads N`. Exit codes: 0 done, 2 bad input, 130 interrupted, others failed.
+    pub program: PathBuf,
+    /// So many jobs run at a time.
+    pub workers: NonZeroUsize,
+    /// CPU threads, which the workers share. A job with a `--threads` of its own is
+    /// left alone.
+    pub threads: NonZeroUsize,
+    /// How often failures are tried again.
+    pub retry: Retry,
+    /// Remove the run of a job that has other arguments now, and begin it anew;
+    /// otherwise such a job fails, and its run is untouched.
+    pub restart_changed: bool,
+}
+
+impl BatchOptions {
+    /// One job at a time on all CPU threads: what is fastest for large scenes, and
+    /// for any on one GPU.
+    pub fn new(program: impl Into<PathBuf>) -> Self {
+        Self {
+            program: program.into(),
+            workers: NonZeroUsize::MIN,
+            threads: thread::available_parallelism().unwrap_or(NonZeroUsize::MIN),
+            retry: Retry::default(),
+            restart_changed: false,
+        }
+    }
+}
 
 /// How often, and after how long, a failed job is tried again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,8 +1,46 @@
-//! A summary as tables, for people and for programs.
+//! A summary as files: `summary.json`, and tables for people (`.md`) and programs
+//! (`.csv`).
 
+use crate::batch::Batch;
+use crate::error::BatchError;
 use crate::job_record::JobState;
 use crate::summary::{Aggregate, JobSummary, Summary};
+use neat_core::{SceneError, file};
 use std::fmt::Write;
+use std::fs::OpenOptions;
+use std::path::Path;
+
+impl Summary {
+    /// [`Self::read`], and writes `summary.json`, `summary.md` and `summary.csv`. Of
+    /// several processes that do so, the last one has seen the work of all.
+    ///
+    /// # Errors
+    /// If `out` cannot be written.
+    pub fn write(batch: &Batch, out: &Path) -> Result<Self, BatchError> {
+        file::create_dir(out)?;
+        let path = out.join(".summary.lock");
+        let locked = OpenOptions::new()
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path)
+            .and_then(|file| file.lock().map(|()| file));
+        // Held until the end of the function.
+        let _lock = locked.map_err(|source| SceneError::Write { path, source })?;
+        let summary = Self::read(batch, out);
+        let json = out.join("summary.json");
+        let mut text = serde_json::to_vec_pretty(&summary).map_err(|source| SceneError::Json {
+            path: json.clone(),
+            format: "summary of a batch",
+            source,
+        })?;
+        text.push(b'\n');
+        file::write_atomically(&json, &text)?;
+        file::write_atomically(&out.join("summary.md"), to_markdown(&summary).as_bytes())?;
+        file::write_atomically(&out.join("summary.csv"), to_csv(&summary).as_bytes())?;
+        Ok(summary)
+    }
+}
 
 /// A column of numbers.
 struct Column {
