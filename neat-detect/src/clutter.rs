@@ -10,28 +10,25 @@ pub(crate) struct FittedEdge {
     pub score: f64,
 }
 
-/// What texture is; lengths in pixels.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ClutterLimits {
-    /// Segments are near if their middles are no farther apart.
-    pub radius: f64,
-    /// So many others make a segment texture
-    pub count: usize,
-    /// if it is shorter than this.
-    pub length: f64,
-}
+/// Segments are near if their middles are no farther apart, in reference pixels.
+const RADIUS: f64 = 16.0;
+/// So many others near make a segment texture
+const COUNT: usize = 3;
+/// if it is shorter than this, in reference pixels: what a person would draw is longer,
+/// or meets something.
+const LENGTH: f64 = 24.0;
 
 /// `edges` without those that are texture; `meets_others` says of every vertex
-/// whether another segment touches it.
+/// whether another segment touches it. The image has `scale` pixels per reference pixel.
 pub(crate) fn remove(
     edges: Vec<FittedEdge>,
     vertices: &[Vector2<f64>],
     meets_others: &[bool],
-    limits: &ClutterLimits,
+    scale: f64,
 ) -> Vec<FittedEdge> {
     let short_and_alone = |edge: &FittedEdge| {
         let [a, b] = edge.vertices;
-        !meets_others[a] && !meets_others[b] && (vertices[a] - vertices[b]).norm() < limits.length
+        !meets_others[a] && !meets_others[b] && (vertices[a] - vertices[b]).norm() < LENGTH * scale
     };
     let middle =
         |edge: &FittedEdge| (vertices[edge.vertices[0]] + vertices[edge.vertices[1]]) / 2.0;
@@ -44,9 +41,9 @@ pub(crate) fn remove(
         let at = middle(edge);
         let near = suspects
             .iter()
-            .filter(|other| (*other - at).norm() <= limits.radius);
+            .filter(|other| (*other - at).norm() <= RADIUS * scale);
         // One of them is the segment itself.
-        short_and_alone(edge) && near.count() > limits.count
+        short_and_alone(edge) && near.count() > COUNT
     };
     edges
         .iter()
@@ -59,11 +56,8 @@ pub(crate) fn remove(
 mod tests {
     use super::*;
 
-    const LIMITS: ClutterLimits = ClutterLimits {
-        radius: 10.0,
-        count: 3,
-        length: 6.0,
-    };
+    /// Segments are near up to a distance of 8, and long from 12 on.
+    const SCALE: f64 = 0.5;
 
     /// Parallel segments of length 5, `spacing` apart, none of which meet.
     fn hatching(count: usize, spacing: f64) -> (Vec<FittedEdge>, Vec<Vector2<f64>>) {
@@ -83,22 +77,22 @@ mod tests {
     fn dense_short_segments_go_and_others_stay() {
         let alone = [false; 16];
         let (edges, vertices) = hatching(8, 2.0);
-        assert_eq!(remove(edges.clone(), &vertices, &alone, &LIMITS), []);
-        let (sparse, apart) = hatching(8, 5.0);
-        assert_eq!(remove(sparse, &apart, &alone, &LIMITS).len(), 2); // those at the rim
+        assert_eq!(remove(edges.clone(), &vertices, &alone, SCALE), []);
+        let (sparse, apart) = hatching(8, 4.0);
+        assert_eq!(remove(sparse, &apart, &alone, SCALE).len(), 2); // those at the rim
         let (few, near) = hatching(3, 2.0);
-        assert_eq!(remove(few.clone(), &near, &alone, &LIMITS), few);
+        assert_eq!(remove(few.clone(), &near, &alone, SCALE), few);
         let long: Vec<Vector2<f64>> = vertices
             .iter()
             .map(|v| Vector2::new(v.x, v.y * 3.0))
             .collect();
-        assert_eq!(remove(edges.clone(), &long, &alone, &LIMITS), edges);
+        assert_eq!(remove(edges.clone(), &long, &alone, SCALE), edges);
     }
 
     #[test]
     fn segments_that_meet_others_are_no_texture() {
         let (edges, vertices) = hatching(8, 2.0);
         let one_end: Vec<bool> = (0..16).map(|vertex| vertex % 2 == 0).collect();
-        assert_eq!(remove(edges.clone(), &vertices, &one_end, &LIMITS), edges);
+        assert_eq!(remove(edges.clone(), &vertices, &one_end, SCALE), edges);
     }
 }

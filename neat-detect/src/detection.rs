@@ -1,19 +1,20 @@
 //! The whole way from an image to its wireframe.
 
-use crate::DetectorConfig;
 use crate::claimed_pixels::ClaimedPixels;
-use crate::clutter::{self, ClutterLimits, FittedEdge};
+use crate::clutter::{self, FittedEdge};
+use crate::config::{DetectorConfig, pixels_per_reference_pixel};
 use crate::edge_completion;
 use crate::edge_profile::strength;
-use crate::junction_graph::{self, JunctionLimits};
+use crate::junction_graph;
 use crate::line_fitting::{FittedSegment, LineFitter};
-use crate::merging::{self, MergeLimits};
+use crate::merging;
 use crate::noise;
 use crate::segment_search;
 use crate::smoothed_image::SmoothedImage;
 use image::{Rgb, RgbImage};
 use nalgebra::Vector2;
 use neat_core::{LineSegment2, Wireframe2d};
+use tracing::{debug, debug_span};
 
 /// The contrast, in smallest gradients, that halves an edge's score.
 const WEAK_CONTRAST: f64 = 1.0;
@@ -23,8 +24,14 @@ const FREE_END: f64 = 0.4;
 const STRAIGHT: f64 = 0.3;
 /// Smaller images show no segment.
 const MIN_SIDE: u32 = 8;
-/// Segments under a smaller angle than this can follow one another's edge.
-const MAX_OVERSHOOT_ANGLE: f64 = 25.0;
+/// Edges that bend more are curves and are dropped: the height of the arc as a share of
+/// its length.
+const MAX_SAGITTA: f64 = 0.012;
+/// Stretches without an edge along a line up to this length are bridged, in reference
+/// pixels: where a weak edge drowns for a moment.
+const MAX_GAP: f64 = 4.0;
+/// How many standard deviations of the image's noise a gradient must have.
+const NOISE_FACTOR: f64 = 3.0;
 /// How far the lines of the detector lie from the edge, in pixels.
 const SEARCH_WIDTH: f64 = 3.0;
 
@@ -55,6 +62,7 @@ pub fn detect(image: &RgbImage, config: &DetectorConfig) -> Wireframe2d {
     if width < MIN_SIDE || height < MIN_SIDE {
         return Wireframe2d::empty(width, height);
     }
+    let _span = debug_span!("detect", width, height).entered();
     let prepared = PreparedImage::new(image, config);
     let reduction = width
         .max(height)
@@ -101,6 +109,7 @@ pub fn wireframe_from_segments(
     if width < MIN_SIDE || height < MIN_SIDE {
         return Wireframe2d::empty(width, height);
     }
+    let _span = debug_span!("wireframe_from_segments", width, height).entered();
     let inside: Vec<LineSegment2> = (segments.iter())
         .filter_map(|segment| clipped(segment, Vector2::new(width, height)))
         .collect();
@@ -145,10 +154,10 @@ struct PreparedImage {
 impl PreparedImage {
     fn new(image: &RgbImage, config: &DetectorConfig) -> Self {
         let noise = noise::estimate(image);
-        let sigma = noise::smoothing(config.smoothing_in_pixels, noise);
+        let sigma = noise::smoothing(noise);
         let smoothed = SmoothedImage::new(image, sigma);
         let min_gradient = (config.min_gradient)
-            .max(config.noise_factor * noise::gradient_noise(sigma, noise))
+            .max(NOISE_FACTOR * noise::gradient_noise(sigma, noise))
             .max(config.texture_factor * smoothed.median_gradient());
         Self {
             smoothed,
@@ -184,47 +193,27 @@ fn graph_of(
     config: &DetectorConfig,
 ) -> Wireframe2d {
     let [width, height] = image.smoothed.size().map(|side| side as u32);
-    let scale = DetectorConfig::pixels_per_reference_pixel(width, height);
+    let scale = pixels_per_reference_pixel(width, height);
     let fitter = LineFitter {
         image: &image.smoothed,
         min_gradient: image.min_gradient,
-        max_gap: config.max_gap * scale,
+        max_gap: MAX_GAP * scale,
     };
-    let fitted = fit_all(segments, &fitter, search_width);
-    let mut lines = merging::merge(
-        fitted,
-        &fitter,
-        &MergeLimits {
-            distance: config.merge_distance_in_pixels,
-            sin_angle: config.merge_angle.to_radians().sin(),
-            gap: config.max_gap * scale,
-        },
-    );
-    merging::drop_covered(&mut lines, MAX_OVERSHOOT_ANGLE.to_radians().sin());
-    merging::trim_overshoots(&mut lines, MAX_OVERSHOOT_ANGLE.to_radians().sin());
+    let mut lines = merging::merge(fit_all(segments, &fitter, search_width), &fitter);
     lines.retain(|line| {
         let length = line.segment.length();
         length >= (config.min_length * scale).max(1.0)
-            && (line.sagitta <= STRAIGHT || line.sagitta <= config.max_sagitta * length)
+            && (line.sagitta <= STRAIGHT || line.sagitta <= MAX_SAGITTA * length)
     });
-    let limits = JunctionLimits {
-        extension: config.max_extension * scale,
-        retreat: config.max_retreat * scale,
-        distance: config.junction_distance * scale,
-        sin_angle: config.min_junction_angle.to_radians().sin(),
-        attraction: config.max_attraction * scale,
-        t_extension: config.t_junction_distance * scale,
-    };
     let straight: Vec<LineSegment2> = lines.iter().map(|line| line.segment).collect();
-    let mut graph =
-        junction_graph::build(&straight, &limits, |bridge| fitter.is_nowhere_flat(bridge));
-    let completed = edge_completion::complete(
-        &graph.vertices,
-        &graph.edges,
-        config.max_completion * scale,
-        &fitter,
+    debug!(
+        found = segments.len(),
+        straight = lines.len(),
+        "segments are fitted"
     );
-    for edge in completed {
+    let mut graph =
+        junction_graph::build(&straight, scale, |bridge| fitter.is_nowhere_flat(bridge));
+    for edge in edge_completion::complete(&graph.vertices, &graph.edges, scale, &fitter) {
         for vertex in edge.vertices {
             graph.meets_others[vertex] = true;
         }
@@ -237,17 +226,14 @@ fn graph_of(
             score: score(line, image.min_gradient),
         })
         .collect();
-    let kept = clutter::remove(
-        fitted_edges,
-        &graph.vertices,
-        &graph.meets_others,
-        &ClutterLimits {
-            radius: config.clutter_radius * scale,
-            count: config.clutter_count,
-            length: config.clutter_length * scale,
-        },
+    let kept = clutter::remove(fitted_edges, &graph.vertices, &graph.meets_others, scale);
+    let wireframe = wireframe(&graph.vertices, kept, config.min_score, [width, height]);
+    debug!(
+        vertices = wireframe.vertices.len(),
+        edges = wireframe.edges.len(),
+        "segments are joined"
     );
-    wireframe(&graph.vertices, kept, config.min_score, [width, height])
+    wireframe
 }
 
 /// The wireframe of the edges with a score of at least `min_score` and their

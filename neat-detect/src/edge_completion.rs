@@ -15,20 +15,26 @@ const OTHERS_EDGE: f64 = 1.0;
 /// Cosine of the smallest angle to another edge of the same junction.
 const MAX_COS_ANGLE: f64 = 0.97;
 
+/// Junctions no farther apart, in reference pixels, are joined by an edge where the image
+/// shows one between them: longer ones the search finds itself.
+const MAX_LENGTH: f64 = 25.0;
+
 /// A new edge, and the image edge that it stands for.
 pub(crate) struct CompletedEdge {
     pub vertices: [usize; 2],
     pub fitted: FittedSegment,
 }
 
-/// Edges between vertices at most `max_length` pixels apart that are not joined
-/// by `edges`, where the image shows a straight edge; the shortest first.
+/// Edges between vertices at most [`MAX_LENGTH`] apart that are not joined by `edges`,
+/// where the image shows a straight edge; the shortest first. The image has `scale`
+/// pixels per reference pixel.
 pub(crate) fn complete(
     vertices: &[Vector2<f64>],
     edges: &[[usize; 2]],
-    max_length: f64,
+    scale: f64,
     fitter: &LineFitter,
 ) -> Vec<CompletedEdge> {
+    let max_length = MAX_LENGTH * scale;
     let mut candidates = Vec::new();
     // Sorted by x, so that only near vertices are compared.
     let mut order: Vec<usize> = (0..vertices.len()).collect();

@@ -157,18 +157,10 @@ impl Mask {
     /// what is left, which is closed.
     fn chains(mut self) -> Vec<Vec<Vector2<f64>>> {
         let indices = self.indices();
-        let degree = |mask: &Self, index: usize| {
-            mask.neighbors(index)
-                .iter()
-                .filter(|&&neighbor| mask.set[neighbor])
-                .count()
-        };
-        let is_node: Vec<bool> = (indices.iter())
-            .map(|&index| degree(&self, index) != 2)
-            .collect();
         let mut nodes = vec![false; self.set.len()];
-        for (&index, &is_node) in indices.iter().zip(&is_node) {
-            nodes[index] = is_node;
+        for &index in &indices {
+            let around = self.neighbors(index);
+            nodes[index] = around.iter().filter(|&&at| self.set[at]).count() != 2;
         }
         let mut chains = Vec::new();
         for &start in indices.iter().filter(|&&index| nodes[index]) {
@@ -181,10 +173,8 @@ impl Mask {
         for &start in &indices {
             if self.set[start] && !nodes[start] {
                 self.set[start] = false;
-                let next = self
-                    .neighbors(start)
-                    .into_iter()
-                    .find(|&next| self.set[next]);
+                let mut around = self.neighbors(start).into_iter();
+                let next = around.find(|&next| self.set[next]);
                 chains.extend(next.map(|next| self.walk(start, next, &nodes)));
             }
         }

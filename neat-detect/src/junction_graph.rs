@@ -8,22 +8,51 @@ use std::collections::BTreeMap;
 /// decides only where lines are nearly parallel.
 const END_WEIGHT: f64 = 1e-3;
 
-/// How far segments bend to meet; lengths in pixels.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct JunctionLimits {
-    /// An end moves at most so far outwards along its line,
-    pub extension: f64,
-    /// so far inwards,
-    pub retreat: f64,
-    /// and so far across it.
-    pub distance: f64,
+/// A segment's end moves at most so far outwards to meet another: corners are round in
+/// images, and segments stop before them. In reference pixels, as all lengths here.
+const MAX_EXTENSION: f64 = 8.0;
+/// So far inwards: an end that ran on along another edge.
+const MAX_RETREAT: f64 = 5.0;
+/// As [`MAX_EXTENSION`], towards a junction of other segments, where colours change all
+/// the way, but at most half of the segment's length: a weak edge cannot be seen beside
+/// a stronger one.
+const MAX_ATTRACTION: f64 = 25.0;
+/// A junction lies no farther from the line of each of its segments: more than lines
+/// err, less than neighbouring edges are apart.
+const MAX_DISTANCE: f64 = 1.2;
+/// A free end this near to the inside of another segment is put on it.
+const T_EXTENSION: f64 = 4.0;
+/// Segments that meet under a smaller angle, in degrees, do not determine a junction.
+const MIN_ANGLE: f64 = 2.5;
+
+/// How far segments bend to meet, in pixels of the image.
+struct JunctionLimits {
+    extension: f64,
+    retreat: f64,
+    distance: f64,
+    attraction: f64,
+    t_extension: f64,
     /// Sine of the smallest angle under which two lines determine a junction.
-    pub sin_angle: f64,
-    /// As `extension`, to a junction of other segments where the image is not flat
-    /// between; but at most half of the segment's length.
-    pub attraction: f64,
-    /// As `extension`, to the inside of another segment.
-    pub t_extension: f64,
+    sin_angle: f64,
+}
+
+impl JunctionLimits {
+    /// For an image of so many pixels per reference pixel.
+    fn new(scale: f64) -> Self {
+        Self {
+            extension: MAX_EXTENSION * scale,
+            retreat: MAX_RETREAT * scale,
+            distance: MAX_DISTANCE * scale,
+            attraction: MAX_ATTRACTION * scale,
+            t_extension: T_EXTENSION * scale,
+            sin_angle: MIN_ANGLE.to_radians().sin(),
+        }
+    }
+
+    /// Whether an end may move outwards by `along`, which is negative for inwards.
+    fn allow(&self, along: f64) -> bool {
+        (-self.retreat..=self.extension).contains(&along)
+    }
 }
 
 /// Where a junction must lie on the line for certain, it lies this near, in pixels.
@@ -61,102 +90,154 @@ impl SegmentEnd {
     }
 }
 
-/// Builds the graph of `segments`; `may_bridge` says whether one may be extended
-/// by a stretch that is not supported by an edge of its own.
+/// Builds the graph of `segments` in an image of `scale` pixels per reference pixel;
+/// `may_bridge` says whether one may be extended by a stretch that is not supported by
+/// an edge of its own.
 pub(crate) fn build(
     segments: &[LineSegment2],
-    limits: &JunctionLimits,
+    scale: f64,
     may_bridge: impl Fn(&LineSegment2) -> bool,
 ) -> JunctionGraph {
-    let ends: Vec<SegmentEnd> = (segments.iter())
-        .flat_map(|segment| {
-            let length = segment.length();
-            let direction = (segment.end - segment.start) / length;
-            [
-                SegmentEnd {
-                    position: segment.start,
-                    outward: -direction,
-                    length,
-                },
-                SegmentEnd {
-                    position: segment.end,
-                    outward: direction,
-                    length,
-                },
-            ]
-        })
-        .collect();
+    let mut meetings = Meetings::new(segments, JunctionLimits::new(scale));
+    meetings.join_pairs();
+    meetings.attract_free_ends(may_bridge);
+    meetings.put_on_segments(segments);
+    meetings.graph()
+}
 
-    // Every end begins as a vertex of its own; pairs join them, nearest first.
-    let mut vertex_of: Vec<usize> = (0..ends.len()).collect();
-    let mut members: Vec<Vec<usize>> = (0..ends.len()).map(|end| vec![end]).collect();
-    let mut positions: Vec<Vector2<f64>> = ends.iter().map(|end| end.position).collect();
-    for [a, b] in meeting_pairs(&ends, limits) {
-        let [into, from] = [
-            vertex_of[a].min(vertex_of[b]),
-            vertex_of[a].max(vertex_of[b]),
-        ];
-        if into == from {
-            continue;
-        }
-        let together: Vec<usize> = members[into]
-            .iter()
-            .chain(&members[from])
-            .copied()
+/// Which ends meet, while that is found out.
+struct Meetings {
+    limits: JunctionLimits,
+    /// Start and end of every segment.
+    ends: Vec<SegmentEnd>,
+    /// The vertex of every end. Each begins as one of its own.
+    vertex_of: Vec<usize>,
+    /// The ends that meet in every vertex; none where it has become part of another.
+    members: Vec<Vec<usize>>,
+    positions: Vec<Vector2<f64>>,
+    /// Whether the vertex lies on a segment that does not end there.
+    on_segment: Vec<bool>,
+}
+
+impl Meetings {
+    fn new(segments: &[LineSegment2], limits: JunctionLimits) -> Self {
+        let ends: Vec<SegmentEnd> = (segments.iter())
+            .flat_map(|segment| {
+                let length = segment.length();
+                let direction = (segment.end - segment.start) / length;
+                let end = |position, outward| SegmentEnd {
+                    position,
+                    outward,
+                    length,
+                };
+                [end(segment.start, -direction), end(segment.end, direction)]
+            })
             .collect();
-        if let Some(position) = junction_of(&ends, &together, limits) {
-            for &end in &members[from] {
-                vertex_of[end] = into;
-            }
-            members[from].clear();
-            members[into] = together;
-            positions[into] = position;
-        }
-    }
-    for end in 0..ends.len() {
-        if members[vertex_of[end]].len() == 1
-            && let Some(vertex) = attracting_vertex(
-                end,
-                &ends,
-                &vertex_of,
-                &members,
-                &positions,
-                limits,
-                &may_bridge,
-            )
-        {
-            members[vertex_of[end]].clear();
-            vertex_of[end] = vertex;
-            members[vertex].push(end);
-        }
-    }
-    let mut on_segment = vec![false; members.len()];
-    for end in 0..ends.len() {
-        if members[vertex_of[end]].len() == 1
-            && let Some(position) = t_junction(end, &ends, segments, limits)
-        {
-            positions[vertex_of[end]] = position;
-            on_segment[vertex_of[end]] = true;
+        Self {
+            limits,
+            vertex_of: (0..ends.len()).collect(),
+            members: (0..ends.len()).map(|end| vec![end]).collect(),
+            positions: ends.iter().map(|end| end.position).collect(),
+            on_segment: vec![false; ends.len()],
+            ends,
         }
     }
 
-    let mut graph = JunctionGraph {
-        vertices: Vec::new(),
-        meets_others: Vec::new(),
-        edges: vec![[0; 2]; segments.len()],
-    };
-    for (vertex, members) in members
-        .iter()
-        .enumerate()
-        .filter(|(_, members)| !members.is_empty())
-    {
-        for end in members {
-            graph.edges[end / 2][end % 2] = graph.vertices.len();
+    /// Joins the vertices of ends that meet, the nearest first.
+    fn join_pairs(&mut self) {
+        for pair in meeting_pairs(&self.ends, &self.limits) {
+            let [a, b] = pair.map(|end| self.vertex_of[end]);
+            let [into, from] = [a.min(b), a.max(b)];
+            if into == from {
+                continue;
+            }
+            let together = [&self.members[into][..], &self.members[from]].concat();
+            if let Some(position) = junction_of(&self.ends, &together, &self.limits) {
+                for &end in &self.members[from] {
+                    self.vertex_of[end] = into;
+                }
+                self.members[from].clear();
+                self.members[into] = together;
+                self.positions[into] = position;
+            }
         }
-        graph.vertices.push(positions[vertex]);
-        (graph.meets_others).push(members.len() > 1 || on_segment[vertex]);
     }
-    graph
+
+    fn is_free(&self, end: usize) -> bool {
+        self.members[self.vertex_of[end]].len() == 1
+    }
+
+    /// Lets free ends go to the junctions that they point at.
+    fn attract_free_ends(&mut self, may_bridge: impl Fn(&LineSegment2) -> bool) {
+        for end in 0..self.ends.len() {
+            if self.is_free(end)
+                && let Some(vertex) = self.attracting_vertex(end, &may_bridge)
+            {
+                self.members[self.vertex_of[end]].clear();
+                self.vertex_of[end] = vertex;
+                self.members[vertex].push(end);
+            }
+        }
+    }
+
+    /// Puts free ends on the segments that they come near to.
+    fn put_on_segments(&mut self, segments: &[LineSegment2]) {
+        for end in 0..self.ends.len() {
+            if self.is_free(end)
+                && let Some(position) = t_junction(end, &self.ends[end], segments, &self.limits)
+            {
+                self.positions[self.vertex_of[end]] = position;
+                self.on_segment[self.vertex_of[end]] = true;
+            }
+        }
+    }
+
+    /// The vertices in which ends meet, renumbered.
+    fn graph(self) -> JunctionGraph {
+        let mut graph = JunctionGraph {
+            vertices: Vec::new(),
+            meets_others: Vec::new(),
+            edges: vec![[0; 2]; self.ends.len() / 2],
+        };
+        for (vertex, members) in self.members.iter().enumerate() {
+            if members.is_empty() {
+                continue;
+            }
+            for end in members {
+                graph.edges[end / 2][end % 2] = graph.vertices.len();
+            }
+            graph.vertices.push(self.positions[vertex]);
+            (graph.meets_others).push(members.len() > 1 || self.on_segment[vertex]);
+        }
+        graph
+    }
+
+    /// The nearest junction that a free end points at.
+    fn attracting_vertex(
+        &self,
+        end: usize,
+        may_bridge: impl Fn(&LineSegment2) -> bool,
+    ) -> Option<usize> {
+        let (free, limits) = (&self.ends[end], &self.limits);
+        let reach = limits
+            .attraction
+            .min(0.5 * free.length)
+            .max(limits.extension);
+        (0..self.members.len())
+            .filter(|&vertex| self.members[vertex].len() > 1 && vertex != self.vertex_of[end ^ 1])
+            .filter_map(|vertex| {
+                let [along, across] = free.offset_to(&self.positions[vertex]);
+                let reached =
+                    (-limits.retreat..=reach).contains(&along) && across.abs() <= limits.distance;
+                reached.then_some((along, vertex))
+            })
+            .min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
+            .filter(|&(along, vertex)| {
+                along <= limits.extension
+                    || may_bridge(&LineSegment2::new(free.position, self.positions[vertex]))
+            })
+            .map(|(_, vertex)| vertex)
+    }
 }
 
 /// Pairs of ends whose lines meet where both ends may move, the shortest moves
@@ -197,11 +278,8 @@ fn meeting_cost(a: &SegmentEnd, b: &SegmentEnd, limits: &JunctionLimits) -> Opti
         between.perp(&b.outward) / sine,
         between.perp(&a.outward) / sine,
     ];
-    let allowed = |distance: &f64| (-limits.retreat..=limits.extension).contains(distance);
-    moves
-        .iter()
-        .all(allowed)
-        .then(|| moves[0].abs() + moves[1].abs())
+    let allowed = moves.iter().all(|&along| limits.allow(along));
+    allowed.then(|| moves[0].abs() + moves[1].abs())
 }
 
 /// The point nearest to the lines of some ends, if every one of them may move
@@ -236,50 +314,19 @@ fn junction_of(
         } else {
             limits.distance
         };
-        across.abs() <= distance && (-limits.retreat..=limits.extension).contains(&along)
+        across.abs() <= distance && limits.allow(along)
     });
     fits.then_some(position)
 }
 
-/// The nearest junction that a free end points at.
-fn attracting_vertex(
-    end: usize,
-    ends: &[SegmentEnd],
-    vertex_of: &[usize],
-    members: &[Vec<usize>],
-    positions: &[Vector2<f64>],
-    limits: &JunctionLimits,
-    may_bridge: impl Fn(&LineSegment2) -> bool,
-) -> Option<usize> {
-    let free = &ends[end];
-    let reach = limits
-        .attraction
-        .min(0.5 * free.length)
-        .max(limits.extension);
-    (0..members.len())
-        .filter(|&vertex| members[vertex].len() > 1 && vertex != vertex_of[end ^ 1])
-        .filter_map(|vertex| {
-            let [along, across] = free.offset_to(&positions[vertex]);
-            let reached =
-                (-limits.retreat..=reach).contains(&along) && across.abs() <= limits.distance;
-            reached.then_some((along, vertex))
-        })
-        .min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))
-        .filter(|&(along, vertex)| {
-            along <= limits.extension
-                || may_bridge(&LineSegment2::new(free.position, positions[vertex]))
-        })
-        .map(|(_, vertex)| vertex)
-}
-
-/// Where a free end meets the inside of another segment, if it comes near one.
+/// Where the free end of this number meets the inside of another segment, if it comes
+/// near one.
 fn t_junction(
     end: usize,
-    ends: &[SegmentEnd],
+    free: &SegmentEnd,
     segments: &[LineSegment2],
     limits: &JunctionLimits,
 ) -> Option<Vector2<f64>> {
-    let free = &ends[end];
     (segments.iter().enumerate())
         .filter(|(index, _)| *index != end / 2)
         .filter_map(|(_, segment)| {

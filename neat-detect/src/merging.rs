@@ -15,24 +15,27 @@ const MAX_BEND: f64 = 0.75;
 /// it, in pixels.
 const OVERSHOOT: f64 = 1.5;
 
-/// How near collinear segments must be to become one.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct MergeLimits {
-    /// Between a segment's ends and the other's line, in pixels.
-    pub distance: f64,
-    /// Sine of the largest angle between them.
-    pub sin_angle: f64,
-    /// Between the two along their line, in pixels.
-    pub gap: f64,
+/// Collinear segments become one if the ends of each lie no farther from the line of the
+/// other, in pixels: an edge is about as wide, in small images and in large ones.
+const DISTANCE: f64 = 1.5;
+/// The largest angle between them, in degrees: short pieces know their direction badly.
+const MAX_ANGLE: f64 = 8.0;
+/// Segments under a smaller angle than this, in degrees, can follow one another's edge.
+const MAX_OVERSHOOT_ANGLE: f64 = 25.0;
+
+/// One segment for each image edge, longest first: pieces are joined, chords across
+/// corners go, and what runs on beyond a crossing is cut off.
+pub(crate) fn merge(segments: Vec<FittedSegment>, fitter: &LineFitter) -> Vec<FittedSegment> {
+    let mut lines = join_all(segments, fitter);
+    let max_sin_angle = MAX_OVERSHOOT_ANGLE.to_radians().sin();
+    drop_covered(&mut lines, max_sin_angle);
+    trim_overshoots(&mut lines, max_sin_angle);
+    lines
 }
 
-/// Merges `segments` until no two belong together. The result is sorted by
-/// length, longest first.
-pub(crate) fn merge(
-    mut segments: Vec<FittedSegment>,
-    fitter: &LineFitter,
-    limits: &MergeLimits,
-) -> Vec<FittedSegment> {
+/// Joins `segments` until no two belong together.
+fn join_all(mut segments: Vec<FittedSegment>, fitter: &LineFitter) -> Vec<FittedSegment> {
+    let max_sin_angle = MAX_ANGLE.to_radians().sin();
     // Two that did not belong together in one round need not be asked again.
     let mut changed = vec![true; segments.len()];
     while changed.contains(&true) {
@@ -49,7 +52,7 @@ pub(crate) fn merge(
             let merged = kept.iter_mut().find_map(|(long, long_changed, changes)| {
                 let asked = was_changed || *long_changed || *changes;
                 let joined = asked
-                    .then(|| joined(long, segment, fitter, limits))
+                    .then(|| joined(long, segment, fitter, max_sin_angle))
                     .flatten()?;
                 *changes |= joined != *long;
                 *long = joined;
@@ -62,13 +65,7 @@ pub(crate) fn merge(
         changed = kept.iter().map(|(_, _, changes)| *changes).collect();
         segments = kept.into_iter().map(|(segment, ..)| segment).collect();
     }
-    sort_by_length(&mut segments);
     segments
-}
-
-/// Longest first.
-fn sort_by_length(segments: &mut [FittedSegment]) {
-    segments.sort_by(|a, b| b.segment.length().total_cmp(&a.segment.length()));
 }
 
 /// The one segment that stands for both; `None` if they are two.
@@ -76,10 +73,10 @@ fn joined(
     long: &FittedSegment,
     short: &FittedSegment,
     fitter: &LineFitter,
-    limits: &MergeLimits,
+    max_sin_angle: f64,
 ) -> Option<FittedSegment> {
     let direction = long.direction();
-    if direction.perp(&short.direction()).abs() > limits.sin_angle {
+    if direction.perp(&short.direction()).abs() > max_sin_angle {
         return None;
     }
     let normal = normal_of(&direction);
@@ -93,22 +90,18 @@ fn joined(
     let [first, last] = short_way
         .ends()
         .map(|end| (end - long.segment.start).dot(&direction));
-    if first > length + limits.gap || last < -limits.gap {
+    if first > length + fitter.max_gap || last < -fitter.max_gap {
         return None;
     }
     let across = short_way
         .ends()
         .map(|end| (end - long.segment.start).dot(&normal).abs());
     let same_contrast = (long.change.dot(&short.change) >= 0.0) == same_way;
-    let distance = if same_contrast {
-        limits.distance
-    } else {
-        SAME_EDGE
-    };
+    let distance = if same_contrast { DISTANCE } else { SAME_EDGE };
     if across[0].max(across[1]) > distance {
         return None;
     }
-    if first >= -limits.distance && last <= length + limits.distance {
+    if first >= -DISTANCE && last <= length + DISTANCE {
         return Some(long.clone());
     }
     let whole = LineSegment2::new(
@@ -123,21 +116,18 @@ fn joined(
             long.segment.end
         },
     );
-    fitter
-        .fit_between_ends(&whole, limits.distance)
-        .filter(|fitted| {
-            let line = &fitted.segment;
-            let off_line =
-                |end: &Vector2<f64>| (line.point_at(line.line_parameter(end)) - end).norm();
-            let all_ends = long.segment.ends().into_iter().chain(short_way.ends());
-            all_ends.map(|end| off_line(&end)).fold(0.0, f64::max) <= MAX_BEND
-        })
+    fitter.fit_between_ends(&whole, DISTANCE).filter(|fitted| {
+        let line = &fitted.segment;
+        let off_line = |end: &Vector2<f64>| (line.point_at(line.line_parameter(end)) - end).norm();
+        let all_ends = long.segment.ends().into_iter().chain(short_way.ends());
+        all_ends.map(|end| off_line(&end)).fold(0.0, f64::max) <= MAX_BEND
+    })
 }
 
 /// Drops segments of which longer ones of about the same direction cover all:
 /// chords across a corner between two long edges.
-pub(crate) fn drop_covered(segments: &mut Vec<FittedSegment>, max_sin_angle: f64) {
-    sort_by_length(segments);
+fn drop_covered(segments: &mut Vec<FittedSegment>, max_sin_angle: f64) {
+    segments.sort_by(|a, b| b.segment.length().total_cmp(&a.segment.length()));
     for index in (0..segments.len()).rev() {
         let (longer, rest) = segments.split_at(index);
         let covered = rest.first().is_some_and(|segment| {
@@ -162,7 +152,7 @@ pub(crate) fn drop_covered(segments: &mut Vec<FittedSegment>, max_sin_angle: f64
 /// Cuts off what runs on along another segment beyond the point where they meet:
 /// edges that bend a little at a junction are followed too far from both sides.
 /// Only pairs under an angle below `max_sin_angle` do so.
-pub(crate) fn trim_overshoots(segments: &mut [FittedSegment], max_sin_angle: f64) {
+fn trim_overshoots(segments: &mut [FittedSegment], max_sin_angle: f64) {
     for i in 0..segments.len() {
         for j in 0..i {
             let [a, b] = [&segments[i].segment, &segments[j].segment];

@@ -1,14 +1,16 @@
 //! How noisy an image is, and what that asks of its smoothing.
 
+use crate::robust_line::DEVIATION_FROM_MEDIAN;
 use image::RgbImage;
 use std::f64::consts::PI;
 
 /// Images with less noise than this, in grey levels, are smoothed no further.
 const LITTLE_NOISE: f64 = 2.0;
+/// Standard deviation of the Gaussian that images are smoothed with before gradients are
+/// taken, in pixels: it follows the blur of cameras, not the scene.
+const SMOOTHING: f64 = 0.8;
 /// No image is smoothed more than this, in pixels: neighbouring edges would merge.
 const MAX_SMOOTHING: f64 = 2.0;
-/// From the median absolute value to the standard deviation of a Gaussian.
-const DEVIATION_FROM_MEDIAN: f64 = 1.4826;
 
 /// Standard deviation of an image's noise in each channel, in grey levels.
 ///
@@ -47,9 +49,9 @@ pub(crate) fn estimate(image: &RgbImage) -> f64 {
 }
 
 /// The smoothing that keeps the noise of gradients in bounds, in pixels.
-pub(crate) fn smoothing(smoothing: f64, noise: f64) -> f64 {
+pub(crate) fn smoothing(noise: f64) -> f64 {
     let factor = (noise / LITTLE_NOISE).sqrt().max(1.0);
-    (smoothing * factor).min(MAX_SMOOTHING.max(smoothing))
+    (SMOOTHING * factor).min(MAX_SMOOTHING)
 }
 
 /// Standard deviation of each component of the gradient of white noise that was

@@ -7,7 +7,7 @@ const MIN_SPREAD: f64 = 0.05;
 /// Where Tukey's biweight ends, in standard deviations.
 const BIWEIGHT_CUTOFF: f64 = 4.685;
 /// From the median absolute deviation to the standard deviation of a Gaussian.
-const DEVIATION_FROM_MEDIAN: f64 = 1.4826;
+pub(crate) const DEVIATION_FROM_MEDIAN: f64 = 1.4826;
 /// A fit needs so many points.
 pub(crate) const MIN_POINTS: usize = 4;
 

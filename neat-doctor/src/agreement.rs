@@ -50,11 +50,6 @@ impl Agreement {
         }
     }
 
-    /// Adds to the score.
-    pub fn weigh(&mut self, weight: f64) {
-        self.score += weight;
-    }
-
     pub fn share(&self) -> f64 {
         self.all.share()
     }

@@ -1,6 +1,8 @@
 //! Where the cameras stand, what they look at, and what is known beside images.
 
-use crate::examination::{Cause, Check, Finding, Level, counted, listed, percent};
+use crate::examination::{
+    Cause, Check, Finding, Level, counted, listed, median, percent, views_where,
+};
 use nalgebra::Vector3;
 use neat_core::{Camera, Scene};
 
@@ -10,11 +12,6 @@ pub(crate) fn capture_findings(scene: &Scene) -> Vec<Finding> {
     findings.extend(sparse_points(scene));
     findings.extend(segments(scene));
     findings
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Neighbouring views further apart, in degrees, share little.
@@ -50,7 +47,7 @@ fn coverage(scene: &Scene) -> Finding {
             .map(|other| angle(view, other))
             .fold(f64::INFINITY, f64::min)
     };
-    let neighbour = median((0..count).map(nearest).collect());
+    let neighbour = median((0..count).map(nearest));
     let widest = (0..count)
         .flat_map(|a| (a + 1..count).map(move |b| (a, b)))
         .map(|(a, b)| angle(a, b))
@@ -60,20 +57,19 @@ fn coverage(scene: &Scene) -> Finding {
          seen from the middle of the scene sphere",
         counted(count, "view")
     );
-    if widest < NARROW {
-        return Finding::new(Check::Coverage, Level::Warning, message)
-            .because(Cause::Other)
-            .remedied_by("take photographs from places further apart");
-    }
-    if neighbour > WIDE {
-        return Finding::new(Check::Coverage, Level::Warning, message)
-            .because(Cause::Other)
-            .remedied_by("take more photographs in between");
-    }
-    if count < 8 {
-        return Finding::new(Check::Coverage, Level::Warning, message)
-            .because(Cause::Other)
-            .remedied_by("take more photographs: from 20 on results are good");
+    let remedies = [
+        (
+            widest < NARROW,
+            "take photographs from places further apart",
+        ),
+        (neighbour > WIDE, "take more photographs in between"),
+        (
+            count < 8,
+            "take more photographs: from 20 on results are good",
+        ),
+    ];
+    if let Some((_, remedy)) = remedies.into_iter().find(|(holds, _)| *holds) {
+        return Finding::warning(Check::Coverage, message, remedy);
     }
     let one_sided = directions.iter().sum::<Vector3<f64>>().norm() / count as f64 > 0.6;
     if one_sided {
@@ -84,52 +80,37 @@ fn coverage(scene: &Scene) -> Finding {
 }
 
 fn scene_sphere(scene: &Scene) -> Finding {
-    let names = |holds: Vec<bool>| -> Vec<String> {
-        let views = scene.views.iter().zip(holds).filter(|(_, holds)| *holds);
-        views.map(|(view, _)| view.name.clone()).collect()
-    };
-    let cameras = || scene.views.iter().map(|view| &view.camera);
-    let shares: Vec<f64> = cameras()
-        .map(|camera| seen_share(camera, scene.sphere_radius))
+    let camera = |view: usize| &scene.views[view].camera;
+    let shares: Vec<f64> = (0..scene.views.len())
+        .map(|view| seen_share(camera(view), scene.sphere_radius))
         .collect();
-    let is_inside = |camera: &Camera| camera.center_in_world.norm() < scene.sphere_radius;
-    let inside = names(cameras().map(is_inside).collect());
-    let away = names(shares.iter().map(|&share| share == 0.0).collect());
-    let seen = median(shares);
+    let inside = views_where(scene, |view| {
+        camera(view).center_in_world.norm() < scene.sphere_radius
+    });
+    let away = views_where(scene, |view| shares[view] == 0.0);
     // In the frame of the user's files, as --scene-sphere takes it.
     let [x, y, z] = scene.original_from_world.translation.into();
     let radius = scene.original_from_world.scale * scene.sphere_radius;
     let ball = format!("the ball around ({x:.2}, {y:.2}, {z:.2}) of radius {radius:.3}");
     let remedy = "give the sphere of the object by --scene-sphere";
+    let of_cameras = |names: &[String], what: &str| {
+        let all = counted(scene.views.len(), "camera");
+        format!("{} of {all} {what} {ball}: {}", names.len(), listed(names))
+    };
     if !away.is_empty() {
-        let message = format!(
-            "{} of {} do not look at {ball}: {}",
-            away.len(),
-            counted(scene.views.len(), "camera"),
-            listed(&away)
-        );
+        let message = of_cameras(&away, "do not look at");
+        let mut finding = Finding::warning(Check::SceneSphere, message, remedy);
         // What no camera looks at cannot be reconstructed.
-        let level = match away.len() == scene.views.len() {
-            true => Level::Problem,
-            false => Level::Warning,
-        };
-        return Finding::new(Check::SceneSphere, level, message)
-            .because(Cause::Other)
-            .remedied_by(remedy)
-            .of_views(away);
+        if away.len() == scene.views.len() {
+            finding.level = Level::Problem;
+        }
+        return finding.of_views(away);
     }
     if !inside.is_empty() {
-        let message = format!(
-            "{} of {} stand inside {ball}: {}",
-            inside.len(),
-            counted(scene.views.len(), "camera"),
-            listed(&inside)
-        );
-        return Finding::new(Check::SceneSphere, Level::Warning, message)
-            .because(Cause::Other)
-            .remedied_by(remedy)
-            .of_views(inside);
+        let message = of_cameras(&inside, "stand inside");
+        return Finding::warning(Check::SceneSphere, message, remedy).of_views(inside);
     }
+    let seen = median(shares.into_iter());
     let message = format!("cameras see {} of {ball} (median)", percent(seen));
     Finding::new(Check::SceneSphere, Level::Good, message)
 }
@@ -179,7 +160,7 @@ fn sparse_points(scene: &Scene) -> Option<Finding> {
     if all < 50 {
         return None;
     }
-    let residual = median(residuals);
+    let residual = median(residuals.into_iter());
     let message = format!(
         "{all} observations of sparse points: {residual:.2} pixels from their projections \
          (median, of 1000 across), {} behind their cameras",
@@ -195,19 +176,13 @@ fn sparse_points(scene: &Scene) -> Option<Finding> {
 }
 
 fn segments(scene: &Scene) -> Option<Finding> {
-    let counts: Vec<usize> = (scene.views.iter())
-        .map(|view| view.wireframe.edges.len())
-        .collect();
-    if counts.iter().all(|&count| count == 0) {
+    let count = |view: usize| scene.views[view].wireframe.edges.len();
+    let empty = views_where(scene, |view| count(view) == 0);
+    if empty.len() == scene.views.len() {
         return None;
     }
-    let empty: Vec<String> = (scene.views.iter().zip(&counts))
-        .filter(|(_, count)| **count == 0)
-        .map(|(view, _)| view.name.clone())
-        .collect();
-    let mut sorted = counts;
-    sorted.sort_unstable();
-    let message = format!("{} 2D segments per view (median)", sorted[sorted.len() / 2]);
+    let usual = median((0..scene.views.len()).map(|view| count(view) as f64));
+    let message = format!("{usual} 2D segments per view (median)");
     if empty.is_empty() {
         return Some(Finding::new(Check::Segments, Level::Good, message));
     }

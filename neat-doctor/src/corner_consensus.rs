@@ -156,7 +156,7 @@ impl CornerEvidence {
                         hits.clear();
                         if confirmed(&views, cameras, pair, &point, &mut hits) {
                             for &(view, corner, fit) in &hits {
-                                agreement.weigh(fit);
+                                agreement.score += fit;
                                 let best: &mut f64 = &mut fits[view][corner];
                                 *best = best.max(fit);
                             }

@@ -54,12 +54,7 @@ fn strengths(image: &GrayImage) -> GrayImage {
     let [along_x, along_y] = image.blurred(2).gradients();
     let product = |a: &GrayImage, b: &GrayImage| {
         let values = a.values.iter().zip(&b.values).map(|(a, b)| a * b);
-        let image = GrayImage {
-            width: a.width,
-            height: a.height,
-            values: values.collect(),
-        };
-        image.blurred(4)
+        a.with_values(values.collect()).blurred(4)
     };
     let mut xx = product(&along_x, &along_x);
     let (xy, yy) = (product(&along_x, &along_y), product(&along_y, &along_y));
@@ -88,16 +83,19 @@ fn is_peak(strength: &GrayImage, x: usize, y: usize) -> bool {
 /// Where between the pixels the top is, by a parabola along one axis.
 fn parabola_top(strength: &GrayImage, x: usize, y: usize, step: usize) -> f32 {
     let index = y * strength.width + x;
-    let (before, top, after) = (
-        strength.values[index - step],
-        strength.values[index],
-        strength.values[index + step],
-    );
+    let [before, top, after] = [index - step, index, index + step].map(|i| strength.values[i]);
+    vertex_of_parabola(before, top, after)
+}
+
+/// Where the parabola through three values has its top, from the middle one, within half
+/// a step; 0 where it has none.
+pub(crate) fn vertex_of_parabola(before: f32, top: f32, after: f32) -> f32 {
     let curvature = before - 2.0 * top + after;
-    if curvature >= 0.0 {
-        return 0.0;
+    if curvature < 0.0 {
+        (0.5 * (before - after) / curvature).clamp(-0.5, 0.5)
+    } else {
+        0.0
     }
-    (0.5 * (before - after) / curvature).clamp(-0.5, 0.5)
 }
 
 /// Half the side of the window in which edges are intersected.

@@ -1,6 +1,6 @@
 //! Binary descriptors: what a corner looks like, whatever its rotation.
 
-use crate::corners::{Corner, corners};
+use crate::corners::{Corner, corners, vertex_of_parabola};
 use crate::gray_image::GrayImage;
 use std::f32::consts::TAU;
 
@@ -131,17 +131,8 @@ fn orientation(gradients: &[GrayImage; 2], corner: &Corner) -> f32 {
     let peak = (0..ANGLES)
         .max_by(|&a, &b| smooth(a).total_cmp(&smooth(b)))
         .unwrap_or(0);
-    let (before, top, after) = (
-        smooth((peak + ANGLES - 1) % ANGLES),
-        smooth(peak),
-        smooth((peak + 1) % ANGLES),
-    );
-    let curvature = before - 2.0 * top + after;
-    let offset = if curvature < 0.0 {
-        (0.5 * (before - after) / curvature).clamp(-0.5, 0.5)
-    } else {
-        0.0
-    };
+    let [before, top, after] = [peak + ANGLES - 1, peak, peak + 1].map(|i| smooth(i % ANGLES));
+    let offset = vertex_of_parabola(before, top, after);
     (peak as f32 + 0.5 + offset) * TAU / ANGLES as f32
 }
 

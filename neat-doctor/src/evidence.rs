@@ -4,6 +4,7 @@ use crate::agreement::Agreement;
 use crate::corner_consensus::{CornerEvidence, MAX_CORNERS, ViewCorners};
 use crate::corners::{corners, refined};
 use crate::descriptor::keypoints;
+use crate::examination::median;
 use crate::gray_image::GrayImage;
 use crate::tracks::{self, Track, ViewKeypoints, matching};
 use crate::working_copies::WorkingCopies;
@@ -68,13 +69,11 @@ pub(crate) fn is_textured(
 ) -> Result<bool, SceneError> {
     // A few views tell; the first and the last are often the worst.
     let few: Vec<usize> = views.iter().copied().skip(1).step_by(6).collect();
-    let mut counts = working.look_at(&few, |view| {
+    let counts = working.look_at(&few, |view| {
         let (image, _) = working.of(view)?;
-        Ok(corners(&image, TEXTURE + 1).len())
+        Ok(corners(&image, TEXTURE + 1).len() as f64)
     })?;
-    counts.sort_unstable();
-    let median = counts.get(counts.len() / 2);
-    Ok(median.is_some_and(|&count| count > TEXTURE))
+    Ok(median(counts.into_iter()) > TEXTURE as f64)
 }
 
 /// Looks at the given views for points of texture or for corners.

@@ -1,7 +1,7 @@
 //! What an examination found, for people and for programs.
 
-use neat_core::LoadOptions;
 use neat_core::layout::PoseConvention;
+use neat_core::{LoadOptions, Scene};
 use serde::Serialize;
 use std::fmt;
 
@@ -180,6 +180,13 @@ impl Finding {
         }
     }
 
+    /// A warning for none of the causes that have a name.
+    pub(crate) fn warning(check: Check, message: String, remedy: &str) -> Self {
+        Self::new(check, Level::Warning, message)
+            .because(Cause::Other)
+            .remedied_by(remedy)
+    }
+
     pub(crate) fn because(mut self, cause: Cause) -> Self {
         self.cause = Some(cause);
         self
@@ -319,6 +326,20 @@ impl fmt::Display for Examination {
 pub(crate) fn counted(count: usize, noun: &str) -> String {
     let ending = if count == 1 { "" } else { "s" };
     format!("{count} {noun}{ending}")
+}
+
+/// The upper median; 0 of nothing.
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Names of the views for which `holds` does.
+pub(crate) fn views_where(scene: &Scene, holds: impl Fn(usize) -> bool) -> Vec<String> {
+    let views = scene.views.iter().enumerate();
+    let chosen = views.filter(|(view, _)| holds(*view));
+    chosen.map(|(_, view)| view.name.clone()).collect()
 }
 
 /// Names in backticks, the first few of many.

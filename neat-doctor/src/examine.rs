@@ -11,6 +11,7 @@ use neat_core::{
     CameraError, LoadOptions, LoadedScene, MemoryLimit, Scene, SceneError, ViewError, load_scene,
 };
 use std::path::Path;
+use tracing::{debug, debug_span};
 
 /// How thoroughly to look.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,10 +76,14 @@ fn findings(
     options: &ExamineOptions,
     mirrored: bool,
 ) -> Result<Vec<Finding>, SceneError> {
+    let _span = debug_span!("examine", scene = scene.name, views = scene.views.len()).entered();
     let working = WorkingCopies::new(scene, options.memory_limit);
     let mut findings = pose_findings(scene, &working, options, mirrored)?;
     findings.extend(image_findings(scene, &working)?);
     findings.extend(capture_findings(scene));
+    for Finding { level, message, .. } in &findings {
+        debug!(%level, "{message}");
+    }
     Ok(findings)
 }
 
@@ -90,6 +95,7 @@ fn pose_findings(
 ) -> Result<Vec<Finding>, SceneError> {
     let count = scene.views.len();
     let textured = is_textured(working, &evenly(count, QUICK_VIEWS))?;
+    debug!(textured, "what the images show");
     if options.depth == Depth::Quick {
         let views = if textured && count > 2 * QUICK_RUN {
             let second = count / 2;

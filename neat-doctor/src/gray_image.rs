@@ -44,6 +44,16 @@ impl GrayImage {
         (image, factor)
     }
 
+    /// An image of the same size.
+    pub fn with_values(&self, values: Vec<f32>) -> Self {
+        let (width, height) = (self.width, self.height);
+        Self {
+            width,
+            height,
+            values,
+        }
+    }
+
     pub fn at(&self, x: usize, y: usize) -> f32 {
         self.values[y * self.width + x]
     }
@@ -124,11 +134,7 @@ impl GrayImage {
                     0.5 * (self.values[index + self.width] - self.values[index - self.width]);
             }
         }
-        [along_x, along_y].map(|values| Self {
-            width: self.width,
-            height: self.height,
-            values,
-        })
+        [along_x, along_y].map(|values| self.with_values(values))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Images by themselves and against their intrinsics: sizes, brightness, blur,
 //! images that occur twice.
 
-use crate::examination::{Cause, Check, Finding, Level, counted, listed};
+use crate::examination::{Cause, Check, Finding, Level, counted, listed, median, views_where};
 use crate::gray_image::GrayImage;
 use crate::working_copies::WorkingCopies;
 use neat_core::{Camera, Scene, SceneError};
@@ -88,26 +88,13 @@ pub(crate) fn image_findings(
     Ok(findings)
 }
 
-/// Names of the views for which `holds` does.
-fn views_where(scene: &Scene, holds: impl Fn(usize) -> bool) -> Vec<String> {
-    (0..scene.views.len())
-        .filter(|&view| holds(view))
-        .map(|view| scene.views[view].name.clone())
-        .collect()
-}
-
-fn median(mut values: Vec<f32>) -> f32 {
-    values.sort_by(f32::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
 fn sizes(scene: &Scene) -> Finding {
     let size = |view: usize| scene.views[view].image.dimensions();
     let mut all: Vec<_> = (0..scene.views.len()).map(size).collect();
     all.sort_unstable();
     let usual = all[all.len() / 2];
     let others = views_where(scene, |view| size(view) != usual);
-    let [width, height] = [usual.0, usual.1];
+    let (width, height) = usual;
     if others.is_empty() {
         let message = format!("all images have {width}×{height} pixels");
         return Finding::new(Check::ImageSizes, Level::Good, message);
@@ -193,27 +180,24 @@ fn intrinsics(scene: &Scene) -> Vec<Finding> {
 fn exposure(scene: &Scene, statistics: &[ImageStatistics]) -> Finding {
     let empty = views_where(scene, |view| statistics[view].contrast < MIN_CONTRAST);
     if !empty.is_empty() {
-        let level = if 2 * empty.len() > scene.views.len() {
-            Level::Problem
-        } else {
-            Level::Warning
-        };
         let message = format!(
             "{} of one colour: {}",
             counted(empty.len(), "image"),
             listed(&empty)
         );
-        return Finding::new(Check::Exposure, level, message)
-            .because(Cause::Other)
-            .remedied_by("take these images out or export them again")
-            .of_views(empty);
+        let remedy = "take these images out or export them again";
+        let mut finding = Finding::warning(Check::Exposure, message, remedy);
+        if 2 * empty.len() > scene.views.len() {
+            finding.level = Level::Problem;
+        }
+        return finding.of_views(empty);
     }
     let on_background = statistics.iter().filter(|s| s.plain_border).count();
     if 2 * on_background > statistics.len() {
         let message = "the object stands before a plain background";
         return Finding::new(Check::Exposure, Level::Good, message);
     }
-    let usual = median(statistics.iter().map(|s| s.mean).collect());
+    let usual = median(statistics.iter().map(|s| f64::from(s.mean))) as f32;
     let odd = views_where(scene, |view| {
         let ratio = statistics[view].mean / usual;
         !(1.0 / EXPOSURE_FACTOR..=EXPOSURE_FACTOR).contains(&ratio)
@@ -225,10 +209,8 @@ fn exposure(scene: &Scene, statistics: &[ImageStatistics]) -> Finding {
             counted(odd.len(), "image"),
             listed(&odd)
         );
-        return Finding::new(Check::Exposure, Level::Warning, message)
-            .because(Cause::Other)
-            .remedied_by("develop all photographs with one exposure, or take these out")
-            .of_views(odd);
+        let remedy = "develop all photographs with one exposure, or take these out";
+        return Finding::warning(Check::Exposure, message, remedy).of_views(odd);
     }
     if !clipped.is_empty() {
         let message = format!(
@@ -246,7 +228,7 @@ fn exposure(scene: &Scene, statistics: &[ImageStatistics]) -> Finding {
 }
 
 fn sharpness(scene: &Scene, statistics: &[ImageStatistics]) -> Finding {
-    let usual = median(statistics.iter().map(|s| s.steepness).collect());
+    let usual = median(statistics.iter().map(|s| f64::from(s.steepness))) as f32;
     let blurred = views_where(scene, |view| {
         statistics[view].steepness < BLUR_FACTOR * usual
             && statistics[view].contrast >= MIN_CONTRAST
@@ -260,10 +242,8 @@ fn sharpness(scene: &Scene, statistics: &[ImageStatistics]) -> Finding {
         counted(blurred.len(), "image"),
         listed(&blurred)
     );
-    Finding::new(Check::Sharpness, Level::Warning, message)
-        .because(Cause::Other)
-        .remedied_by("take blurred images out where others show the same")
-        .of_views(blurred)
+    let remedy = "take blurred images out where others show the same";
+    Finding::warning(Check::Sharpness, message, remedy).of_views(blurred)
 }
 
 /// Images that are equal to the last bit; equal ones have equal `fingerprints`.
@@ -285,16 +265,14 @@ fn duplicates(scene: &Scene, fingerprints: &[u64]) -> Result<Option<Finding>, Sc
     if twice.is_empty() {
         return Ok(None);
     }
-    twice.sort_unstable();
-    let names: Vec<String> = twice.iter().map(|&v| scene.views[v].name.clone()).collect();
+    let names = views_where(scene, |view| twice.contains(&view));
     let message = format!(
         "{} the same as another one to the last pixel: {}",
         counted(names.len(), "image"),
         listed(&names)
     );
-    let finding = Finding::new(Check::Duplicates, Level::Warning, message)
-        .because(Cause::Other)
-        .remedied_by("keep one image of each and its pose");
+    let remedy = "keep one image of each and its pose";
+    let finding = Finding::warning(Check::Duplicates, message, remedy);
     Ok(Some(finding.of_views(names)))
 }
 

@@ -45,7 +45,7 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
-    pub fn of(evidence: &Evidence, views: usize) -> Self {
+    fn of(evidence: &Evidence, views: usize) -> Self {
         match evidence {
             Evidence::Tracks(_) => Self {
                 min_total: 60,
@@ -88,21 +88,31 @@ impl<'a> Diagnosis<'a> {
     }
 
     /// Trusts all views whose images were looked at.
-    pub fn all_trusted(&self) -> Vec<bool> {
+    fn all_trusted(&self) -> Vec<bool> {
+        self.trusted(usize::MAX)
+    }
+
+    /// Trusts at most so many of them.
+    fn trusted(&self, limit: usize) -> Vec<bool> {
         let mut trusted = vec![false; self.scene.views.len()];
-        for &view in &self.gathered.views {
-            trusted[view] = true;
+        for index in evenly(self.gathered.views.len(), limit) {
+            trusted[self.gathered.views[index]] = true;
         }
         trusted
     }
 
-    /// Trusts as many of these as a search among hundreds of hypotheses needs.
-    fn some_trusted(&self) -> Vec<bool> {
-        let mut trusted = vec![false; self.scene.views.len()];
-        for index in evenly(self.gathered.views.len(), SEARCHED_VIEWS) {
-            trusted[self.gathered.views[index]] = true;
-        }
-        trusted
+    /// How well the given cameras explain what the `trusted` views show.
+    fn given(&self, trusted: &[bool]) -> Agreement {
+        self.evidence().agreement(&self.cameras, trusted)
+    }
+
+    /// How well the given cameras explain everything.
+    pub fn all_given(&self) -> Agreement {
+        self.given(&self.all_trusted())
+    }
+
+    pub fn limits(&self) -> Limits {
+        Limits::of(self.evidence(), self.gathered.views.len())
     }
 
     /// Whether the given cameras explain what they should, in all views and
@@ -110,8 +120,7 @@ impl<'a> Diagnosis<'a> {
     pub fn is_plainly_good(&self) -> bool {
         const FOCAL_SCALES: [f64; 6] = [0.8, 0.9, 0.95, 1.05, 1.1, 1.25];
         let trusted = self.all_trusted();
-        let given = self.evidence().agreement(&self.cameras, &trusted);
-        let limits = Limits::of(self.evidence(), self.gathered.views.len());
+        let (given, limits) = (self.given(&trusted), self.limits());
         let explains = given.all.total >= limits.min_total && given.share() >= limits.good_share;
         let focal_is_better = || {
             FOCAL_SCALES.into_par_iter().any(|scale| {
@@ -127,17 +136,14 @@ impl<'a> Diagnosis<'a> {
 
     /// That the given cameras agree with the images.
     pub fn agreeing_findings(&self) -> Vec<Finding> {
-        let given = self
-            .evidence()
-            .agreement(&self.cameras, &self.all_trusted());
-        vec![self.agreeing(&given, true)]
+        vec![self.agreeing(&self.all_given(), true)]
     }
 
     /// What is found about the poses.
     pub fn findings(&self) -> Vec<Finding> {
-        let trusted = self.some_trusted();
-        let given = self.evidence().agreement(&self.cameras, &trusted);
-        let limits = Limits::of(self.evidence(), self.gathered.views.len());
+        // As many as a search among hundreds of hypotheses needs.
+        let trusted = self.trusted(SEARCHED_VIEWS);
+        let (given, limits) = (self.given(&trusted), self.limits());
         if given.all.total < limits.min_total {
             return vec![self.too_little(&given)];
         }
@@ -148,7 +154,7 @@ impl<'a> Diagnosis<'a> {
             return vec![self.mirrored_as_read()];
         }
         let trusted = self.without_bad_views(self.all_trusted());
-        let rest = self.evidence().agreement(&self.cameras, &trusted);
+        let rest = self.given(&trusted);
         if rest.share() < limits.bad_share {
             return vec![self.disagreement(&given)];
         }
@@ -265,7 +271,7 @@ impl<'a> Diagnosis<'a> {
     fn without_bad_views(&self, mut trusted: Vec<bool>) -> Vec<bool> {
         let views = self.gathered.views.len();
         for _ in 0..views / 2 {
-            let agreement = self.evidence().agreement(&self.cameras, &trusted);
+            let agreement = self.given(&trusted);
             let mut shares: Vec<(f64, usize)> = (self.gathered.views.iter())
                 .filter(|&&view| trusted[view] && agreement.per_view[view].total > 0)
                 .map(|&view| (agreement.per_view[view].share(), view))

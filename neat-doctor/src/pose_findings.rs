@@ -4,7 +4,7 @@ use crate::agreement::Agreement;
 use crate::examination::{Cause, Check, Finding, Level, Repair, counted, listed, percent};
 use crate::hypothesis::{Hypothesis, PoseOrder};
 use crate::likeness::poses_follow_likeness;
-use crate::pose_diagnosis::{Candidate, Diagnosis, Limits};
+use crate::pose_diagnosis::{Candidate, Diagnosis};
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
 
 /// A focal length further off than this, as a factor, spoils every result.
@@ -16,7 +16,6 @@ impl Diagnosis<'_> {
         let Some(last) = candidates.last() else {
             return self.disagreement(given);
         };
-        let after = last.agreement.share();
         let mut repair = self.read_with;
         let mut cause = None;
         let mut reasons = Vec::new();
@@ -58,11 +57,9 @@ impl Diagnosis<'_> {
         }
         let remedy = remedy.unwrap_or_else(|| run_with(&repair));
         let message = format!(
-            "{}: so read, the cameras explain {} of {} {} instead of {}",
+            "{}: so read, {} instead of {}",
             reasons.join(", and "),
-            percent(after),
-            last.agreement.all.total,
-            self.evidence().noun(),
+            self.explained(&last.agreement),
             percent(given.share()),
         );
         Finding {
@@ -148,22 +145,14 @@ impl Diagnosis<'_> {
     /// That mirroring the world, as was done to read the poses, repairs them, or
     /// that nothing does.
     pub fn mirrored_as_read(&self) -> Finding {
-        let given = self
-            .evidence()
-            .agreement(&self.cameras, &self.all_trusted());
-        let limits = Limits::of(self.evidence(), self.gathered.views.len());
-        let finding = Finding::new(
-            Check::Poses,
-            Level::Problem,
-            format!(
-                "the poses are mirrored: in a mirrored world the cameras explain {} of {} {}",
-                percent(given.share()),
-                given.all.total,
-                self.evidence().noun()
-            ),
-        )
-        .because(Cause::MirroredPoses);
-        if given.share() < limits.good_share {
+        let given = self.all_given();
+        let message = format!(
+            "the poses are mirrored: in a mirrored world {}",
+            self.explained(&given)
+        );
+        let finding = Finding::new(Check::Poses, Level::Problem, message);
+        let finding = finding.because(Cause::MirroredPoses);
+        if given.share() < self.limits().good_share {
             return finding.remedied_by("convert them to right-handed OpenCV axes");
         }
         Finding {
@@ -209,12 +198,7 @@ impl Diagnosis<'_> {
 
     /// That nothing is known to explain the images.
     pub fn disagreement(&self, given: &Agreement) -> Finding {
-        let explained = format!(
-            "the cameras explain {} of {} {}",
-            percent(given.share()),
-            given.all.total,
-            self.evidence().noun()
-        );
+        let explained = self.explained(given);
         if poses_follow_likeness(self.gathered, &self.cameras) {
             let message = format!(
                 "{explained}, although views that look alike have poses alike: \
@@ -249,22 +233,23 @@ impl Diagnosis<'_> {
 
     /// How well the cameras agree; `good` if that is enough.
     pub fn agreeing(&self, agreement: &Agreement, good: bool) -> Finding {
-        let message = format!(
+        let explained = self.explained(agreement);
+        if good {
+            return Finding::new(Check::Poses, Level::Good, explained);
+        }
+        let message = format!("{explained}, few for right cameras but many for wrong ones");
+        Finding::new(Check::Poses, Level::Warning, message)
+            .because(Cause::PosesDisagree)
+            .remedied_by("look at a few views for moving things, lens distortion or bad poses")
+    }
+
+    fn explained(&self, agreement: &Agreement) -> String {
+        format!(
             "the cameras explain {} of {} {}",
             percent(agreement.share()),
             agreement.all.total,
             self.evidence().noun()
-        );
-        if good {
-            return Finding::new(Check::Poses, Level::Good, message);
-        }
-        Finding::new(
-            Check::Poses,
-            Level::Warning,
-            format!("{message}, few for right cameras but many for wrong ones"),
         )
-        .because(Cause::PosesDisagree)
-        .remedied_by("look at a few views for moving things, lens distortion or bad poses")
     }
 }
 

@@ -243,7 +243,7 @@ pub(crate) fn agreement(tracks: &[Track], cameras: &[Camera], trusted: &[bool]) 
         let residual = track.residual(cameras);
         let explained = residual < 1.0;
         agreement.all += Tally::one(explained);
-        agreement.weigh(1.0 / (1.0 + (residual / TYPICAL_RESIDUAL).powi(2)));
+        agreement.score += 1.0 / (1.0 + (residual / TYPICAL_RESIDUAL).powi(2));
         for view in track.views() {
             agreement.per_view[view] += Tally::one(explained);
         }

@@ -15,8 +15,7 @@ use nalgebra::Vector3;
 use neat_core::Wireframe3d;
 use neat_core::ground_truth::GroundTruth;
 use neat_eval::{
-    EdgeModel, EdgePoints, EditDistance, EvaluationReport, NeatAbc, Protocol, Scores,
-    StructureScore, foreign,
+    EdgeModel, EvaluationInput, EvaluationOptions, EvaluationReport, Protocol, foreign,
 };
 
 type AnyError = Box<dyn std::error::Error>;
@@ -37,37 +36,16 @@ fn main() -> Result<(), AnyError> {
     if protocols.is_empty() {
         protocols = vec![Protocol::NeatAbc, Protocol::Emap, Protocol::Wed];
     }
+    let input = EvaluationInput {
+        predicted,
+        truth,
+        ..EvaluationInput::default()
+    };
     for protocol in protocols {
-        let report = EvaluationReport::new(measure(protocol, &predicted, &truth)?);
-        println!("{}", report.to_text());
+        let scores = protocol.evaluate(&input, &EvaluationOptions::default())?;
+        println!("{}", EvaluationReport::new(scores).to_text());
     }
     Ok(())
-}
-
-fn measure(
-    protocol: Protocol,
-    predicted: &EdgeModel,
-    truth: &GroundTruth,
-) -> Result<Scores, AnyError> {
-    let (wireframe, true_wireframe) = (&predicted.wireframe, &truth.wireframe);
-    Ok(match protocol {
-        Protocol::NeatAbc => {
-            Scores::NeatAbc(NeatAbc::default().evaluate(wireframe, None, true_wireframe)?)
-        }
-        Protocol::Emap => Scores::Emap(EdgePoints::emap().evaluate(predicted, truth)?),
-        Protocol::CurveGaussian => {
-            Scores::CurveGaussian(EdgePoints::curve_gaussian().evaluate(predicted, truth)?)
-        }
-        Protocol::EdgeGaussians => {
-            Scores::EdgeGaussians(EdgePoints::edge_gaussians().evaluate(predicted, truth)?)
-        }
-        Protocol::Nef => Scores::Nef(EdgePoints::nef().evaluate(predicted, truth)?),
-        Protocol::Hss => {
-            Scores::Hss(StructureScore::default().evaluate(wireframe, true_wireframe)?)
-        }
-        Protocol::Wed => Scores::Wed(EditDistance::default().evaluate(wireframe, true_wireframe)?),
-        other => return Err(format!("{other} needs a surface, which this example has not").into()),
-    })
 }
 
 /// A square, and a result that lacks one of its edges.

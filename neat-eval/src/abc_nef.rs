@@ -22,6 +22,7 @@
 use crate::EvalError;
 use crate::edge_model::EdgeModel;
 use crate::edge_points::{EdgeSampling, VoxelGrid, sample_prediction, sample_truth};
+use crate::table::{Table, distance};
 use nalgebra::Vector3;
 use neat_core::ground_truth::GroundTruth;
 use neat_wireframe::metrics::{MetricsError, PointCloud, mean_nearest_distance};
@@ -75,6 +76,28 @@ pub struct PointPrecisionRecall {
     pub f_score: f64,
     /// Smaller number of agreeing points by all points less the larger one.
     pub iou: f64,
+}
+
+impl EdgePointScores {
+    pub(crate) fn tables(&self) -> Vec<Table> {
+        let (predicted, truth) = (self.predicted_points, self.true_points);
+        let values = [
+            ("accuracy", distance(self.accuracy)),
+            ("completeness", distance(self.completeness)),
+            ("chamfer", distance(self.chamfer)),
+        ];
+        let title = format!("{predicted} predicted points, {truth} true points");
+        let distances = Table::of_values(title, ["distance", "mean"], values);
+        let header = ["threshold", "precision", "recall", "F-score", "IoU"];
+        let mut shares = Table::new("Shares of points", &header);
+        for score in &self.thresholds {
+            let mut row = vec![score.threshold.to_string()];
+            let values = [score.precision, score.recall, score.f_score, score.iou];
+            row.extend(values.map(|value| format!("{value:.4}")));
+            shares.rows.push(row);
+        }
+        vec![distances, shares]
+    }
 }
 
 const SPACING: f64 = 0.005;

@@ -2,6 +2,7 @@
 
 use neat_core::Wireframe3d;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// How large a wireframe is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,6 +27,17 @@ impl WireframeCounts {
             junctions: wireframe.junctions.len(),
             segments: segments.len(),
             mean_length: (!segments.is_empty()).then(|| total_length / segments.len() as f64),
+        }
+    }
+}
+
+impl fmt::Display for WireframeCounts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (junctions, segments) = (self.junctions, self.segments);
+        write!(f, "{junctions} junctions, {segments} segments")?;
+        match self.mean_length {
+            Some(length) => write!(f, " of mean length {length:.4}"),
+            None => Ok(()),
         }
     }
 }

@@ -16,6 +16,7 @@
 //! when they join the same vertices.
 
 use crate::EvalError;
+use crate::table::Table;
 use crate::total::total;
 use nalgebra::Vector3;
 use neat_core::Wireframe3d;
@@ -63,6 +64,21 @@ pub struct EditScores {
     pub edge_insertion: f64,
     /// Additional edges.
     pub edge_deletion: f64,
+}
+
+impl EditScores {
+    pub(crate) fn table(&self) -> Table {
+        let values = [
+            ("WED", self.wed),
+            ("moved vertices", self.translation),
+            ("missing vertices", self.vertex_insertion),
+            ("additional vertices", self.vertex_deletion),
+            ("missing edges", self.edge_insertion),
+            ("additional edges", self.edge_deletion),
+        ];
+        let values = values.map(|(name, value)| (name, format!("{value:.4}")));
+        Table::of_values("Edit distance, lower is better", ["cost", "value"], values)
+    }
 }
 
 impl EditDistance {

@@ -17,7 +17,8 @@
 //!
 //! All take plain points and segments, so that anything can be measured; results
 //! of other programs come in through [`foreign::read`]. An [`EvaluationReport`]
-//! prints scores as a table, as Markdown and as JSON. [`image_quality`] measures
+//! prints scores as a table, as Markdown and as JSON; [`Protocol::evaluate`] measures by
+//! a protocol that is named at run time. [`image_quality`] measures
 //! rendered views, [`image_colouring`] turns them into pictures.
 //!
 //! # Example
@@ -25,7 +26,7 @@
 //! ```
 //! use nalgebra::Vector3;
 //! use neat_core::Wireframe3d;
-//! use neat_eval::{EvaluationReport, NeatAbc, Scores};
+//! use neat_eval::{EvaluationInput, EvaluationReport, NeatAbc, Protocol};
 //!
 //! let truth = Wireframe3d {
 //!     junctions: vec![Vector3::zeros(), Vector3::x(), Vector3::y()],
@@ -39,9 +40,14 @@
 //! let at_2_percent = scores.wireframe.segments_max[1];
 //! assert_eq!((at_2_percent.precision, at_2_percent.recall), (1.0, 0.5));
 //!
-//! let report = EvaluationReport::new(Scores::NeatAbc(scores));
+//! // Or any protocol by its name, with a report to print.
+//! let protocol: Protocol = "neat-abc".parse()?;
+//! let mut input = EvaluationInput::default();
+//! input.predicted = predicted.into();
+//! input.truth.wireframe = truth;
+//! let report = EvaluationReport::new(protocol.evaluate(&input, &Default::default())?);
 //! assert!(report.to_text().contains("segments, larger end distance"));
-//! # Ok::<(), neat_eval::EvalError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 #![forbid(unsafe_code)]
@@ -78,7 +84,7 @@ pub use limap_length::{LengthRecall, LengthScores, LimapLength};
 pub use neat_abc::{GraphScores, NeatAbc, NeatAbcScores};
 pub use neat_dtu::{NeatSurface, ScannedSurface, SurfaceScores};
 pub use observation_mask::{GroundPlane, ObservationMask};
-pub use protocol::{Protocol, UnknownProtocol};
-pub use report::{EvaluationReport, Scores};
+pub use protocol::{EvaluationInput, EvaluationOptions, Protocol, Scores, UnknownProtocol};
+pub use report::EvaluationReport;
 pub use structure_score::{StructureScore, StructureScores};
 pub use thinning::thin_points;

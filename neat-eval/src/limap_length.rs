@@ -10,6 +10,7 @@
 //! for Tanks and Temples; sample a mesh densely for Hypersim.
 
 use crate::EvalError;
+use crate::table::Table;
 use crate::total::total;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
@@ -47,6 +48,21 @@ pub struct LengthRecall {
     pub length_recall: f64,
     /// P_τ: percentage of lines with an inlier part; 0 without lines.
     pub precision_percent: f64,
+}
+
+impl LengthScores {
+    pub(crate) fn table(&self) -> Table {
+        let title = format!("{} lines, {:.3} m", self.lines, self.total_length);
+        let mut table = Table::new(title, &["threshold", "length recall", "precision %"]);
+        for score in &self.thresholds {
+            table.rows.push(vec![
+                score.threshold.to_string(),
+                format!("{:.3}", score.length_recall),
+                format!("{:.2}", score.precision_percent),
+            ]);
+        }
+        table
+    }
 }
 
 impl LimapLength {

@@ -12,6 +12,7 @@
 
 use crate::EvalError;
 use crate::counts::WireframeCounts;
+use crate::table::Table;
 use neat_core::Wireframe3d;
 use neat_wireframe::metrics::{
     Matching, MetricsError, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,
@@ -63,6 +64,47 @@ pub struct GraphScores {
     pub segments_max: Vec<PrecisionRecall>,
     /// Of the segments, by the mean end distance (the published code).
     pub segments_mean: Vec<PrecisionRecall>,
+}
+
+impl NeatAbcScores {
+    pub(crate) fn tables(&self) -> Vec<Table> {
+        let matching = match self.matching {
+            Matching::MinimumSum => "one matching with the smallest sum of distances",
+            Matching::PerThreshold => "the best matching per threshold",
+        };
+        let table = |name: &str, graph: &GraphScores| {
+            let (counts, truth) = (&graph.counts, &self.truth);
+            graph.table(format!("{name}: {counts}. Truth: {truth}; {matching}."))
+        };
+        let before = self.before_visibility.iter();
+        std::iter::once(table("Wireframe", &self.wireframe))
+            .chain(before.map(|before| table("Before the visibility check", before)))
+            .collect()
+    }
+}
+
+impl GraphScores {
+    fn table(&self, title: String) -> Table {
+        let mut table = Table::new(title, &[""]);
+        for letter in ["P", "R"] {
+            let thresholds = self.junctions.iter();
+            table
+                .header
+                .extend(thresholds.map(|score| format!("{letter} {}", score.threshold)));
+        }
+        let row = |name: &str, scores: &[PrecisionRecall]| {
+            let mut cells = vec![name.to_owned()];
+            cells.extend(scores.iter().map(|s| format!("{:.3}", s.precision)));
+            cells.extend(scores.iter().map(|s| format!("{:.3}", s.recall)));
+            cells
+        };
+        table.rows = vec![
+            row("junctions", &self.junctions),
+            row("segments, larger end distance", &self.segments_max),
+            row("segments, mean end distance", &self.segments_mean),
+        ];
+        table
+    }
 }
 
 impl NeatAbc {

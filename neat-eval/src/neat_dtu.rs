@@ -14,6 +14,7 @@
 use crate::EvalError;
 use crate::counts::WireframeCounts;
 use crate::observation_mask::{GroundPlane, ObservationMask};
+use crate::table::{Table, distance};
 use crate::thinning::thin_points;
 use nalgebra::Vector3;
 use neat_core::Wireframe3d;
@@ -53,6 +54,16 @@ pub struct ScannedSurface {
     pub ground_plane: Option<GroundPlane>,
 }
 
+impl ScannedSurface {
+    /// Only the points: all of them count.
+    pub(crate) fn only_points(&self) -> Self {
+        Self {
+            points: self.points.clone(),
+            ..Self::default()
+        }
+    }
+}
+
 /// Agreement with a scanned surface; lower is better. `None` where no distance
 /// counts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,6 +78,19 @@ pub struct SurfaceScores {
     pub completeness: Option<f64>,
     /// Samples that were seen, and so could count for `segment_accuracy`.
     pub observed_samples: usize,
+}
+
+impl SurfaceScores {
+    pub(crate) fn table(&self) -> Table {
+        let title = format!("Wireframe: {}.", self.counts);
+        let values = [
+            ("junctions (ACC-J)", distance(self.junction_accuracy)),
+            ("segments (ACC-L)", distance(self.segment_accuracy)),
+            ("completeness", distance(self.completeness)),
+            ("samples observed", self.observed_samples.to_string()),
+        ];
+        Table::of_values(title, ["distance to the surface", "mean"], values)
+    }
 }
 
 impl NeatSurface {

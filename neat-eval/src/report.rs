@@ -1,16 +1,8 @@
 //! The result of an evaluation: as a table, as Markdown, as JSON.
 
-use crate::abc_nef::EdgePointScores;
-use crate::counts::WireframeCounts;
-use crate::edit_distance::EditScores;
-use crate::limap_length::LengthScores;
-use crate::neat_abc::{GraphScores, NeatAbcScores};
-use crate::neat_dtu::SurfaceScores;
-use crate::protocol::Protocol;
-use crate::structure_score::StructureScores;
+use crate::protocol::{Protocol, Scores};
 use crate::table::Table;
 use neat_core::{SceneError, file};
-use neat_wireframe::metrics::{Matching, PrecisionRecall};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::path::Path;
@@ -41,67 +33,6 @@ pub struct EvaluationReport {
     /// The numbers.
     #[serde(flatten)]
     pub scores: Scores,
-}
-
-/// The numbers, by protocol.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "protocol", content = "scores", rename_all = "kebab-case")]
-pub enum Scores {
-    /// NEAT on ABC.
-    NeatAbc(NeatAbcScores),
-    /// NEAT on DTU.
-    NeatDtu(SurfaceScores),
-    /// NEAT on BlendedMVS.
-    NeatBlendedMvs(SurfaceScores),
-    /// EMAP on ABC-NEF.
-    Emap(EdgePointScores),
-    /// CurveGaussian on ABC-NEF.
-    CurveGaussian(EdgePointScores),
-    /// EdgeGaussians on ABC-NEF.
-    EdgeGaussians(EdgePointScores),
-    /// NEF on ABC-NEF.
-    Nef(EdgePointScores),
-    /// LIMAP on Hypersim.
-    LimapHypersim(LengthScores),
-    /// LIMAP on Tanks and Temples.
-    LimapTnt(LengthScores),
-    /// Hybrid structure score.
-    Hss(StructureScores),
-    /// Wireframe edit distance.
-    Wed(EditScores),
-}
-
-impl Scores {
-    /// The protocol that they are of.
-    pub fn protocol(&self) -> Protocol {
-        match self {
-            Self::NeatAbc(_) => Protocol::NeatAbc,
-            Self::NeatDtu(_) => Protocol::NeatDtu,
-            Self::NeatBlendedMvs(_) => Protocol::NeatBlendedMvs,
-            Self::Emap(_) => Protocol::Emap,
-            Self::CurveGaussian(_) => Protocol::CurveGaussian,
-            Self::EdgeGaussians(_) => Protocol::EdgeGaussians,
-            Self::Nef(_) => Protocol::Nef,
-            Self::LimapHypersim(_) => Protocol::LimapHypersim,
-            Self::LimapTnt(_) => Protocol::LimapTnt,
-            Self::Hss(_) => Protocol::Hss,
-            Self::Wed(_) => Protocol::Wed,
-        }
-    }
-
-    fn tables(&self) -> Vec<Table> {
-        match self {
-            Self::NeatAbc(scores) => neat_abc_tables(scores),
-            Self::NeatDtu(scores) | Self::NeatBlendedMvs(scores) => vec![surface_table(scores)],
-            Self::Emap(scores)
-            | Self::CurveGaussian(scores)
-            | Self::EdgeGaussians(scores)
-            | Self::Nef(scores) => edge_point_tables(scores),
-            Self::LimapHypersim(scores) | Self::LimapTnt(scores) => vec![length_table(scores)],
-            Self::Hss(scores) => vec![structure_table(scores)],
-            Self::Wed(scores) => vec![edit_table(scores)],
-        }
-    }
 }
 
 impl EvaluationReport {
@@ -156,142 +87,6 @@ impl EvaluationReport {
     }
 }
 
-fn neat_abc_tables(scores: &NeatAbcScores) -> Vec<Table> {
-    let matching = match scores.matching {
-        Matching::MinimumSum => "one matching with the smallest sum of distances",
-        Matching::PerThreshold => "the best matching per threshold",
-    };
-    let truth = describe(&scores.truth);
-    let table = |name: &str, graph: &GraphScores| {
-        let counts = describe(&graph.counts);
-        graph_table(
-            format!("{name}: {counts}. Truth: {truth}; {matching}."),
-            graph,
-        )
-    };
-    let mut tables = vec![table("Wireframe", &scores.wireframe)];
-    if let Some(before) = &scores.before_visibility {
-        tables.push(table("Before the visibility check", before));
-    }
-    tables
-}
-
-fn graph_table(title: String, graph: &GraphScores) -> Table {
-    let mut table = Table::new(title, &[""]);
-    for letter in ["P", "R"] {
-        let thresholds = graph.junctions.iter();
-        table
-            .header
-            .extend(thresholds.map(|score| format!("{letter} {}", score.threshold)));
-    }
-    let row = |name: &str, scores: &[PrecisionRecall]| {
-        let mut cells = vec![name.to_owned()];
-        cells.extend(scores.iter().map(|s| format!("{:.3}", s.precision)));
-        cells.extend(scores.iter().map(|s| format!("{:.3}", s.recall)));
-        cells
-    };
-    table.rows = vec![
-        row("junctions", &graph.junctions),
-        row("segments, larger end distance", &graph.segments_max),
-        row("segments, mean end distance", &graph.segments_mean),
-    ];
-    table
-}
-
-fn surface_table(scores: &SurfaceScores) -> Table {
-    let title = format!("Wireframe: {}.", describe(&scores.counts));
-    let mut table = Table::new(title, &["distance to the surface", "mean"]);
-    for (name, value) in [
-        ("junctions (ACC-J)", scores.junction_accuracy),
-        ("segments (ACC-L)", scores.segment_accuracy),
-        ("completeness", scores.completeness),
-    ] {
-        table.rows.push(vec![name.into(), distance(value)]);
-    }
-    let samples = scores.observed_samples.to_string();
-    table.rows.push(vec!["samples observed".into(), samples]);
-    table
-}
-
-fn edge_point_tables(scores: &EdgePointScores) -> Vec<Table> {
-    let title = format!(
-        "{} predicted points, {} true points",
-        scores.predicted_points, scores.true_points
-    );
-    let mut distances = Table::new(title, &["distance", "mean"]);
-    for (name, value) in [
-        ("accuracy", scores.accuracy),
-        ("completeness", scores.completeness),
-        ("chamfer", scores.chamfer),
-    ] {
-        distances.rows.push(vec![name.into(), distance(value)]);
-    }
-    let header = ["threshold", "precision", "recall", "F-score", "IoU"];
-    let mut shares = Table::new("Shares of points", &header);
-    for score in &scores.thresholds {
-        let mut row = vec![score.threshold.to_string()];
-        let values = [score.precision, score.recall, score.f_score, score.iou];
-        row.extend(values.map(|value| format!("{value:.4}")));
-        shares.rows.push(row);
-    }
-    vec![distances, shares]
-}
-
-fn length_table(scores: &LengthScores) -> Table {
-    let title = format!("{} lines, {:.3} m", scores.lines, scores.total_length);
-    let mut table = Table::new(title, &["threshold", "length recall", "precision %"]);
-    for score in &scores.thresholds {
-        table.rows.push(vec![
-            score.threshold.to_string(),
-            format!("{:.3}", score.length_recall),
-            format!("{:.2}", score.precision_percent),
-        ]);
-    }
-    table
-}
-
-fn structure_table(scores: &StructureScores) -> Table {
-    let mut table = Table::new("Structure, higher is better", &["score", "value"]);
-    for (name, value) in [
-        ("HSS", scores.hss),
-        ("F1 of vertices", scores.vertex_f1),
-        ("IoU of edges", scores.edge_iou),
-    ] {
-        table.rows.push(vec![name.into(), format!("{value:.4}")]);
-    }
-    table
-}
-
-fn edit_table(scores: &EditScores) -> Table {
-    let mut table = Table::new("Edit distance, lower is better", &["cost", "value"]);
-    for (name, value) in [
-        ("WED", scores.wed),
-        ("moved vertices", scores.translation),
-        ("missing vertices", scores.vertex_insertion),
-        ("additional vertices", scores.vertex_deletion),
-        ("missing edges", scores.edge_insertion),
-        ("additional edges", scores.edge_deletion),
-    ] {
-        table.rows.push(vec![name.into(), format!("{value:.4}")]);
-    }
-    table
-}
-
-fn distance(value: Option<f64>) -> String {
-    value.map_or_else(|| "-".into(), |value| format!("{value:.4}"))
-}
-
-fn describe(counts: &WireframeCounts) -> String {
-    let mut text = format!(
-        "{} junctions, {} segments",
-        counts.junctions, counts.segments
-    );
-    if let Some(length) = counts.mean_length {
-        let _ = write!(text, " of mean length {length:.4}");
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -302,6 +97,7 @@ mod tests {
     use nalgebra::Vector3;
     use neat_core::Wireframe3d;
     use neat_core::ground_truth::GroundTruth;
+    use neat_wireframe::metrics::Matching;
 
     fn truth() -> Wireframe3d {
         Wireframe3d {

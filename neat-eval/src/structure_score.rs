@@ -14,6 +14,7 @@
 
 use crate::EvalError;
 use crate::abc_nef::harmonic_mean;
+use crate::table::Table;
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{LineSegment3, Wireframe3d};
 use neat_wireframe::metrics::{MetricsError, junction_distances};
@@ -56,6 +57,18 @@ pub struct StructureScores {
     pub vertex_f1: f64,
     /// Intersection over union of the edges' solids.
     pub edge_iou: f64,
+}
+
+impl StructureScores {
+    pub(crate) fn table(&self) -> Table {
+        let values = [
+            ("HSS", self.hss),
+            ("F1 of vertices", self.vertex_f1),
+            ("IoU of edges", self.edge_iou),
+        ];
+        let values = values.map(|(name, value)| (name, format!("{value:.4}")));
+        Table::of_values("Structure, higher is better", ["score", "value"], values)
+    }
 }
 
 impl StructureScore {

@@ -19,6 +19,21 @@ impl Table {
         }
     }
 
+    /// One row for each name with its value.
+    pub(crate) fn of_values<'a>(
+        title: impl Into<String>,
+        header: [&str; 2],
+        values: impl IntoIterator<Item = (&'a str, String)>,
+    ) -> Self {
+        let rows = values
+            .into_iter()
+            .map(|(name, value)| vec![name.into(), value]);
+        Self {
+            rows: rows.collect(),
+            ..Self::new(title, &header)
+        }
+    }
+
     /// Columns apart by two spaces, numbers to the right.
     pub(crate) fn to_text(&self) -> String {
         let widths = self.widths();
@@ -71,6 +86,11 @@ impl Table {
             })
             .collect()
     }
+}
+
+/// A distance with four digits; a dash for none.
+pub(crate) fn distance(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".into(), |value| format!("{value:.4}"))
 }
 
 #[cfg(test)]

@@ -3,13 +3,15 @@
 //! `cameras.txt` and `images.txt` have no entries, but COLMAP opens a model only with
 //! all three. `lines3D.txt` is ours: COLMAP has no lines and ignores it.
 
-use neat_core::{SceneError, file};
+use crate::ExportError;
+use crate::target::Target;
+use neat_core::file;
 use neat_wireframe::export::WireframeDocument;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
 
-/// Fills a new or empty folder; returns its files. Ids count from 1.
-pub fn write(dir: &Path, document: &WireframeDocument) -> Result<Vec<PathBuf>, SceneError> {
+/// Fills a new or empty folder. Ids count from 1.
+pub fn write(to: &mut Target) -> Result<(), ExportError> {
+    let (dir, document) = (to.path, to.document);
     let files = [
         (
             "cameras.txt",
@@ -27,7 +29,8 @@ pub fn write(dir: &Path, document: &WireframeDocument) -> Result<Vec<PathBuf>, S
             .iter()
             .try_for_each(|(name, text)| file::write_atomically(&dir.join(name), text.as_bytes()))
     })?;
-    Ok(files.iter().map(|(name, _)| dir.join(name)).collect())
+    to.written.files = files.iter().map(|(name, _)| dir.join(name)).collect();
+    Ok(())
 }
 
 fn points(document: &WireframeDocument) -> String {

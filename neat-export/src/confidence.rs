@@ -46,6 +46,19 @@ impl Confidence {
         values.iter().map(class).collect()
     }
 
+    /// The edges of every class that has some, in the order of [`Self::ALL`].
+    pub(crate) fn groups(document: &WireframeDocument) -> Vec<(Self, Vec<usize>)> {
+        let classes = Self::of_edges(document);
+        let edges_of = |class| {
+            (0..classes.len())
+                .filter(|&e| classes[e] == class)
+                .collect()
+        };
+        let groups = Self::ALL.map(|class| (class, edges_of(class)));
+        let has_some = |(_, edges): &(Self, Vec<usize>)| !edges.is_empty();
+        groups.into_iter().filter(has_some).collect()
+    }
+
     /// Its name, for layers, classes and legends.
     pub fn name(self) -> &'static str {
         match self {

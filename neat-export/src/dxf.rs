@@ -4,7 +4,8 @@
 //! shares no vertices; lines that meet have the same numbers at their ends, and all
 //! junctions are `POINT`s on a layer of their own.
 
-use crate::Confidence;
+use crate::target::Target;
+use crate::{Confidence, ExportError};
 use nalgebra::Vector3;
 use neat_wireframe::export::WireframeDocument;
 use std::fmt::{Display, Write};
@@ -12,8 +13,12 @@ use std::fmt::{Display, Write};
 /// Layer of the junctions.
 const JUNCTIONS: &str = "JUNCTIONS";
 
-/// The text of a DXF file.
-pub fn text(document: &WireframeDocument) -> String {
+/// Writes a DXF file.
+pub fn write(to: &mut Target) -> Result<(), ExportError> {
+    to.write(text(to.document))
+}
+
+fn text(document: &WireframeDocument) -> String {
     let mut dxf = Dxf::default();
     dxf.section("HEADER", |dxf| {
         dxf.group(9, "$ACADVER");

@@ -1,25 +1,10 @@
 //! A document to a file.
 
-use crate::orthographic::Drawing;
-use crate::{ExportError, ExportOptions, Format};
-use crate::{colmap, dxf, geojson, gltf, limap, npz, picture, step, svg};
-use neat_core::file;
-use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
-use std::path::{Path, PathBuf};
-
-/// What an export has written.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Written {
-    /// The files, complete.
-    pub files: Vec<PathBuf>,
-    /// Number of junctions that passed the filter.
-    pub junctions: usize,
-    /// Number of edges that passed the filter.
-    pub edges: usize,
-    /// What the format has no words for and the files therefore lack, one sentence
-    /// each.
-    pub left_out: Vec<String>,
-}
+use crate::format::Format;
+use crate::target::{Target, Written};
+use crate::{ExportError, ExportOptions};
+use neat_wireframe::export::WireframeDocument;
+use std::path::Path;
 
 /// Writes a document in a format, in the frame and the unit of the document.
 ///
@@ -37,46 +22,19 @@ pub fn export(
 ) -> Result<Written, ExportError> {
     options.check()?;
     document.check(path)?;
-    let document = options.filter.apply(document)?;
-    let mut written = Written {
-        files: vec![path.into()],
-        junctions: document.junctions.len(),
-        edges: document.edges.len(),
-        left_out: Vec::new(),
-    };
-    let out_of_range = || ExportError::OutOfRange {
-        path: path.into(),
+    let document = &options.filter.apply(document)?;
+    let mut target = Target {
         format: format.name(),
+        path,
+        document,
+        options,
+        written: Written {
+            files: vec![path.into()],
+            junctions: document.junctions.len(),
+            edges: document.edges.len(),
+            left_out: Vec::new(),
+        },
     };
-    let drawing = || {
-        Drawing::new(&document.junctions, options.direction, options.width).ok_or_else(out_of_range)
-    };
-    let write = |bytes: &[u8]| file::write_atomically(path, bytes);
-    match format {
-        Format::Json => write_json(path, &document)?,
-        Format::Obj => write_obj(path, &document.wireframe())?,
-        Format::Ply => write_ply(path, &document.wireframe())?,
-        Format::Gltf => write(&gltf::text(&document).ok_or_else(out_of_range)?)?,
-        Format::Glb => write(&gltf::binary(&document).ok_or_else(out_of_range)?)?,
-        Format::Dxf => write(dxf::text(&document).as_bytes())?,
-        Format::Step => {
-            let step = step::text(&document, options.unit);
-            let lacking = [
-                (step.edges_without_length, "edges without length"),
-                (step.lonely_junctions, "junctions without edges"),
-            ];
-            for (count, what) in lacking.into_iter().filter(|(count, _)| *count > 0) {
-                let sentence = format!("a STEP wireframe has no {what}: {count} left out");
-                written.left_out.push(sentence);
-            }
-            write(step.text.as_bytes())?;
-        }
-        Format::Svg => write(svg::text(&document, &drawing()?).as_bytes())?,
-        Format::Png => file::write_png(path, &picture::draw(&document, &drawing()?))?,
-        Format::GeoJson => write(geojson::text(&document).as_bytes())?,
-        Format::Npz => npz::write(path, &document)?,
-        Format::Colmap => written.files = colmap::write(path, &document)?,
-        Format::Limap => written.files = limap::write(path, &document)?,
-    }
-    Ok(written)
+    format.write(&mut target)?;
+    Ok(target.written)
 }

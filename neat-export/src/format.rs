@@ -1,6 +1,12 @@
-//! The formats, their names and their file endings.
+//! The formats: a table of names, file endings and the functions that write them.
+//!
+//! A new format is a file with its function, a variant of [`Format`], and a row of
+//! [`FORMATS`].
 
 use crate::ExportError;
+use crate::target::Target;
+use crate::{colmap, dxf, geojson, gltf, limap, npz, picture, step, svg};
+use neat_wireframe::export::{write_json, write_obj, write_ply};
 use std::path::Path;
 
 /// A format that a wireframe can be written in.
@@ -35,60 +41,78 @@ pub enum Format {
     Limap,
 }
 
+/// A format as one row of [`FORMATS`].
+struct Row {
+    format: Format,
+    name: &'static str,
+    /// See [`Format::endings`].
+    endings: &'static [&'static str],
+    write: fn(&mut Target) -> Result<(), ExportError>,
+    explanation: &'static str,
+}
+
+/// The endings of a format that fills a folder.
+const FOLDER: &[&str] = &[];
+
+/// Every format, in the order of [`Format`] and of help texts.
+#[rustfmt::skip] // One row a line.
+static FORMATS: [Row; 13] = [
+    row(Format::Json, "json", &["json"], |to| Ok(write_json(to.path, to.document)?), "everything that is known, by docs/wireframe.schema.json"),
+    row(Format::Obj, "obj", &["obj"], |to| Ok(write_obj(to.path, &to.document.wireframe())?), "Wavefront OBJ: v and l elements (Blender, MeshLab, trimesh)"),
+    row(Format::Ply, "ply", &["ply"], |to| Ok(write_ply(to.path, &to.document.wireframe())?), "PLY, ASCII, with vertex and edge elements (CloudCompare, trimesh)"),
+    row(Format::Gltf, "gltf", &["gltf"], gltf::write_text, "glTF 2.0 lines, text with embedded data, coloured by confidence"),
+    row(Format::Glb, "glb", &["glb"], gltf::write_binary, "glTF 2.0 lines in one binary file (web viewers, Blender)"),
+    row(Format::Dxf, "dxf", &["dxf"], dxf::write, "AutoCAD R12 lines on layers by confidence (CAD programs)"),
+    row(Format::Step, "step", &["step", "stp"], step::write, "ISO 10303 AP214 wireframe with shared vertices (CAD programs)"),
+    row(Format::Svg, "svg", &["svg"], svg::write, "orthographic view, vector graphics"),
+    row(Format::Png, "png", &["png"], picture::write, "orthographic view, image"),
+    row(Format::GeoJson, "geojson", &["geojson"], geojson::write, "LineString features with z, coordinates as they are (QGIS)"),
+    row(Format::Npz, "npz", &["npz"], npz::write, "NumPy: lines3d as the published NEAT code, junctions, edges"),
+    row(Format::Colmap, "colmap", FOLDER, colmap::write, "a folder: COLMAP text model of the junctions, and lines3D.txt"),
+    row(Format::Limap, "limap", FOLDER, limap::write, "a folder: line tracks with their 2D segments, as LIMAP leaves them"),
+];
+
+const fn row(
+    format: Format,
+    name: &'static str,
+    endings: &'static [&'static str],
+    write: fn(&mut Target) -> Result<(), ExportError>,
+    explanation: &'static str,
+) -> Row {
+    Row {
+        format,
+        name,
+        endings,
+        write,
+        explanation,
+    }
+}
+
 impl Format {
     /// All formats, in the order in which help texts list them.
-    pub const ALL: [Self; 13] = [
-        Self::Json,
-        Self::Obj,
-        Self::Ply,
-        Self::Gltf,
-        Self::Glb,
-        Self::Dxf,
-        Self::Step,
-        Self::Svg,
-        Self::Png,
-        Self::GeoJson,
-        Self::Npz,
-        Self::Colmap,
-        Self::Limap,
-    ];
+    pub const ALL: [Self; FORMATS.len()] = {
+        let mut all = [Self::Json; FORMATS.len()];
+        let mut index = 0;
+        while index < all.len() {
+            all[index] = FORMATS[index].format;
+            index += 1;
+        }
+        all
+    };
+
+    fn row(self) -> &'static Row {
+        &FORMATS[self as usize]
+    }
 
     /// Name, for command lines and messages.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Json => "json",
-            Self::Obj => "obj",
-            Self::Ply => "ply",
-            Self::Gltf => "gltf",
-            Self::Glb => "glb",
-            Self::Dxf => "dxf",
-            Self::Step => "step",
-            Self::Svg => "svg",
-            Self::Png => "png",
-            Self::GeoJson => "geojson",
-            Self::Npz => "npz",
-            Self::Colmap => "colmap",
-            Self::Limap => "limap",
-        }
+        self.row().name
     }
 
     /// The file endings by which [`Format::from_path`] knows it, the usual one
     /// first; empty for a format that fills a folder.
     pub fn endings(self) -> &'static [&'static str] {
-        match self {
-            Self::Json => &["json"],
-            Self::Obj => &["obj"],
-            Self::Ply => &["ply"],
-            Self::Gltf => &["gltf"],
-            Self::Glb => &["glb"],
-            Self::Dxf => &["dxf"],
-            Self::Step => &["step", "stp"],
-            Self::Svg => &["svg"],
-            Self::Png => &["png"],
-            Self::GeoJson => &["geojson"],
-            Self::Npz => &["npz"],
-            Self::Colmap | Self::Limap => &[],
-        }
+        self.row().endings
     }
 
     /// Whether it fills a folder instead of a file.
@@ -98,21 +122,11 @@ impl Format {
 
     /// What it is for, in one line.
     pub fn explanation(self) -> &'static str {
-        match self {
-            Self::Json => "everything that is known, by docs/wireframe.schema.json",
-            Self::Obj => "Wavefront OBJ: v and l elements (Blender, MeshLab, trimesh)",
-            Self::Ply => "PLY, ASCII, with vertex and edge elements (CloudCompare, trimesh)",
-            Self::Gltf => "glTF 2.0 lines, text with embedded data, coloured by confidence",
-            Self::Glb => "glTF 2.0 lines in one binary file (web viewers, Blender)",
-            Self::Dxf => "AutoCAD R12 lines on layers by confidence (CAD programs)",
-            Self::Step => "ISO 10303 AP214 wireframe with shared vertices (CAD programs)",
-            Self::Svg => "orthographic view, vector graphics",
-            Self::Png => "orthographic view, image",
-            Self::GeoJson => "LineString features with z, coordinates as they are (QGIS)",
-            Self::Npz => "NumPy: lines3d as the published NEAT code, junctions, edges",
-            Self::Colmap => "a folder: COLMAP text model of the junctions, and lines3D.txt",
-            Self::Limap => "a folder: line tracks with their 2D segments, as LIMAP leaves them",
-        }
+        self.row().explanation
+    }
+
+    pub(crate) fn write(self, target: &mut Target) -> Result<(), ExportError> {
+        (self.row().write)(target)
     }
 
     /// The format that a file name's ending says, in upper or lower case.
@@ -158,6 +172,7 @@ mod tests {
     #[test]
     fn names_and_endings_lead_back() {
         for format in Format::ALL {
+            assert_eq!(format.row().format, format);
             assert_eq!(Format::from_name(format.name()).unwrap(), format);
             for ending in format.endings() {
                 let path = format!("out.d/wire.frame.{}", ending.to_uppercase());

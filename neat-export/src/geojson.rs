@@ -5,14 +5,15 @@
 //! in the document instead, which programs accept when told the reference system;
 //! the member `coordinate_frame` says so.
 
-use crate::Confidence;
 use crate::isolated::isolated_junctions;
-use neat_wireframe::export::WireframeDocument;
+use crate::target::Target;
+use crate::{Confidence, ExportError};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
-/// The text of a GeoJSON file.
-pub fn text(document: &WireframeDocument) -> String {
+/// Writes a GeoJSON file.
+pub fn write(to: &mut Target) -> Result<(), ExportError> {
+    let document = to.document;
     let position = |junction: usize| document.junctions[junction].as_slice();
     let classes = Confidence::of_edges(document);
     let edges = document.edges.iter().enumerate().map(|(edge, [a, b])| {
@@ -34,7 +35,7 @@ pub fn text(document: &WireframeDocument) -> String {
         "coordinate_frame": "the frame of the reconstructed scene, not WGS 84",
         "features": edges.chain(isolated).collect::<Vec<_>>(),
     });
-    format!("{collection}\n")
+    to.write(format!("{collection}\n"))
 }
 
 fn fields(fields: &BTreeMap<String, Vec<f64>>, index: usize) -> Map<String, Value> {

@@ -6,8 +6,9 @@
 //! same positions. Axes and unit are those of the document, although glTF means
 //! metres with +Y up.
 
-use crate::Confidence;
 use crate::isolated::isolated_junctions;
+use crate::target::Target;
+use crate::{Confidence, ExportError};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use nalgebra::Vector3;
@@ -24,9 +25,19 @@ const LINES: u32 = 1;
 /// The extents that 32-bit numbers hold: smaller ones would lose digits.
 const EXTENTS: Range<f64> = 1e-30..1e38;
 
-/// A `.gltf` file with the data inside; `None` if 32-bit numbers cannot hold the extent
+/// A `.gltf` file with the data inside.
+pub fn write_text(to: &mut Target) -> Result<(), ExportError> {
+    to.write(text(to.document).ok_or_else(|| to.out_of_range())?)
+}
+
+/// A `.glb` file.
+pub fn write_binary(to: &mut Target) -> Result<(), ExportError> {
+    to.write(binary(to.document).ok_or_else(|| to.out_of_range())?)
+}
+
+/// `None` if 32-bit numbers cannot hold the extent
 /// of the wireframe.
-pub fn text(document: &WireframeDocument) -> Option<Vec<u8>> {
+fn text(document: &WireframeDocument) -> Option<Vec<u8>> {
     let mut asset = Asset::new(document)?;
     if !asset.data.is_empty() {
         let data = BASE64_STANDARD.encode(&asset.data);
@@ -36,8 +47,8 @@ pub fn text(document: &WireframeDocument) -> Option<Vec<u8>> {
     Some(format!("{}\n", asset.json).into_bytes())
 }
 
-/// A `.glb` file; `None` as for [`text`].
-pub fn binary(document: &WireframeDocument) -> Option<Vec<u8>> {
+/// `None` as for [`text`].
+fn binary(document: &WireframeDocument) -> Option<Vec<u8>> {
     let asset = Asset::new(document)?;
     let mut json = asset.json.to_string().into_bytes();
     json.resize(json.len().next_multiple_of(4), b' ');
@@ -108,7 +119,6 @@ impl Asset {
         document: &WireframeDocument,
         position: usize,
     ) -> Option<Vec<Value>> {
-        let classes = Confidence::of_edges(document);
         let mut primitives = Vec::new();
         let mut materials = Vec::new();
         let mut add = |name: &str, color: [u8; 3], mode: u32, indices: &[usize]| {
@@ -130,13 +140,9 @@ impl Asset {
             }));
             Some(())
         };
-        for class in Confidence::ALL {
-            let edges = document.edges.iter().zip(&classes);
-            let of_class: Vec<usize> = edges
-                .filter(|(_, of)| **of == class)
-                .flat_map(|(ends, _)| *ends)
-                .collect();
-            add(class.name(), class.color(), LINES, &of_class)?;
+        for (class, edges) in Confidence::groups(document) {
+            let ends: Vec<usize> = edges.iter().flat_map(|e| document.edges[*e]).collect();
+            add(class.name(), class.color(), LINES, &ends)?;
         }
         let isolated = isolated_junctions(document);
         add("isolated", Confidence::Unknown.color(), POINTS, &isolated)?;

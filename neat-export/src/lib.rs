@@ -31,33 +31,35 @@
 
 #![forbid(unsafe_code)]
 
-pub mod confidence;
-pub mod edge_filter;
-pub mod error;
-pub mod format;
 pub mod marching_cubes;
-pub mod options;
-pub mod orthographic;
-pub mod triangle_mesh;
 
 mod colmap;
+mod confidence;
 mod cube_case;
 mod dxf;
+mod edge_filter;
+mod error;
 mod export;
+mod format;
 mod geojson;
 mod gltf;
 mod isolated;
 mod limap;
 mod npz;
+mod options;
+mod orthographic;
 mod picture;
 mod step;
 mod svg;
+mod target;
+mod triangle_mesh;
 
 pub use confidence::Confidence;
 pub use edge_filter::EdgeFilter;
 pub use error::ExportError;
-pub use export::{Written, export};
+pub use export::export;
 pub use format::Format;
 pub use options::{ExportOptions, LengthUnit};
 pub use orthographic::ViewDirection;
+pub use target::Written;
 pub use triangle_mesh::TriangleMesh;

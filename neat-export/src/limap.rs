@@ -5,18 +5,19 @@
 //! every edge brings its own two ends.
 
 use crate::ExportError;
+use crate::target::Target;
 use neat_core::{LineSegment2, file};
 use neat_wireframe::export::{
     LineTrack, SupportingSegment, TrackSegment, WireframeDocument, write_all_tracks,
     write_image_list, write_track_folder,
 };
-use std::path::{Path, PathBuf};
 
-/// Fills a new or empty folder; returns its files and folders.
+/// Fills a new or empty folder.
 ///
 /// The document has no numbers of 2D segments: in every image the supporting ones
 /// are counted in the order of the edges.
-pub fn write(dir: &Path, document: &WireframeDocument) -> Result<Vec<PathBuf>, ExportError> {
+pub fn write(to: &mut Target) -> Result<(), ExportError> {
+    let (dir, document) = (to.path, to.document);
     if document.edge_support.len() != document.edges.len() {
         return Err(ExportError::NoField {
             field: "edge_support",
@@ -31,7 +32,8 @@ pub fn write(dir: &Path, document: &WireframeDocument) -> Result<Vec<PathBuf>, E
     write_image_list(images, &document.views)?;
     write_all_tracks(all, &tracks)?;
     write_track_folder(folder, &tracks)?;
-    Ok(written.into())
+    to.written.files = written.into();
+    Ok(())
 }
 
 fn line_tracks(document: &WireframeDocument) -> Vec<LineTrack> {

@@ -1,15 +1,15 @@
 //! NumPy arrays: `lines3d` as the published NEAT code saves it, and the graph.
 
-use neat_core::SceneError;
+use crate::ExportError;
+use crate::target::Target;
 use neat_core::npz::{NpyArray, NpyIntegers, write_npz_with_integers};
-use neat_wireframe::export::WireframeDocument;
 use std::collections::BTreeMap;
-use std::path::Path;
 
 /// Writes `lines3d` `[E, 2, 3]`, the one array of the published code's
 /// `…-wfi_checked.npz` (`neat-final-parsing.py`), and beside it `junctions` `[J, 3]`
 /// and `edges` `[E, 2]`, by which lines share their ends. All numbers have 64 bits.
-pub fn write(path: &Path, document: &WireframeDocument) -> Result<(), SceneError> {
+pub fn write(to: &mut Target) -> Result<(), ExportError> {
+    let document = to.document;
     let ends = document.edges.iter().flatten();
     let lines3d = NpyArray {
         shape: vec![document.edges.len(), 2, 3],
@@ -26,9 +26,9 @@ pub fn write(path: &Path, document: &WireframeDocument) -> Result<(), SceneError
         shape: vec![document.edges.len(), 2],
         values: ends.map(|end| *end as i64).collect(),
     };
-    write_npz_with_integers(
-        path,
+    Ok(write_npz_with_integers(
+        to.path,
         &BTreeMap::from([("junctions", junctions), ("lines3d", lines3d)]),
         &BTreeMap::from([("edges", edges)]),
-    )
+    )?)
 }

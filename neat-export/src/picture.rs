@@ -1,33 +1,30 @@
 //! PNG: an orthographic view with smooth lines.
 
-use crate::Confidence;
 use crate::orthographic::Drawing;
+use crate::target::Target;
+use crate::{Confidence, ExportError};
 use image::{Rgb, RgbImage};
 use nalgebra::Vector2;
-use neat_core::{LineSegment, LineSegment2};
+use neat_core::{LineSegment, LineSegment2, file};
 use neat_wireframe::export::WireframeDocument;
 
 const JUNCTION_COLOR: [u8; 3] = [0x11; 3];
 
+/// Writes a PNG.
+pub fn write(to: &mut Target) -> Result<(), ExportError> {
+    let image = draw(to.document, &to.drawing()?);
+    Ok(file::write_png(to.path, &image)?)
+}
+
 /// The picture: uncertain edges first, so that certain ones lie on top.
-pub fn draw(document: &WireframeDocument, drawing: &Drawing) -> RgbImage {
+fn draw(document: &WireframeDocument, drawing: &Drawing) -> RgbImage {
     let mut image = RgbImage::from_pixel(drawing.width, drawing.height, Rgb([255; 3]));
     let radius = drawing.line_width(document.edges.len()) / 2.0;
-    let classes = Confidence::of_edges(document);
-    for class in Confidence::ALL {
-        for (ends, _) in document
-            .edges
-            .iter()
-            .zip(&classes)
-            .filter(|(_, of)| **of == class)
-        {
-            let [start, end] = ends.map(|junction| drawing.points[junction]);
-            draw_segment(
-                &mut image,
-                &LineSegment::new(start, end),
-                radius,
-                class.color(),
-            );
+    for (class, edges) in Confidence::groups(document) {
+        for edge in edges {
+            let [start, end] = document.edges[edge].map(|junction| drawing.points[junction]);
+            let segment = LineSegment::new(start, end);
+            draw_segment(&mut image, &segment, radius, class.color());
         }
     }
     for point in &drawing.points {

@@ -5,34 +5,21 @@
 //! more than two edges meet; so every edge is a set of its own, and its reader keeps
 //! positions and shared vertices.
 
-use crate::LengthUnit;
+use crate::target::Target;
+use crate::{ExportError, LengthUnit};
 use nalgebra::Vector3;
-use neat_wireframe::export::WireframeDocument;
 use std::fmt::Write;
 
-/// A STEP file, and what it lacks.
-pub struct Step {
-    /// Its text.
-    pub text: String,
-    /// Number of edges that are left out: a line needs a direction.
-    pub edges_without_length: usize,
-    /// Number of junctions that no edge in the file joins.
-    pub lonely_junctions: usize,
-}
-
-/// The text of a STEP file.
-pub fn text(document: &WireframeDocument, unit: LengthUnit) -> Step {
-    let scene = document
-        .metadata
-        .get("scene")
-        .and_then(|name| name.as_str());
+/// Writes a STEP file.
+pub fn write(to: &mut Target) -> Result<(), ExportError> {
+    let document = to.document;
     let mut step = Entities::default();
     let context = step.add("APPLICATION_CONTEXT('automotive design')");
     step.add(&format!(
         "APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',2000,{context})"
     ));
-    let shape = step.product(&string(scene.unwrap_or("wireframe")), &context);
-    let geometry = step.geometric_context(unit);
+    let shape = step.product(&string(to.title()), &context);
+    let geometry = step.geometric_context(to.options.unit);
     let origin = step.point(&Vector3::zeros());
     let placement = step.add(&format!("AXIS2_PLACEMENT_3D('',{origin},$,$)"));
 
@@ -73,11 +60,18 @@ pub fn text(document: &WireframeDocument, unit: LengthUnit) -> Step {
     step.add(&format!(
         "SHAPE_DEFINITION_REPRESENTATION({shape},{representation})"
     ));
-    Step {
-        text: step.file(),
-        edges_without_length: document.edges.len() - sets.len(),
-        lonely_junctions: lonely.iter().filter(|lonely| **lonely).count(),
+    // A line needs a direction, and a vertex an edge.
+    let lonely = lonely.iter().filter(|lonely| **lonely).count();
+    for (count, what) in [
+        (document.edges.len() - sets.len(), "edges without length"),
+        (lonely, "junctions without edges"),
+    ] {
+        if count > 0 {
+            let sentence = format!("a STEP wireframe has no {what}: {count} left out");
+            to.written.left_out.push(sentence);
+        }
     }
+    to.write(step.file())
 }
 
 /// The unit vector between two points, if they differ. First scaled, so that no

@@ -4,19 +4,15 @@
 //! `data-center` of the root lead back to the units of the document:
 //! right = center₀ + (x − width / 2) / scale, up = center₁ − (y − height / 2) / scale.
 
-use crate::Confidence;
-use crate::orthographic::Drawing;
-use neat_wireframe::export::WireframeDocument;
+use crate::target::Target;
+use crate::{Confidence, ExportError};
 use std::fmt::Write;
 
-/// The text of an SVG file.
-pub fn text(document: &WireframeDocument, drawing: &Drawing) -> String {
+/// Writes an SVG file.
+pub fn write(to: &mut Target) -> Result<(), ExportError> {
+    let (document, drawing) = (to.document, to.drawing()?);
     let (width, height) = (drawing.width, drawing.height);
     let [right, up] = drawing.direction.right_and_up();
-    let scene = document
-        .metadata
-        .get("scene")
-        .and_then(|name| name.as_str());
     let line_width = drawing.line_width(document.edges.len());
     let mut svg = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
@@ -36,13 +32,9 @@ pub fn text(document: &WireframeDocument, drawing: &Drawing) -> String {
         drawing.scale,
         drawing.center.x,
         drawing.center.y,
-        escaped(scene.unwrap_or("wireframe")),
+        escaped(to.title()),
     );
-    let classes = Confidence::of_edges(document);
-    for class in Confidence::ALL {
-        if !classes.contains(&class) {
-            continue;
-        }
+    for (class, edges) in Confidence::groups(document) {
         let (name, [red, green, blue]) = (class.name(), class.color());
         let _ = writeln!(
             svg,
@@ -50,16 +42,15 @@ pub fn text(document: &WireframeDocument, drawing: &Drawing) -> String {
              stroke-width=\"{line_width:.3}\" stroke-linecap=\"round\">\n\
              <title>confidence: {name}</title>"
         );
-        for (edge, [a, b]) in document.edges.iter().enumerate() {
-            if classes[edge] == class {
-                let [start, end] = [a, b].map(|junction| drawing.points[*junction]);
-                let _ = writeln!(
-                    svg,
-                    "<line data-edge=\"{edge}\" data-junctions=\"{a} {b}\" \
-                     x1=\"{:.6}\" y1=\"{:.6}\" x2=\"{:.6}\" y2=\"{:.6}\"/>",
-                    start.x, start.y, end.x, end.y
-                );
-            }
+        for edge in edges {
+            let [a, b] = document.edges[edge];
+            let [start, end] = [a, b].map(|junction| drawing.points[junction]);
+            let _ = writeln!(
+                svg,
+                "<line data-edge=\"{edge}\" data-junctions=\"{a} {b}\" \
+                 x1=\"{:.6}\" y1=\"{:.6}\" x2=\"{:.6}\" y2=\"{:.6}\"/>",
+                start.x, start.y, end.x, end.y
+            );
         }
         svg.push_str("</g>\n");
     }
@@ -72,7 +63,7 @@ pub fn text(document: &WireframeDocument, drawing: &Drawing) -> String {
         );
     }
     svg.push_str("</g>\n</svg>\n");
-    svg
+    to.write(svg)
 }
 
 /// Text as XML content. What XML 1.0 cannot hold at all becomes U+FFFD.

@@ -1,0 +1,66 @@
+//! What a format is given to write.
+
+use crate::orthographic::Drawing;
+use crate::{ExportError, ExportOptions};
+use neat_core::file;
+use neat_wireframe::export::WireframeDocument;
+use std::path::{Path, PathBuf};
+
+/// What an export has written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// The files, complete.
+    pub files: Vec<PathBuf>,
+    /// Number of junctions that passed the filter.
+    pub junctions: usize,
+    /// Number of edges that passed the filter.
+    pub edges: usize,
+    /// What the format has no words for and the files therefore lack, one sentence
+    /// each.
+    pub left_out: Vec<String>,
+}
+
+/// A valid document, and where and how to write it.
+pub(crate) struct Target<'a> {
+    /// Name of the format, for messages.
+    pub format: &'static str,
+    /// The file, or the folder.
+    pub path: &'a Path,
+    /// What passed the filter.
+    pub document: &'a WireframeDocument,
+    /// All options, in their ranges.
+    pub options: &'a ExportOptions,
+    /// Names `path`, unless the format says otherwise.
+    pub written: Written,
+}
+
+impl Target<'_> {
+    /// Writes the file, which is replaced when the new one is complete.
+    pub fn write(&self, bytes: impl AsRef<[u8]>) -> Result<(), ExportError> {
+        Ok(file::write_atomically(self.path, bytes.as_ref())?)
+    }
+
+    /// The name of the scene, as a title.
+    pub fn title(&self) -> &str {
+        let scene = self.document.metadata.get("scene");
+        scene.and_then(|name| name.as_str()).unwrap_or("wireframe")
+    }
+
+    /// The orthographic view that was asked for.
+    ///
+    /// # Errors
+    /// If no picture can hold the extent of the wireframe.
+    pub fn drawing(&self) -> Result<Drawing, ExportError> {
+        let options = self.options;
+        Drawing::new(&self.document.junctions, options.direction, options.width)
+            .ok_or_else(|| self.out_of_range())
+    }
+
+    /// That the format has no numbers for the extent of the wireframe.
+    pub fn out_of_range(&self) -> ExportError {
+        ExportError::OutOfRange {
+            path: self.path.into(),
+            format: self.format,
+        }
+    }
+}
