@@ -74,3 +74,8 @@ pub use shard::{Shard, ShardError, ShardSource};
 pub use stop::{Stop, StopSwitch};
 pub use summary::{Aggregate, JobSummary, Summary, Totals};
 pub use summary_files::{to_csv, to_markdown};
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -9,6 +9,15 @@
 //! `segment_search`, `line_fitting` (with `edge_profile` and `robust_line`),
 //! `merging`, `junction_graph`, `edge_completion`, `clutter`.
 //!
+//! ```
+//! use image::{Rgb, RgbImage};
+//! use neat_detect::{DetectorConfig, detect};
+//!
+//! let image = RgbImage::from_fn(64, 64, |x, _| Rgb([if x < 30 { 20 } else { 200 }; 3]));
+//! let wireframe = detect(&image, &DetectorConfig::default());
+//! assert_eq!(wireframe.edges.len(), 1);
+//! ```
+//!
 //! Coordinates are those of HAWP's files: pixel centres are integers.
 
 #![forbid(unsafe_code)]
@@ -33,3 +42,8 @@ mod smoothed_image;
 
 pub use config::{DetectorConfig, DetectorConfigError};
 pub use detection::{detect, wireframe_from_segments};
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -24,7 +24,8 @@ pub enum Depth {
     Full,
 }
 
-/// How [`examine`] looks at a scene.
+/// How [`examine`] looks at a scene. There may be more of it one day: write
+/// `..ExamineOptions::default()`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExamineOptions {
     /// How thoroughly.

@@ -12,6 +12,15 @@
 //! convention of poses and axes, with other focal lengths, of scaled images, in
 //! another order. The explanation that is clearly best is the diagnosis.
 //!
+//! ```
+//! use neat_core::LoadOptions;
+//! use neat_doctor::{Check, ExamineOptions, Verdict, examine_folder};
+//!
+//! let nowhere = examine_folder("no/such/folder", &LoadOptions::default(), &ExamineOptions::default());
+//! assert_eq!(nowhere.verdict, Verdict::NotReady);
+//! assert_eq!(nowhere.findings[0].check, Check::Files);
+//! ```
+//!
 //! [`SceneError`]: neat_core::SceneError
 
 #![forbid(unsafe_code)]
@@ -37,3 +46,8 @@ mod working_copies;
 pub use examination::{Cause, Check, Examination, Finding, Level, Repair, Verdict};
 pub use examine::{Depth, ExamineOptions, examine, examine_folder, examine_loaded};
 pub use load_failure::explain;
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -88,3 +88,8 @@ pub use protocol::{EvaluationInput, EvaluationOptions, Protocol, Scores, Unknown
 pub use report::EvaluationReport;
 pub use structure_score::{StructureScore, StructureScores};
 pub use thinning::thin_points;
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -63,3 +63,8 @@ pub use options::{ExportOptions, LengthUnit};
 pub use orthographic::ViewDirection;
 pub use target::Written;
 pub use triangle_mesh::TriangleMesh;
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

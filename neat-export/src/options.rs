@@ -2,7 +2,8 @@
 
 use crate::{EdgeFilter, ExportError, ViewDirection};
 
-/// What to write, and how.
+/// What to write, and how. There may be more of it one day: write
+/// `..ExportOptions::default()`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExportOptions {
     /// Which edges.

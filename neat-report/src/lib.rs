@@ -34,3 +34,8 @@ mod report;
 pub use error::ReportError;
 pub use photograph::{Photograph, PhotographConfig, photographs};
 pub use report::{Curve, FactGroup, JunctionSnapshot, Report, ReportView};
+
+/// The example of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

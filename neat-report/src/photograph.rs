@@ -7,7 +7,8 @@ use nalgebra::Vector3;
 use neat_core::{Downscaling, Scene, View};
 use rayon::prelude::*;
 
-/// How many photographs a report has, and how large they are.
+/// How many photographs a report has, and how large they are. There may be more settings
+/// one day: write `..PhotographConfig::default()`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PhotographConfig {
     /// At most so many photographs, of views that are spread over the scene; 0 for
