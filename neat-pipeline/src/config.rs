@@ -12,9 +12,9 @@ use neat_gjp::{CandidateConfig, MatchingConfig, PerceiverConfig};
 use neat_sdf::{DensityConfig, ImplicitNetworkConfig, RaySamplerConfig, RenderingNetworkConfig};
 use neat_tensor::adam::AdamConfig;
 use neat_wireframe::confidence::ConfidenceConfig;
-use neat_wireframe::fast_back_end::FastBackEndConfig;
+use neat_wireframe::fast::FastBackEndConfig;
 use neat_wireframe::line_tracks::LineTracksConfig;
-use neat_wireframe::paper_back_end::PaperBackEndConfig;
+use neat_wireframe::paper::PaperBackEndConfig;
 use serde::{Deserialize, Serialize};
 
 /// All choices of a run.

@@ -1,30 +1,29 @@
 //! From the trained field to the wireframe (paper §4.3, or the fast back end).
 
+mod thin_regions;
+
 use crate::config::{BackEnd, Config};
 use crate::field::TrainedField;
 use crate::model::host_vec;
-use crate::training_data::{push_ray, push_ray_through};
-use nalgebra::{Vector2, Vector3};
-use neat_core::{Camera, LineSegment3, Scene, Wireframe3d};
-use neat_field::attraction_region::AttractionRegions;
+use nalgebra::Vector3;
+use neat_core::{LineSegment3, Scene, Wireframe3d};
 use neat_sdf::RayBundle;
 use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::curved_rims::curved_chains;
 use neat_wireframe::export::WireframeDocument;
-use neat_wireframe::fast_back_end;
+use neat_wireframe::fast;
 use neat_wireframe::line_tracks;
 use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
-use neat_wireframe::neat_lines;
-use neat_wireframe::paper_back_end::PaperBackEndError;
-use neat_wireframe::robust_segments::{self, RobustSegmentConfig, robust_segment};
+use neat_wireframe::paper::{self, PaperBackEndError};
+use neat_wireframe::proposals::{RobustSegmentConfig, WeightedSegment, robust_segment};
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation};
 use serde_json::json;
+pub use thin_regions::paper_regions;
+use thin_regions::{Query, spread_query};
 
 /// Rays per rendering call: bounds the memory.
 const RAY_CHUNK: usize = 2048;
-/// Half the width of the thin regions that are queried (paper §4.3).
-const THIN_REGION: f64 = 1.0;
 
 /// Who listens to the progress wants the distillation to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -130,79 +129,6 @@ pub fn agreement(scene: &Scene, config: &Config, wireframe: &Wireframe3d) -> Opt
         *distance *= scene.original_from_world.scale;
     }
     Some(evidence)
-}
-
-/// Rays of one view, with the 2D segment that each asks for.
-struct Query {
-    rays: RayBundle,
-    /// Index into the view's segments.
-    segments: Vec<usize>,
-    /// Rays through the feet of the pixels on their segments.
-    feet: RayBundle,
-}
-
-/// Thin-region pixels of a view; `per_segment` limits how many per segment,
-/// spread evenly along it.
-fn thin_query(
-    camera: &Camera,
-    observation: &ViewObservation,
-    pixel_center: f64,
-    per_segment: Option<usize>,
-) -> Query {
-    let segments: Vec<_> = observation.segments.iter().map(|s| s.segment).collect();
-    let regions = AttractionRegions::compute(
-        &segments,
-        camera.width,
-        camera.height,
-        pixel_center,
-        THIN_REGION,
-    );
-    let entries: Vec<usize> = match per_segment {
-        None => (0..regions.len()).collect(),
-        Some(wanted) => {
-            let mut by_segment = vec![Vec::new(); segments.len()];
-            for entry in 0..regions.len() {
-                by_segment[regions.labels[entry] as usize].push(entry);
-            }
-            by_segment
-                .into_iter()
-                .flat_map(|mut entries| {
-                    entries
-                        .sort_by(|a, b| regions.parameters[*a].total_cmp(&regions.parameters[*b]));
-                    spread(&entries, wanted)
-                })
-                .collect()
-        }
-    };
-    let mut query = Query {
-        rays: RayBundle::default(),
-        segments: Vec::with_capacity(entries.len()),
-        feet: RayBundle::default(),
-    };
-    for entry in entries {
-        let pixel = regions.pixels[entry];
-        push_ray(
-            &mut query.rays,
-            camera,
-            pixel_center,
-            pixel % camera.width,
-            pixel / camera.width,
-        );
-        let foot = Vector2::from(regions.feet[entry]).map(f64::from);
-        push_ray_through(&mut query.feet, camera, &foot);
-        query.segments.push(regions.labels[entry] as usize);
-    }
-    query
-}
-
-/// At most `wanted` of `entries`, evenly spread, first and last included.
-fn spread(entries: &[usize], wanted: usize) -> Vec<usize> {
-    if entries.len() <= wanted || wanted < 2 {
-        return entries.iter().copied().take(wanted.max(1)).collect();
-    }
-    (0..wanted)
-        .map(|i| entries[i * (entries.len() - 1) / (wanted - 1)])
-        .collect()
 }
 
 /// One rendered ray.
@@ -316,16 +242,15 @@ pub fn propose_segments(
     let robust = RobustSegmentConfig::default();
     let mut proposals = Vec::new();
     for (view, observation) in views.iter().enumerate() {
-        let query = thin_query(
-            &observation.camera,
+        let query = spread_query(
             observation,
             scene.pixel_center,
-            Some(config.distill.rays_per_segment),
+            config.distill.rays_per_segment,
         );
         let rendered = render_rays(field, &query.rays);
         let mut of_segment = vec![Vec::new(); observation.segments.len()];
         for (ray, segment) in rendered.iter().zip(&query.segments) {
-            of_segment[*segment].push(robust_segments::RenderedSegment {
+            of_segment[*segment].push(WeightedSegment {
                 segment: ray.segment,
                 weight: ray.opacity,
             });
@@ -350,8 +275,9 @@ fn paper(
     let paper = &config.distill.paper;
     let views = ViewObservation::from_scene(scene, paper.neat_lines.min_segment_score);
     let mut rays_by_view = Vec::with_capacity(views.len());
-    for (index, observation) in views.iter().enumerate() {
-        let query = thin_query(&observation.camera, observation, scene.pixel_center, None);
+    for (index, view) in scene.views.iter().enumerate() {
+        let regions = paper_regions(&view.wireframe, scene.pixel_center, config);
+        let query = Query::of_pixels(&view.camera, scene.pixel_center, &regions, 0..regions.len());
         let rendered = render_rays(field, &query.rays);
         let points: Vec<[f32; 3]> = rendered
             .iter()
@@ -362,7 +288,7 @@ fn paper(
             .iter()
             .zip(surface)
             .enumerate()
-            .map(|(i, (ray, (_, gradient)))| neat_lines::RenderedSegment {
+            .map(|(i, (ray, (_, gradient)))| paper::SupportedSegment {
                 segment: ray.segment,
                 support_point: support_point(
                     &Vector3::from(query.feet.origins[i]).map(f64::from),

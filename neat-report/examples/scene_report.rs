@@ -13,7 +13,7 @@ use neat_core::{LineSegment2, LoadOptions, Scene, Wireframe3d, load_scene};
 use neat_detect::{DetectorConfig, detect};
 use neat_report::{FactGroup, PhotographConfig, Report};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::edge_support::EdgeSupportConfig;
+use neat_wireframe::evidence::EdgeSupportConfig;
 use neat_wireframe::export::{SupportingSegment, WireframeDocument, read_json};
 use neat_wireframe::line_tracks::{LineTracksConfig, run};
 use rayon::prelude::*;

@@ -13,9 +13,9 @@
 
 use nalgebra::{Vector2, Vector3};
 use neat_core::{LineSegment3, Wireframe3d};
-use neat_wireframe::attraction::{AttractionConfig, attract};
-use neat_wireframe::junction_modes::{JunctionModesConfig, junction_modes};
-use neat_wireframe::segment_ends::SegmentEnd;
+use neat_wireframe::fast::SegmentEnd;
+use neat_wireframe::fast::{JunctionModesConfig, junction_modes};
+use neat_wireframe::paper::{AttractionConfig, attract};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let segments = match std::env::args_os().nth(1) {

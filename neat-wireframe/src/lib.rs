@@ -1,60 +1,68 @@
-//! From segment proposals and junctions to a 3D wireframe graph.
+//! From posed views with 2D segments, and what a field proposes, to a 3D wireframe
+//! graph that says how sure it is. No learning framework: anything that proposes 3D
+//! segments can use this crate.
 //!
-//! No learning framework: anything that proposes 3D segments can use this crate.
+//! | to | see |
+//! | --- | --- |
+//! | build a graph from 2D segments alone, as of photographs | [`line_tracks`] |
+//! | build one from proposals, junctions and a surface, as of an object | [`fast`] |
+//! | build one as the paper does | [`paper`] |
+//! | make one robust proposal of what several rays rendered | [`proposals`] |
+//! | learn how sure each junction and edge is, and which 2D segments say so | [`confidence`] |
+//! | find chains of edges that stand for a curve | [`curved_rims`] |
+//! | measure a wireframe, with and without ground truth | [`metrics`] |
+//! | write and read one | [`export`], [`validity`] |
+//!
+//! # Example
+//! ```
+//! use neat_core::synthetic::{SyntheticScene, generate};
+//! use neat_wireframe::ViewObservation;
+//! use neat_wireframe::confidence::{ConfidenceConfig, assess};
+//! use neat_wireframe::line_tracks::{LineTracksConfig, run};
+//!
+//! let scene = SyntheticScene { views: 12, image_size: 256, ..Default::default() };
+//! let views = ViewObservation::from_scene(&generate(&scene)?.scene, 0.05);
+//! let built = run(&views, &[], None, 1.0, &LineTracksConfig::default());
+//! let confidence = assess(&built.wireframe, &views, None, 1.0, &ConfidenceConfig::default())?;
+//! assert!(confidence.edges.iter().any(|edge| edge.probability > 0.9));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #![forbid(unsafe_code)]
 
-pub mod attraction;
-pub mod attraction_hypotheses;
 pub mod bundle_adjustment;
-pub mod cleanup;
 pub mod confidence;
 pub mod curved_rims;
-pub mod distance_matrix;
-pub mod edge_completion;
-pub mod edge_support;
-pub mod exclusive_support;
+pub mod evidence;
 pub mod export;
-pub mod fast_back_end;
-pub mod junction_modes;
-pub mod junction_refinement;
-pub mod junction_splitting;
-pub mod junction_voting;
+pub mod fast;
 pub mod line_tracks;
 pub mod metrics;
-pub mod neat_lines;
-pub mod normal_equations;
-pub mod observation;
-pub mod occlusion;
-pub mod paper_back_end;
+pub mod paper;
 pub mod projection;
-pub mod proposal;
-pub mod regularities;
-pub mod robust_segments;
-pub mod segment_ends;
-pub mod segment_matching;
-pub mod signed_distance;
-pub mod step_report;
-pub mod supported_truth;
-pub mod touching_edges;
-pub mod triangulation;
+pub mod proposals;
 pub mod validity;
-pub mod visibility;
 
 mod alignments;
 mod block_cholesky;
 mod disjoint_sets;
-mod evidence;
 mod interval_cover;
+mod normal_equations;
+mod observation;
 mod point_grid;
 mod point_index;
 mod pulls;
+mod regularities;
+mod segment_ends;
 mod segment_grid;
+mod segment_matching;
+mod signed_distance;
+mod triangulation;
 mod used_junctions;
 
 pub use neat_core::Wireframe3d;
 pub use observation::ViewObservation;
-pub use proposal::SegmentProposal;
+pub use proposals::SegmentProposal;
 pub use signed_distance::SignedDistance;
 
 #[cfg(test)]

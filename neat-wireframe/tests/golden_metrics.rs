@@ -5,7 +5,7 @@ mod golden;
 use golden::{Geometry, Golden};
 use neat_core::LineSegment3;
 use neat_wireframe::Wireframe3d;
-use neat_wireframe::distance_matrix::DistanceMatrix;
+use neat_wireframe::metrics::DistanceMatrix;
 use neat_wireframe::metrics::{
     Matching, PointCloud, SegmentDistance, junction_distances, mean_nearest_distance,
     precision_recall, sample_segments, segment_distances,

@@ -1,22 +1,19 @@
 //! The paper's back end against the published final parsing (golden case 11).
 //!
-//! Cases b and c also need the toy scene (cameras and HAWP wireframes), which is
-//! not part of the repository: set `NEAT_DATA` to the folder that holds
-//! `abc-00075213`, or the tests say that they skip.
+//! Cases b and c also take the cameras and HAWP wireframes of the toy scene, which
+//! lie in `tests/data/toy`.
 
 mod golden;
 
 use golden::{Geometry, Golden, repository};
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{Camera, Intrinsics, LineSegment3, hawp_json};
-use neat_wireframe::attraction::{AttractionConfig, attract, attracted_ends};
-use neat_wireframe::junction_refinement::refine_junctions;
-use neat_wireframe::junction_voting::{JunctionVotingConfig, vote_for_junctions};
-use neat_wireframe::neat_lines::{NeatLine, NeatLineConfig, RenderedSegment, neat_lines};
-use neat_wireframe::paper_back_end::PaperBackEndConfig;
-use neat_wireframe::visibility::{VisibilityConfig, squared_reprojection_distance, visible_views};
+use neat_wireframe::paper::{
+    AttractionConfig, JunctionVotingConfig, NeatLine, NeatLineConfig, PaperBackEndConfig,
+    SupportedSegment, VisibilityConfig, attract, attracted_ends, neat_lines, refine_junctions,
+    seeing_views, squared_reprojection_distance, vote_for_junctions,
+};
 use neat_wireframe::{SignedDistance, ViewObservation};
-use std::path::PathBuf;
 
 /// What the published code computes in float32 (9e-8 measured).
 const POSITION_TOLERANCE: f64 = 2e-6;
@@ -35,16 +32,9 @@ fn largest_difference(a: &[LineSegment3], b: &[LineSegment3]) -> f64 {
 }
 
 /// All 100 views of the toy scene, integer pixel centres as in the published
-/// code; `None` if the scene is not there.
-#[expect(clippy::print_stderr, reason = "a skipped test must say so")]
-fn toy_views(min_score: f64) -> Option<Vec<ViewObservation>> {
-    let data = std::env::var_os("NEAT_DATA")
-        .map_or_else(|| repository().join("../shared/data"), PathBuf::from);
-    let dir = data.join("abc-00075213");
-    if !dir.is_dir() {
-        eprintln!("skipped: {} is not there, set NEAT_DATA", dir.display());
-        return None;
-    }
+/// code.
+fn toy_views(min_score: f64) -> Vec<ViewObservation> {
+    let dir = repository().join("tests/data/toy");
     let text = std::fs::read_to_string(dir.join("cameras.json")).unwrap();
     let cameras: serde_json::Value = serde_json::from_str(&text).unwrap();
     let view = |(index, frame): (usize, &serde_json::Value)| {
@@ -65,7 +55,7 @@ fn toy_views(min_score: f64) -> Option<Vec<ViewObservation>> {
         }
     };
     let frames = cameras["frames"].as_array().unwrap();
-    Some(frames.iter().enumerate().map(view).collect())
+    frames.iter().enumerate().map(view).collect()
 }
 
 /// The upper triangle of a symmetric 0/1 matrix, with the diagonal.
@@ -107,18 +97,16 @@ fn case_a_attraction() {
 fn case_b_visibility() {
     let golden = golden();
     let config = VisibilityConfig::default();
-    let Some(views) = toy_views(config.min_segment_score) else {
-        return;
-    };
+    let views = toy_views(config.min_segment_score);
     let segments = golden.segments("b/segments");
-    let seen = visible_views(&segments, &views, &config);
+    let seen = seeing_views(&segments, &views, &config);
     assert_eq!(seen, golden.indices("b/visible_views"));
     let strict = VisibilityConfig {
         max_squared_distance: 25.0,
         ..config
     };
     assert_eq!(
-        visible_views(&segments, &views, &strict),
+        seeing_views(&segments, &views, &strict),
         golden.indices("b/visible_views_th25")
     );
 
@@ -174,13 +162,13 @@ struct CaseC {
     /// The views that were queried, in the order of the run.
     queried: Vec<usize>,
     /// Per queried view.
-    rays: Vec<Vec<RenderedSegment>>,
+    rays: Vec<Vec<SupportedSegment>>,
 }
 
 impl CaseC {
-    fn read() -> Option<Self> {
+    fn read() -> Self {
         let golden = golden();
-        let all_views = toy_views(NeatLineConfig::default().min_segment_score)?;
+        let all_views = toy_views(NeatLineConfig::default().min_segment_score);
         let queried = golden.indices("c/views");
         let view_of_ray = golden.indices("c/ray_view");
         let segments = golden.segments("c/ray_lines3d");
@@ -188,19 +176,19 @@ impl CaseC {
         let rays_of = |view: &usize| {
             (0..view_of_ray.len())
                 .filter(|ray| view_of_ray[*ray] == *view)
-                .map(|ray| RenderedSegment {
+                .map(|ray| SupportedSegment {
                     segment: segments[ray],
                     support_point: support_points[ray],
                 })
                 .collect()
         };
         let rays = queried.iter().map(rays_of).collect();
-        Some(Self {
+        Self {
             golden,
             all_views,
             queried,
             rays,
-        })
+        }
     }
 
     fn surface(&self) -> Plane {
@@ -264,7 +252,7 @@ fn case_c_junction_refinement() {
 
 #[test]
 fn case_c_neat_lines() {
-    let Some(case) = CaseC::read() else { return };
+    let case = CaseC::read();
     let published: Vec<NeatLine> = case.lines(&PUBLISHED_LINES).concat();
     let ours: Vec<NeatLine> = case.lines(&NeatLineConfig::default()).concat();
 
@@ -308,7 +296,7 @@ fn case_c_neat_lines() {
 
 #[test]
 fn case_c_junction_voting() {
-    let Some(case) = CaseC::read() else { return };
+    let case = CaseC::read();
     let config = JunctionVotingConfig::default();
     let refined = case.refined();
     let votes = vote_for_junctions(&refined, &case.lines(&PUBLISHED_LINES), &config).unwrap();
@@ -331,7 +319,7 @@ fn case_c_junction_voting() {
 
 #[test]
 fn case_c_attraction_and_visibility() {
-    let Some(case) = CaseC::read() else { return };
+    let case = CaseC::read();
     let lines = case.golden.segments("c/lines3d_all");
     let junctions = case.golden.points("c/junctions3d_initial");
     let edges = attract(&lines, &junctions, &PUBLISHED_ATTRACTION);
@@ -345,7 +333,7 @@ fn case_c_attraction_and_visibility() {
     assert_eq!(segments, case.golden.segments("c/lines3d_wfi"));
     let config = VisibilityConfig::default();
     for (views, name) in [(&case.queried_views(), "12"), (&case.all_views, "100")] {
-        let seen = visible_views(&segments, views, &config);
+        let seen = seeing_views(&segments, views, &config);
         assert_eq!(
             seen,
             case.golden
@@ -365,7 +353,7 @@ fn case_c_attraction_and_visibility() {
 /// End to end; the order of junctions and edges is ours, so compare as sets.
 #[test]
 fn case_c_whole_back_end() {
-    let Some(case) = CaseC::read() else { return };
+    let case = CaseC::read();
     // Lines come from the 12 queried views only, all 100 check visibility.
     let mut rays_of_all = vec![Vec::new(); case.all_views.len()];
     for (view, rays) in case.queried.iter().zip(&case.rays) {
@@ -408,7 +396,7 @@ fn case_c_whole_back_end() {
 
 #[test]
 fn any_number_of_threads_gives_the_same_wireframe() {
-    let Some(case) = CaseC::read() else { return };
+    let case = CaseC::read();
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)

@@ -19,9 +19,9 @@ use neat_pipeline::preset::Preset;
 use neat_pipeline::resources::Resources;
 use neat_pipeline::scene::prepare_scene;
 use neat_wireframe::ViewObservation;
-use neat_wireframe::edge_support::EdgeSupportConfig;
+use neat_wireframe::evidence::EdgeSupportConfig;
 use neat_wireframe::metrics::Matching;
-use neat_wireframe::supported_truth::{SupportedTruthConfig, supported_truth, without_curves};
+use neat_wireframe::metrics::{SupportedTruthConfig, supported_truth, without_curves};
 use std::path::{Path, PathBuf};
 
 /// Measure a wireframe against the truth or a scanned surface, by a published protocol

@@ -18,8 +18,8 @@ mod score;
 
 use field::{BlockSurface, observations, proposals, supported_truth};
 use neat_core::synthetic::{BlockScene, SyntheticError};
-use neat_wireframe::fast_back_end::{FastBackEndConfig, run_observed};
-use neat_wireframe::step_report::StepReport;
+use neat_wireframe::fast::StepChange;
+use neat_wireframe::fast::{FastBackEndConfig, run_observed};
 use score::Score;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
@@ -75,7 +75,7 @@ struct Runs {
 /// One run.
 struct Variant {
     name: &'static str,
-    steps: Vec<(StepReport, Duration)>,
+    steps: Vec<(StepChange, Duration)>,
     score: Score,
 }
 

@@ -1,6 +1,6 @@
 //! Settings of the assessment.
 
-use crate::occlusion::OcclusionConfig;
+use crate::evidence::occlusion::OcclusionConfig;
 use serde::{Deserialize, Serialize};
 
 /// Settings of [`super::assess`].

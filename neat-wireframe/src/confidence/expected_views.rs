@@ -1,8 +1,8 @@
 //! The views that ought to show an edge.
 
 use super::config::{ConfidenceConfig, ProvenanceConfig};
+use crate::evidence::occlusion::{OcclusionConfig, views_that_see};
 use crate::metrics::visible_projection;
-use crate::occlusion::{OcclusionConfig, views_that_see};
 use crate::{SignedDistance, ViewObservation};
 use neat_core::LineSegment3;
 

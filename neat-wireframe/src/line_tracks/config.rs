@@ -15,7 +15,7 @@ use super::neighbours::NeighboursConfig;
 use super::parallel_edges::ParallelEdgesConfig;
 use super::straight_junctions::StraightJunctionsConfig;
 use super::track_merging::TrackMergingConfig;
-use crate::occlusion::OcclusionConfig;
+use crate::evidence::occlusion::OcclusionConfig;
 use serde::{Deserialize, Serialize};
 
 /// Switches and constants of [`super::run`].

@@ -67,8 +67,8 @@ pub use report::{LineEvidence, LineTracksReport, LineTracksResult, SegmentSuppor
 pub use straight_junctions::StraightJunctionsConfig;
 pub use track_merging::TrackMergingConfig;
 
-use crate::fast_back_end::UnitBallSurface;
-use crate::occlusion::visible_views;
+use crate::evidence::occlusion::visible_views;
+use crate::signed_distance::UnitBallSurface;
 use crate::{SegmentProposal, SignedDistance, ViewObservation, Wireframe3d};
 use clustering::{grow_tracks, view_count};
 use consensus::find_consensus;

@@ -2,16 +2,20 @@
 //! distances from and to a scanned surface, agreement with the images where there
 //! is no truth. The published protocols that these make up are in `neat-eval`.
 
+mod distance_matrix;
 mod image_evidence;
 mod precision_recall;
+mod supported_truth;
 mod surface_distance;
 
+pub use distance_matrix::{DistanceMatrix, MatchedPair};
 pub(crate) use image_evidence::visible_projection;
 pub use image_evidence::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 pub use precision_recall::{
     Matching, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,
     segment_distances,
 };
+pub use supported_truth::{SupportedTruthConfig, WithoutCurves, supported_truth, without_curves};
 pub use surface_distance::{PointCloud, mean_nearest_distance, sample_segments};
 
 use crate::validity::WireframeFlaw;

@@ -2,7 +2,7 @@
 //! (supplement E, Table 6; `evaluation/eval-abc.py`).
 
 use super::MetricsError;
-use crate::distance_matrix::DistanceMatrix;
+use super::distance_matrix::DistanceMatrix;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};

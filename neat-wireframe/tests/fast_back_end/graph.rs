@@ -1,7 +1,7 @@
 //! Comparison of a result with the truth.
 
 use neat_wireframe::Wireframe3d;
-use neat_wireframe::fast_back_end::FastBackEndResult;
+use neat_wireframe::fast::FastBackEndResult;
 
 /// Asserts that the result is the true graph: the junctions one to one,
 /// each within `tolerance`, and the same edges.

@@ -6,7 +6,7 @@ use crate::noise::{Noise, PROPOSAL_SIGMA};
 use crate::prism::{Prism, Scaled};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::{Camera, Intrinsics, LineSegment2, LineSegment3, ScoredSegment2};
-use neat_wireframe::fast_back_end::{FastBackEndConfig, FastBackEndResult, run};
+use neat_wireframe::fast::{FastBackEndConfig, FastBackEndResult, run};
 use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation, Wireframe3d};
 
 /// A camera at distance 2.5 that looks at the origin; `i` of `count` on a

@@ -3,8 +3,8 @@
 use crate::field::{BlockSurface, observations, proposals, supported_truth};
 use crate::score::Score;
 use neat_core::synthetic::BlockScene;
-use neat_wireframe::fast_back_end::{FastBackEndConfig, run};
-use neat_wireframe::step_report::Step;
+use neat_wireframe::fast::Step;
+use neat_wireframe::fast::{FastBackEndConfig, run};
 
 #[test]
 fn refinement_reduces_the_junction_error_threefold() {

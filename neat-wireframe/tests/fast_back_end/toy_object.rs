@@ -10,7 +10,7 @@ use crate::prism::{Prism, with_numeric_gradient};
 use nalgebra::{Vector2, Vector3};
 use neat_core::ground_truth::read_wireframe;
 use neat_core::{Camera, LineSegment2, LineSegment3, LoadOptions, load_scene};
-use neat_wireframe::fast_back_end::{FastBackEndConfig, run};
+use neat_wireframe::fast::{FastBackEndConfig, run};
 use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation, Wireframe3d};
 use std::path::PathBuf;
 

@@ -1,7 +1,7 @@
 //! Precision and recall against a true wireframe.
 
 use neat_core::Wireframe3d;
-use neat_wireframe::distance_matrix::DistanceMatrix;
+use neat_wireframe::metrics::DistanceMatrix;
 use neat_wireframe::metrics::{
     Matching, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,
     segment_distances,

@@ -9,5 +9,6 @@ mod implicit_network;
 mod junction_perceiver;
 mod ray_networks;
 mod segment_projection;
+mod thin_regions;
 mod training_step;
 mod volume_rendering;
