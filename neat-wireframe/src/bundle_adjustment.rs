@@ -11,7 +11,6 @@ use crate::ViewObservation;
 use crate::block_cholesky::Elimination;
 use crate::normal_equations::NormalEquations;
 use crate::projection::{project_in_front, project_with_jacobian};
-use crate::pulls::Pulls;
 use crate::segment_grid::SegmentGrid;
 use crate::segment_matching::match_segment;
 use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
@@ -125,36 +124,21 @@ pub(crate) fn adjust_observed(
     junctions: &[Vector3<f64>],
     config: &BundleAdjustmentConfig,
 ) -> Vec<Vector3<f64>> {
-    adjust_with_pulls(edges, &Pulls::default(), junctions, config)
-}
-
-/// [`adjust_observed`], with places that the graph is pulled towards.
-pub(crate) fn adjust_with_pulls(
-    edges: &[ObservedEdge],
-    pulls: &Pulls,
-    junctions: &[Vector3<f64>],
-    config: &BundleAdjustmentConfig,
-) -> Vec<Vector3<f64>> {
     let mut junctions = junctions.to_vec();
     if edges.is_empty() {
         return junctions;
     }
     let pairs = edges.iter().map(|edge| edge.junctions);
-    let pairs = pairs.chain(pulls.directions.iter().map(|edge| edge.junctions));
     let elimination = Elimination::new(junctions.len(), pairs);
-    let total_cost = |junctions: &[Vector3<f64>]| {
-        total_cost(edges, junctions, config) + pulls.cost(junctions, config)
-    };
-    let mut cost = total_cost(&junctions);
+    let mut cost = total_cost(edges, &junctions, config);
     let mut damping = config.initial_damping;
     for _ in 0..config.max_iterations {
-        let mut equations = linearise(edges, &junctions, config);
-        pulls.add_to(&mut equations, &junctions, config);
+        let equations = linearise(edges, &junctions, config);
         let mut accepted = None;
         for _ in 0..config.max_attempts {
             if let Some(step) = equations.solve_in_order(damping, &elimination) {
                 let moved: Vec<_> = junctions.iter().zip(&step).map(|(x, dx)| x - dx).collect();
-                let moved_cost = total_cost(&moved);
+                let moved_cost = total_cost(edges, &moved, config);
                 if moved_cost < cost {
                     accepted = Some((moved, moved_cost));
                     break;
@@ -188,16 +172,6 @@ fn total_cost(
         .collect();
     // Summed in the order of the edges, whatever the threads did.
     costs.iter().sum()
-}
-
-/// What the detections tell of every junction while the others stay: the
-/// diagonal blocks of the normal equations, in pixels² per squared world unit.
-pub(crate) fn information(
-    edges: &[ObservedEdge],
-    junctions: &[Vector3<f64>],
-    config: &BundleAdjustmentConfig,
-) -> Vec<Matrix3<f64>> {
-    linearise(edges, junctions, config).diagonal
 }
 
 /// The normal equations at `junctions`, assembled edge by edge.

@@ -43,7 +43,6 @@ pub mod projection;
 pub mod proposals;
 pub mod validity;
 
-mod alignments;
 mod block_cholesky;
 mod disjoint_sets;
 mod interval_cover;
@@ -51,8 +50,6 @@ mod normal_equations;
 mod observation;
 mod point_grid;
 mod point_index;
-mod pulls;
-mod regularities;
 mod segment_ends;
 mod segment_grid;
 mod segment_matching;

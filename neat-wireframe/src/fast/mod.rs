@@ -27,7 +27,6 @@ pub use step_report::{Step, StepChange};
 use crate::bundle_adjustment::{BundleAdjustmentConfig, bundle_adjust};
 use crate::evidence::edge_support::{EdgeSupportConfig, SupportedEdge};
 use crate::evidence::occlusion::{OcclusionConfig, visible_views};
-use crate::regularities::{RegularitiesConfig, adjust_with_regularities};
 use crate::segment_ends::{SegmentEndConfig, segment_ends};
 use crate::signed_distance::UnitBallSurface;
 use crate::triangulation::{TriangulationConfig, associate, retriangulate};
@@ -89,8 +88,6 @@ pub struct FastBackEndConfig {
     pub merging: CleanupConfig,
     /// Constants of the splitting of edges.
     pub crossings: TouchingEdgesConfig,
-    /// Parallel and orthogonal edges, flat faces and straight lines, off by default.
-    pub regularities: RegularitiesConfig,
 }
 
 impl Default for FastBackEndConfig {
@@ -116,7 +113,6 @@ impl Default for FastBackEndConfig {
             occlusion: OcclusionConfig::default(),
             merging: CleanupConfig::default(),
             crossings: TouchingEdgesConfig::default(),
-            regularities: RegularitiesConfig::default(),
         }
     }
 }
@@ -413,17 +409,6 @@ impl BackEnd<'_> {
             let association = config.adjustment.final_association_in_pixels;
             junctions = self.adjust(&junctions, &edges, association);
             record.push_edges(Step::FinalAdjustment, junctions.len(), &edges, &edges);
-        }
-        if config.regularities.is_on() {
-            junctions = adjust_with_regularities(
-                self.views,
-                &junctions,
-                &pairs_of(&edges),
-                config.adjustment.final_association_in_pixels,
-                &config.adjustment,
-                &config.regularities,
-            );
-            record.push_edges(Step::Regularities, junctions.len(), &edges, &edges);
         }
         if config.edge_splitting {
             let before = size_of(&junctions, &edges);

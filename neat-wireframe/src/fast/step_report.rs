@@ -28,8 +28,6 @@ pub enum Step {
     CleanUp,
     /// The bundle adjustment of the final graph.
     FinalAdjustment,
-    /// Edges and junctions are pulled towards regularities of the graph.
-    Regularities,
     /// Edges are split where others end on them or cross them.
     EdgeSplitting,
 }

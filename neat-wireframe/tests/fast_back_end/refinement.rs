@@ -39,34 +39,6 @@ fn refinement_reduces_the_junction_error_threefold() {
 }
 
 #[test]
-fn regularities_are_a_step_of_their_own_and_gain() {
-    let scene = BlockScene {
-        blocks: 8,
-        views: 20,
-        max_yaw_in_degrees: 0.0,
-        ..BlockScene::default()
-    };
-    let data = scene.generate().unwrap();
-    let (views, proposals) = (observations(&data), proposals(&data, 0));
-    let surface = BlockSurface(&data.blocks);
-    let median_error = |config: &FastBackEndConfig| {
-        let result = run(&views, &proposals, &[], &surface, 1.0, config);
-        let mut steps = result.report.steps.iter();
-        let regular = steps.any(|step| step.step == Step::Regularities);
-        let score = Score::new(&result.wireframe, &data.truth, &data.truth, 0.01);
-        (regular, score.median_junction_error)
-    };
-    let mut config = FastBackEndConfig::default();
-    let (is_regular, plain) = median_error(&config);
-    assert!(!is_regular);
-    config.regularities.parallel = true;
-    config.regularities.coplanar = true;
-    let (is_regular, regular) = median_error(&config);
-    assert!(is_regular);
-    assert!(regular < 0.9 * plain, "{plain} {regular}");
-}
-
-#[test]
 fn the_report_accounts_for_every_junction_and_edge() {
     let scene = BlockScene {
         blocks: 4,
