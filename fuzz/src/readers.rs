@@ -9,7 +9,7 @@ use crate::seeds;
 use image::RgbImage;
 use neat_core::layout::{self, Layout};
 use neat_core::npz::{NpzReader, parse_npy};
-use neat_core::{LoadOptions, ground_truth, hawp_json, load_scene, point_cloud};
+use neat_core::{LoadOptions, ground_truth, hawp_json, load_scene, ply};
 use neat_detect::{edge_map, segment_file};
 use neat_eval::{EdgeModel, foreign, mat_file};
 use neat_wireframe::export;
@@ -201,12 +201,9 @@ fn wireframe_of_truth(bytes: &[u8]) -> bool {
 }
 
 fn ply(bytes: &[u8]) -> bool {
-    accepted(
-        point_cloud::parse_ply(bytes, Path::new("a.ply")),
-        |points| {
-            assert!(points.iter().flatten().all(|x| x.is_finite()));
-        },
-    )
+    accepted(ply::parse_points(bytes, Path::new("a.ply")), |points| {
+        assert!(points.iter().flatten().all(|x| x.is_finite()));
+    })
 }
 
 fn npy(bytes: &[u8]) -> bool {

@@ -9,8 +9,7 @@ use crate::job_record::{self, JobRecord, JobState, Outcome};
 use crate::options::BatchOptions;
 use crate::queue::{Entry, Next, Queue};
 use crate::stop::{Stop, StopSwitch};
-use neat_core::SceneError;
-use std::error::Error;
+use neat_core::{SceneError, with_causes};
 use std::path::Path;
 use std::process::Command;
 use std::sync::mpsc::Sender;
@@ -223,18 +222,4 @@ impl Worker<'_> {
 fn seconds_since_1970() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0, |elapsed| elapsed.as_secs())
-}
-
-/// An error with its causes, in one line.
-fn with_causes(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        let message = error.to_string();
-        if !text.contains(&message) {
-            text += &format!(" ({message})");
-        }
-        cause = error.source();
-    }
-    text
 }

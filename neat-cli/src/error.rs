@@ -2,11 +2,11 @@
 
 use crate::output;
 use neat_batch::BatchError;
-use neat_core::SceneError;
 use neat_core::synthetic::SyntheticError;
+use neat_core::{SceneError, with_causes};
 use neat_eval::EvalError;
 use neat_pipeline::compare_backends::CompareError;
-use neat_pipeline::error::{PipelineError, with_causes};
+use neat_pipeline::error::PipelineError;
 use neat_pipeline::overrides::OverrideError;
 use neat_pipeline::run_dir::RunDirError;
 use neat_pipeline::trainer::TrainError;

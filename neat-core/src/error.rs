@@ -2,14 +2,15 @@
 
 use crate::camera::CameraError;
 use crate::wireframe2d::Wireframe2dError;
-use std::path::PathBuf;
-use thiserror::Error;
+use std::error::Error;
+use std::iter::successors;
+use std::path::{Path, PathBuf};
 
 /// Why a file or a folder of a scene could not be read or written.
 ///
 /// Every message names the file, the view where there is one, and the remedy.
 /// Causes that come from other crates are in [`std::error::Error::source`].
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
     /// A file or folder that must be there is not.
@@ -236,8 +237,69 @@ pub enum SceneError {
     },
 }
 
+impl SceneError {
+    /// A file that breaks the rules of its format.
+    pub fn malformed(path: &Path, reason: impl Into<String>) -> Self {
+        Self::Malformed {
+            path: path.into(),
+            reason: reason.into(),
+        }
+    }
+
+    /// A file or folder that is not there; `remedy` says how to provide it.
+    pub fn missing(path: &Path, remedy: impl Into<String>) -> Self {
+        Self::Missing {
+            path: path.into(),
+            remedy: remedy.into(),
+        }
+    }
+
+    /// A problem of the view called `view`, with the file that says so.
+    pub fn view(path: &Path, view: &str, problem: impl Into<ViewError>) -> Self {
+        Self::View {
+            path: path.into(),
+            view: view.into(),
+            problem: problem.into(),
+        }
+    }
+
+    /// What a codec said about an image.
+    pub(crate) fn image(path: &Path, source: image::ImageError) -> Self {
+        Self::Image {
+            path: path.into(),
+            source,
+        }
+    }
+
+    /// What the system said when it refused to write.
+    pub(crate) fn write(path: &Path, source: std::io::Error) -> Self {
+        Self::Write {
+            path: path.into(),
+            source,
+        }
+    }
+}
+
+/// The message of an error, and in brackets those of what caused it: one line.
+///
+/// ```
+/// let error = neat_core::load_scene("/nowhere", &Default::default()).unwrap_err();
+/// assert!(neat_core::with_causes(&error).contains("/nowhere does not exist"));
+/// ```
+pub fn with_causes(error: &dyn Error) -> String {
+    let mut text = error.to_string();
+    for cause in successors(error.source(), |&cause| cause.source()) {
+        let message = cause.to_string();
+        // Some libraries repeat their cause in their own message.
+        if !text.contains(&message) {
+            text += &format!(" ({message})");
+        }
+    }
+    text
+}
+
 /// What can be wrong with one view.
-#[derive(Clone, Debug, Error, PartialEq)]
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
 #[non_exhaustive]
 pub enum ViewError {
     /// Its camera.

@@ -34,7 +34,7 @@ mod memory_limit;
 #[cfg(test)]
 mod mutation;
 pub mod npz;
-pub mod point_cloud;
+pub mod ply;
 mod scene;
 mod scene_sphere;
 pub mod synthetic;
@@ -47,7 +47,7 @@ mod wireframe3d;
 pub use camera::{Camera, CameraError, Intrinsics, Projection, Ray};
 pub use distortion::Distortion;
 pub use downscaling::Downscaling;
-pub use error::{SceneError, ViewError};
+pub use error::{SceneError, ViewError, with_causes};
 pub use layout::{LoadOptions, LoadedScene, load_scene};
 pub use line_segment::{LineSegment, LineSegment2, LineSegment3};
 pub use memory_limit::MemoryLimit;

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector2, Vector3,
 use neat_core::convert::{POINTS_FILE, SceneFormat, convert};
 use neat_core::layout::SceneWarning;
 use neat_core::npz::NpzReader;
-use neat_core::point_cloud::read_ply;
+use neat_core::ply::read_points;
 use neat_core::{
     Camera, Intrinsics, LoadOptions, Observation, Scene, SceneError, Similarity, SparsePoint, View,
     Wireframe2d, load_scene,
@@ -165,7 +165,7 @@ fn every_format_reads_back() {
                 }
             }
             if format != SceneFormat::Colmap {
-                let points = read_ply(&dir.join(POINTS_FILE)).unwrap();
+                let points = read_points(&dir.join(POINTS_FILE)).unwrap();
                 for (found, point) in points.iter().zip(&scene.sparse_points) {
                     let expected = scene.original_from_world.apply(&point.position_in_world);
                     assert_eq!(*found, expected, "{context}");

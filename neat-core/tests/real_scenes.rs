@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
 use neat_core::convert::{SceneFormat, convert};
 use neat_core::ground_truth::{read_ground_truth, read_wireframe};
 use neat_core::layout::Layout;
-use neat_core::point_cloud::read_ply;
+use neat_core::ply::read_points;
 use neat_core::{
     Camera, LoadOptions, Scene, SceneError, SphereChoice, SphereSource, View, load_scene,
 };
@@ -344,7 +344,7 @@ fn strechas_cameras_agree_with_the_cameras_made_from_them() {
     assert_eq!(scene.views.len(), 10);
     let (k, pose) = differences(&scene, &json_cameras(&dir));
     assert!(k < 1e-12 && pose < 1e-12, "{k:e} {pose:e}");
-    for point in read_ply(&dir.join("sparse_points.ply")).unwrap() {
+    for point in read_points(&dir.join("sparse_points.ply")).unwrap() {
         let seen = scene.views.iter().filter(|view| sees(&view.camera, &point));
         assert!(
             seen.count() >= 3,
@@ -359,7 +359,7 @@ fn sparse_points_of_dtu_are_seen() {
         return;
     };
     let scene = load_as(&dir, Layout::Dtu);
-    for point in read_ply(&dir.join("sparse_points.ply")).unwrap() {
+    for point in read_points(&dir.join("sparse_points.ply")).unwrap() {
         let seen = scene.views.iter().filter(|view| sees(&view.camera, &point));
         assert!(seen.count() >= 3);
     }
@@ -510,7 +510,11 @@ fn point_clouds_of_both_encodings_are_read() {
         let Some(dir) = real(name) else {
             continue;
         };
-        assert_eq!(read_ply(&dir.join(file)).unwrap().len(), points, "{name}");
+        assert_eq!(
+            read_points(&dir.join(file)).unwrap().len(),
+            points,
+            "{name}"
+        );
     }
 }
 

@@ -1,19 +1,13 @@
 //! Why a scene cannot be read.
 
 use crate::examination::{Cause, Check, Finding, Level};
-use neat_core::{CameraError, SceneError, ViewError, Wireframe2dError};
-use std::error::Error;
+use neat_core::{CameraError, SceneError, ViewError, Wireframe2dError, with_causes};
 use std::path::Path;
 
 /// The finding for a scene that cannot be read: its cause and the error's own
 /// sentence, which names file, view and remedy.
 pub fn explain(error: &SceneError) -> Finding {
-    let mut message = error.to_string();
-    let mut source = error.source();
-    while let Some(inner) = source {
-        message += &format!(" ({inner})");
-        source = inner.source();
-    }
+    let message = with_causes(error);
     let (cause, what) = cause(error);
     let finding = Finding::new(Check::Files, Level::Problem, format!("{what}: {message}"));
     let finding = match error {

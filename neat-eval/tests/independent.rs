@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 use neat_core::Wireframe3d;
 use neat_core::ground_truth::{GroundTruth, read_ground_truth};
-use neat_core::point_cloud::read_ply;
+use neat_core::ply::read_points;
 use neat_eval::{
     EdgePoints, EditDistance, GroundPlane, LimapLength, NeatAbc, NeatSurface, ObservationMask,
     ScannedSurface, StructureScore, foreign,
@@ -77,7 +77,7 @@ fn predicted(scale: f64) -> Wireframe3d {
 }
 
 fn scan() -> Vec<Vector3<f64>> {
-    read_ply(&data("scan.ply")).unwrap()
+    read_points(&data("scan.ply")).unwrap()
 }
 
 #[test]

@@ -6,7 +6,7 @@ pub mod variants;
 
 use crate::config::{BackEnd, Config};
 use crate::distill::distill;
-use crate::error::{PipelineError, with_causes};
+use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Stage};
 use crate::field::TrainedField;
 use crate::image_io::every_nth_pixel;
@@ -17,7 +17,7 @@ use crate::render::render_view;
 use crate::resources::Resources;
 use crate::run_dir::Existing;
 use nalgebra::Vector3;
-use neat_core::{Scene, Wireframe3d, file};
+use neat_core::{Scene, Wireframe3d, file, with_causes};
 use neat_eval::image_quality::psnr;
 use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
 use neat_field::region_pixels::RegionPixels;

@@ -12,7 +12,6 @@ use neat_report::ReportError;
 use neat_tensor::BackendError;
 use neat_tensor::checkpoint::CheckpointError;
 use neat_wireframe::export::ExportError;
-use std::error::Error;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
@@ -169,23 +168,6 @@ impl PipelineError {
             | Self::AblationInterrupted { .. } => false,
         }
     }
-}
-
-/// The message of an error and what caused it, in one sentence.
-pub fn with_causes(error: &dyn Error) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        let message = error.to_string();
-        // Some libraries repeat their cause in their own message.
-        if !text.contains(&message) {
-            text.push_str(" (");
-            text.push_str(&message);
-            text.push(')');
-        }
-        cause = error.source();
-    }
-    text
 }
 
 fn is_full_disk(error: &SceneError) -> bool {

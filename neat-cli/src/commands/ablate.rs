@@ -8,7 +8,7 @@ use crate::scene_arguments::SceneArgs;
 use crate::{interrupt, output};
 use clap::Args;
 use neat_core::ground_truth::read_wireframe;
-use neat_core::point_cloud::read_ply;
+use neat_core::ply::read_points;
 use neat_pipeline::ablate::table::to_markdown;
 use neat_pipeline::ablate::{Truth, ablate};
 use neat_pipeline::event::Event;
@@ -66,7 +66,7 @@ impl AblateArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         let truth = Truth {
             wireframe: self.gt.as_deref().map(read_wireframe).transpose()?,
-            surface: self.points.as_deref().map(read_ply).transpose()?,
+            surface: self.points.as_deref().map(read_points).transpose()?,
             threshold: self.threshold,
         };
         let mut config = self.method.config()?;

@@ -8,7 +8,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use neat_core::file;
 use neat_core::ground_truth::GroundTruth;
-use neat_core::point_cloud::read_ply;
+use neat_core::ply::read_points;
 use neat_eval::{
     EdgeModel, EdgePointScores, EdgePoints, EditDistance, EvalError, EvaluationReport, GroundPlane,
     LimapLength, NeatAbc, NeatSurface, ObservationMask, Protocol, ScannedSurface, Scores,
@@ -257,7 +257,7 @@ impl EvalArgs {
     fn read(&self) -> Result<Inputs, EvalError> {
         let mut surface = ScannedSurface::default();
         if let Some(points) = &self.points {
-            surface.points = read_ply(points)?;
+            surface.points = read_points(points)?;
         }
         if let Some(mask) = &self.obs_mask {
             surface.mask = Some(ObservationMask::read(mask)?);

@@ -1,7 +1,7 @@
 //! Sparse points as other programs want them: with colours.
 
 use super::points_in_original_frame;
-use crate::{Scene, SceneError, SparsePoint, point_cloud};
+use crate::{Scene, SceneError, SparsePoint, ply};
 use std::path::Path;
 
 /// Where no view says which colour a point has.
@@ -39,5 +39,6 @@ pub(super) fn write_if_any(scene: &Scene, path: &Path) -> Result<(), SceneError>
     if scene.sparse_points.is_empty() {
         return Ok(());
     }
-    point_cloud::write_ply(path, &points_in_original_frame(scene), &colors(scene)?)
+    let points = points_in_original_frame(scene).into_iter();
+    ply::write_points(path, &points.zip(colors(scene)?).collect::<Vec<_>>())
 }

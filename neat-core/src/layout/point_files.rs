@@ -1,6 +1,6 @@
 //! Sparse points in a file beside the poses, for layouts that hold none.
 
-use crate::point_cloud::read_ply;
+use crate::ply::read_points;
 use crate::{Camera, SceneError, Similarity, SparsePoint};
 use nalgebra::Vector3;
 use std::path::Path;
@@ -24,7 +24,7 @@ pub(super) fn read(
     else {
         return Ok(Vec::new());
     };
-    let mut as_written = read_ply(&path)?;
+    let mut as_written = read_points(&path)?;
     if is_mirrored {
         for point in &mut as_written {
             point.z = -point.z;

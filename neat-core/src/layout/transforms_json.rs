@@ -21,7 +21,7 @@ use super::images::{self, ENDINGS, has_known_ending, read_size, with_existing_en
 use super::poses::{PosedImage, Poses, upper_left, view_error};
 use super::reconstruction::{check_finite, simplest};
 use crate::hawp_json::file_stem;
-use crate::point_cloud::read_ply;
+use crate::ply::read_points;
 use crate::scene::check_names;
 use crate::{SceneError, Similarity, SparsePoint, file};
 use nalgebra::Matrix4;
@@ -144,7 +144,7 @@ fn sparse_points(
     if !points_path.is_file() {
         return Ok(Vec::new());
     }
-    let positions = read_ply(&points_path)?.into_iter();
+    let positions = read_points(&points_path)?.into_iter();
     let points = positions.map(|position_in_world| SparsePoint {
         position_in_world,
         observations: Vec::new(),
