@@ -1,5 +1,6 @@
 //! Lens distortion: how a lens bends a ray before it meets a pinhole's image.
 
+use crate::CameraError;
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::FRAC_PI_2;
@@ -80,15 +81,48 @@ impl Distortion {
     /// bends them with any coefficients.
     pub fn is_none(&self) -> bool {
         match self {
-            Self::None => true,
-            Self::Brown { radial, tangential } => {
-                radial.iter().chain(tangential).all(|&x| x == 0.0)
-            }
             Self::Fisheye { .. } | Self::ThinPrismFisheye { .. } => false,
-            Self::Fov { omega } => *omega == 0.0,
-            Self::ReverseRadial { k } | Self::Division { k } => *k == 0.0,
             Self::ExtendedUnified { alpha, .. } => *alpha == 0.0,
+            _ => self.coefficients().all(|x| x == 0.0),
         }
+    }
+
+    /// [`Self::None`] for a lens that does not bend rays.
+    pub(crate) fn simplest(self) -> Self {
+        if self.is_none() { Self::None } else { self }
+    }
+
+    /// Checks that no coefficient is NaN or infinite.
+    ///
+    /// # Errors
+    /// If one is.
+    pub fn validate(&self) -> Result<(), CameraError> {
+        let is_finite = self.coefficients().all(f64::is_finite);
+        is_finite.then_some(()).ok_or(CameraError::NotFinite)
+    }
+
+    fn coefficients(&self) -> impl Iterator<Item = f64> {
+        let lists: [&[f64]; 3] = match self {
+            Self::None => [&[], &[], &[]],
+            Self::Brown { radial, tangential } => [radial, tangential, &[]],
+            Self::Fisheye {
+                radial,
+                tangential,
+                thin_prism,
+            } => [radial, tangential, thin_prism],
+            Self::ThinPrismFisheye {
+                radial,
+                tangential,
+                thin_prism,
+            } => [radial, tangential, thin_prism],
+            Self::Fov { omega: k } | Self::ReverseRadial { k } | Self::Division { k } => {
+                [std::slice::from_ref(k), &[], &[]]
+            }
+            Self::ExtendedUnified { alpha, beta } => {
+                [std::slice::from_ref(alpha), std::slice::from_ref(beta), &[]]
+            }
+        };
+        lists.into_iter().flatten().copied()
     }
 
     /// The model in a word or two, for messages.
@@ -113,31 +147,10 @@ impl Distortion {
     /// there is none.
     pub fn distort(&self, calibrated: &Vector2<f64>) -> Vector2<f64> {
         let point = calibrated;
+        if let Some((value, ..)) = self.polynomial(point) {
+            return value;
+        }
         match self {
-            Self::None => *point,
-            Self::Brown { radial, tangential } => {
-                let (scale, _) = brown_scale(radial, point.norm_squared());
-                point * scale + decentering(tangential, point)
-            }
-            Self::Fisheye {
-                radial,
-                tangential,
-                thin_prism,
-            } => {
-                let (scale, _) = fisheye_scale(radial, point.norm());
-                let bent = point * scale;
-                bent + decentering(tangential, &bent) + prism(thin_prism, &bent)
-            }
-            Self::ThinPrismFisheye {
-                radial,
-                tangential,
-                thin_prism: [s1, s2],
-            } => {
-                let (scale, _) = fisheye_scale(&[0.0; 6], point.norm());
-                let bent = point * scale;
-                let (outer, _) = series(radial, bent.norm_squared());
-                bent * outer + decentering(tangential, &bent) + prism(&[*s1, 0.0, *s2, 0.0], &bent)
-            }
             Self::Fov { omega } => point * fov_scale(*omega, point.norm()),
             Self::ReverseRadial { k } => point * reverse_radial_scale(*k, point.norm()),
             // The smaller root of k r ρ² − ρ + r = 0.
@@ -147,6 +160,7 @@ impl Distortion {
             Self::ExtendedUnified { alpha, beta } => {
                 point / (alpha * (beta * point.norm_squared() + 1.0).sqrt() + 1.0 - alpha)
             }
+            _ => *point,
         }
     }
 
@@ -250,16 +264,22 @@ impl Distortion {
     /// are inverted with it; `None` where they are not finite or have turned the
     /// point through the axis.
     fn with_jacobian(&self, point: &Vector2<f64>) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-        let (value, jacobian, scale) = match self {
+        let (value, jacobian, scale) = self.polynomial(point)?;
+        let finite = value.iter().chain(&jacobian).all(|x| x.is_finite());
+        (finite && scale > 0.0).then_some((value, jacobian))
+    }
+
+    /// Of the models made of polynomials: [`Self::distort`], its derivative by the
+    /// point, and the radial factor.
+    #[inline]
+    fn polynomial(&self, point: &Vector2<f64>) -> Option<(Vector2<f64>, Matrix2<f64>, f64)> {
+        Some(match self {
             Self::Brown { radial, tangential } => {
                 let (scale, slope) = brown_scale(radial, point.norm_squared());
                 let jacobian = radial_jacobian(point, scale, 2.0 * slope)
                     + decentering_jacobian(tangential, point);
-                (
-                    point * scale + decentering(tangential, point),
-                    jacobian,
-                    scale,
-                )
+                let value = point * scale + decentering(tangential, point);
+                (value, jacobian, scale)
             }
             Self::Fisheye {
                 radial,
@@ -271,11 +291,9 @@ impl Distortion {
                 let outer = Matrix2::identity()
                     + decentering_jacobian(tangential, &bent)
                     + prism_jacobian(thin_prism, &bent);
-                (
-                    bent + decentering(tangential, &bent) + prism(thin_prism, &bent),
-                    outer * radial_jacobian(point, scale, slope_by_radius),
-                    scale,
-                )
+                let value = bent + decentering(tangential, &bent) + prism(thin_prism, &bent);
+                let jacobian = outer * radial_jacobian(point, scale, slope_by_radius);
+                (value, jacobian, scale)
             }
             Self::ThinPrismFisheye {
                 radial,
@@ -289,20 +307,13 @@ impl Distortion {
                 let outer = radial_jacobian(&bent, outer_scale, 2.0 * slope)
                     + decentering_jacobian(tangential, &bent)
                     + prism_jacobian(&prisms, &bent);
-                (
-                    bent * outer_scale + decentering(tangential, &bent) + prism(&prisms, &bent),
-                    outer * radial_jacobian(point, scale, slope_by_radius),
-                    outer_scale,
-                )
+                let value =
+                    bent * outer_scale + decentering(tangential, &bent) + prism(&prisms, &bent);
+                let jacobian = outer * radial_jacobian(point, scale, slope_by_radius);
+                (value, jacobian, outer_scale)
             }
-            Self::None
-            | Self::Fov { .. }
-            | Self::ReverseRadial { .. }
-            | Self::Division { .. }
-            | Self::ExtendedUnified { .. } => return None,
-        };
-        let finite = value.iter().chain(&jacobian).all(|x| x.is_finite());
-        (finite && scale > 0.0).then_some((value, jacobian))
+            _ => return None,
+        })
     }
 }
 
@@ -372,9 +383,10 @@ fn reverse_radial_scale(k: f64, radius: f64) -> f64 {
     }
     let root = (3.0 * k.abs()).sqrt();
     let thrice = 1.5 * radius * root;
-    let argument = match k > 0.0 {
-        true => (thrice.asinh() / 3.0).sinh(),
-        false => (thrice.asin() / 3.0).sin(),
+    let argument = if k > 0.0 {
+        (thrice.asinh() / 3.0).sinh()
+    } else {
+        (thrice.asin() / 3.0).sin()
     };
     2.0 / root * argument / radius
 }

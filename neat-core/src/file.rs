@@ -2,6 +2,7 @@
 
 use crate::SceneError;
 use image::{ImageFormat, RgbImage};
+use serde::de::DeserializeOwned;
 use std::fs;
 use std::io::{self, Cursor, Read, Write};
 use std::path::{Path, PathBuf};
@@ -54,14 +55,27 @@ pub fn read(path: &Path, remedy: &str) -> Result<Vec<u8>, SceneError> {
     Ok(bytes)
 }
 
+/// Reads the bytes of a JSON file of this format; `path` is for messages.
+///
+/// # Errors
+/// If they are no JSON or lack a field.
+pub fn parse_json<T: DeserializeOwned>(
+    bytes: &[u8],
+    path: &Path,
+    format: &'static str,
+) -> Result<T, SceneError> {
+    serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
+        path: path.into(),
+        format,
+        source,
+    })
+}
+
 /// [`SceneError::Missing`] where the system says "not found", else
 /// [`SceneError::Read`].
 pub(crate) fn read_error(path: &Path, remedy: &str, source: io::Error) -> SceneError {
     match source.kind() {
-        io::ErrorKind::NotFound => SceneError::Missing {
-            path: path.into(),
-            remedy: remedy.into(),
-        },
+        io::ErrorKind::NotFound => SceneError::missing(path, remedy),
         _ => SceneError::Read {
             path: path.into(),
             source,
@@ -89,10 +103,7 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), SceneError> {
         // The first error is the one to report; a file that was never created
         // cannot be removed.
         let _ = fs::remove_file(&temporary);
-        SceneError::Write {
-            path: path.into(),
-            source,
-        }
+        SceneError::write(path, source)
     })
 }
 
@@ -100,9 +111,10 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), SceneError> {
 fn sync_parent(path: &Path) -> io::Result<()> {
     #[cfg(unix)]
     if let Some(parent) = path.parent() {
-        let parent = match parent.as_os_str().is_empty() {
-            true => Path::new("."),
-            false => parent,
+        let parent = if parent.as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            parent
         };
         match fs::File::open(parent)?.sync_all() {
             // Some network file systems cannot, and need not.
@@ -121,21 +133,18 @@ fn sync_parent(path: &Path) -> io::Result<()> {
 /// # Errors
 /// If the folder cannot be read, or one of them cannot be removed.
 pub fn remove_temporaries(dir: &Path) -> Result<(), SceneError> {
-    let write_error = |path: &Path, source| SceneError::Write {
-        path: path.into(),
-        source,
-    };
     let entries = fs::read_dir(dir).map_err(|source| read_error(dir, "", source))?;
     for entry in entries {
         let path = entry.map_err(|source| read_error(dir, "", source))?.path();
         if !is_temporary(&path) {
             continue;
         }
-        let removed = match path.is_dir() {
-            true => fs::remove_dir_all(&path),
-            false => fs::remove_file(&path),
+        let removed = if path.is_dir() {
+            fs::remove_dir_all(&path)
+        } else {
+            fs::remove_file(&path)
         };
-        removed.map_err(|source| write_error(&path, source))?;
+        removed.map_err(|source| SceneError::write(&path, source))?;
     }
     Ok(())
 }
@@ -145,10 +154,7 @@ pub fn remove_temporaries(dir: &Path) -> Result<(), SceneError> {
 /// # Errors
 /// If the system refuses.
 pub fn create_dir(path: &Path) -> Result<(), SceneError> {
-    fs::create_dir_all(path).map_err(|source| SceneError::Write {
-        path: path.into(),
-        source,
-    })
+    fs::create_dir_all(path).map_err(|source| SceneError::write(path, source))
 }
 
 /// Fills a new folder under a temporary name beside `dir`, then renames it to
@@ -161,10 +167,7 @@ pub fn write_dir_atomically(
     dir: &Path,
     fill: impl FnOnce(&Path) -> Result<(), SceneError>,
 ) -> Result<(), SceneError> {
-    let write_error = |source| SceneError::Write {
-        path: dir.into(),
-        source,
-    };
+    let write_error = |source| SceneError::write(dir, source);
     let exists = dir.symlink_metadata().is_ok();
     if exists && (!dir.is_dir() || fs::read_dir(dir).map_err(write_error)?.next().is_some()) {
         return Err(SceneError::NotEmpty { path: dir.into() });
@@ -218,10 +221,7 @@ pub fn write_png(path: &Path, image: &RgbImage) -> Result<(), SceneError> {
     let mut png = Cursor::new(Vec::new());
     image
         .write_to(&mut png, ImageFormat::Png)
-        .map_err(|source| SceneError::Image {
-            path: path.into(),
-            source,
-        })?;
+        .map_err(|source| SceneError::image(path, source))?;
     write_atomically(path, png.get_ref())
 }
 

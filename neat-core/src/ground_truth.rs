@@ -70,21 +70,13 @@ pub fn read_wireframe(path: &Path) -> Result<Wireframe3d, SceneError> {
 /// # Errors
 /// As [`read_ground_truth`].
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GroundTruth, SceneError> {
-    let json: ReadJson = serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
-        path: path.into(),
-        format: "3D wireframe",
-        source,
-    })?;
-    let malformed = |reason: String| SceneError::Malformed {
-        path: path.into(),
-        reason,
-    };
+    let json: ReadJson = file::parse_json(bytes, path, "3D wireframe")?;
     let junctions = json.junctions.len();
     for (edge, ends) in json.edges.iter().enumerate() {
         if let Some(end) = ends.iter().find(|&&end| end >= junctions) {
-            return Err(malformed(format!(
-                "edge {edge} names junction {end}, but there are {junctions} junctions"
-            )));
+            let reason =
+                format!("edge {edge} names junction {end}, but there are {junctions} junctions");
+            return Err(SceneError::malformed(path, reason));
         }
     }
     Ok(GroundTruth {
@@ -118,10 +110,8 @@ pub fn write_wireframe(path: &Path, wireframe: &Wireframe3d) -> Result<(), Scene
 }
 
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), SceneError> {
-    let bytes = serde_json::to_vec(value).map_err(|source| SceneError::Write {
-        path: path.into(),
-        source: source.into(),
-    })?;
+    let bytes =
+        serde_json::to_vec(value).map_err(|source| SceneError::write(path, source.into()))?;
     file::write_atomically(path, &bytes)
 }
 

@@ -5,7 +5,7 @@
 //! coordinates: the centre of the first pixel is (0, 0). In memory they are in
 //! image coordinates, which differ by the scene's pixel centre.
 
-use crate::{SceneError, ViewError, Wireframe2d, file};
+use crate::{SceneError, Wireframe2d, file};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -62,14 +62,9 @@ pub fn read(path: &Path, pixel_center: f64) -> Result<Wireframe2d, SceneError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(bytes: &[u8], pixel_center: f64, path: &Path) -> Result<Wireframe2d, SceneError> {
-    let json: HawpJson = serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
-        path: path.into(),
-        format: "HAWP wireframe",
-        source,
-    })?;
-    let odd = |list: &str| SceneError::Malformed {
-        path: path.into(),
-        reason: format!("the flat list `{list}` has an odd length"),
+    let json: HawpJson = file::parse_json(bytes, path, "HAWP wireframe")?;
+    let odd = |list: &str| {
+        SceneError::malformed(path, format!("the flat list `{list}` has an odd length"))
     };
     let vertices = json.vertices.into_pairs().ok_or_else(|| odd("vertices"))?;
     let wireframe = Wireframe2d {
@@ -83,14 +78,10 @@ pub fn parse(bytes: &[u8], pixel_center: f64, path: &Path) -> Result<Wireframe2d
         width: json.width,
         height: json.height,
     };
-    match wireframe.validate() {
-        Ok(()) => Ok(wireframe),
-        Err(problem) => Err(SceneError::View {
-            path: path.into(),
-            view: file_stem(path),
-            problem: ViewError::Wireframe(problem),
-        }),
-    }
+    wireframe
+        .validate()
+        .map_err(|problem| SceneError::view(path, &file_stem(path), problem))?;
+    Ok(wireframe)
 }
 
 /// Writes a HAWP file: vertices are shifted back by `pixel_center`.
@@ -134,6 +125,7 @@ pub(crate) fn file_stem(path: &Path) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ViewError;
     use crate::Wireframe2dError;
     use crate::mutation::{CASES, damaged};
     use proptest::prelude::*;

@@ -26,7 +26,7 @@ pub fn decode(bytes: &[u8], path: &Path, max_side: u32) -> Result<DynamicImage, 
         .and_then(|reader| {
             DynamicImage::from_decoder(decoder(reader, bytes.len() as u64, max_side)?)
         })
-        .map_err(|source| image_error(path, source))
+        .map_err(|source| SceneError::image(path, source))
 }
 
 /// What the header of an image file says, through `describe`. Pixels are not
@@ -45,7 +45,7 @@ pub(crate) fn header<T>(
     reader
         .map_err(ImageError::IoError)
         .and_then(|reader| Ok(describe(&decoder(reader, length, u32::MAX)?)))
-        .map_err(|source| image_error(path, source))
+        .map_err(|source| SceneError::image(path, source))
 }
 
 /// The decoder of a file of `length` bytes, if its claims can be true.
@@ -67,13 +67,6 @@ fn decoder<'a, R: BufRead + Seek + 'a>(
     limits.reserve(decoder.total_bytes())?;
     decoder.set_limits(limits)?;
     Ok(decoder)
-}
-
-fn image_error(path: &Path, source: ImageError) -> SceneError {
-    SceneError::Image {
-        path: path.into(),
-        source,
-    }
 }
 
 #[cfg(test)]

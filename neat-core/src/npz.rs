@@ -62,7 +62,7 @@ impl NpzReader {
     /// If the bytes are no zip archive.
     pub fn from_bytes(bytes: Vec<u8>, path: &Path) -> Result<Self, SceneError> {
         let archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| {
-            malformed(
+            SceneError::malformed(
                 path,
                 format!("it is not an npz archive or is truncated ({error})"),
             )
@@ -92,7 +92,9 @@ impl NpzReader {
             .by_name(&npyz::npz::file_name_from_array_name(name))
             .map_err(io::Error::from)
             .and_then(|entry| entry.take(MAX_ARRAY_BYTES + 1).read_to_end(&mut bytes))
-            .map_err(|error| malformed(&path, format!("the array cannot be unpacked ({error})")))?;
+            .map_err(|error| {
+                SceneError::malformed(&path, format!("the array cannot be unpacked ({error})"))
+            })?;
         if bytes.len() as u64 > MAX_ARRAY_BYTES {
             return Err(SceneError::TooLarge {
                 path,
@@ -108,17 +110,18 @@ impl NpzReader {
 /// # Errors
 /// As [`NpzReader::array`].
 pub fn parse_npy(bytes: &[u8], path: &Path) -> Result<NpyArray, SceneError> {
-    check_header(bytes).map_err(|reason| malformed(path, reason))?;
+    check_header(bytes).map_err(|reason| SceneError::malformed(path, reason))?;
     let mut data = bytes;
-    let header = npyz::NpyHeader::from_reader(&mut data)
-        .map_err(|error| malformed(path, format!("its header is not valid ({error})")))?;
+    let header = npyz::NpyHeader::from_reader(&mut data).map_err(|error| {
+        SceneError::malformed(path, format!("its header is not valid ({error})"))
+    })?;
 
     let dtype = header.dtype().descr();
     let element_bytes = match dtype.trim_matches('\'') {
         "<f4" | ">f4" => 4,
         "<f8" | ">f8" => 8,
         _ => {
-            return Err(malformed(
+            return Err(SceneError::malformed(
                 path,
                 format!("elements of type {dtype} are not floats of 4 or 8 bytes"),
             ));
@@ -127,7 +130,7 @@ pub fn parse_npy(bytes: &[u8], path: &Path) -> Result<NpyArray, SceneError> {
     let shape: Vec<usize> = header.shape().iter().map(|&n| n as usize).collect();
     let len: usize = shape.iter().product();
     if len.checked_mul(element_bytes) != Some(data.len()) {
-        return Err(malformed(
+        return Err(SceneError::malformed(
             path,
             format!(
                 "shape {shape:?} of {dtype} does not fit its {} bytes of data",
@@ -138,7 +141,7 @@ pub fn parse_npy(bytes: &[u8], path: &Path) -> Result<NpyArray, SceneError> {
 
     let order = header.order();
     let values = read_values(npyz::NpyFile::with_header(header, data), element_bytes)
-        .map_err(|error| malformed(path, error.to_string()))?;
+        .map_err(|error| SceneError::malformed(path, error.to_string()))?;
     let values = match order {
         npyz::Order::C => values,
         npyz::Order::Fortran => c_order_from_fortran(&shape, &values),
@@ -170,10 +173,8 @@ pub fn write_npz_with_integers(
     floats: &BTreeMap<&str, NpyArray>,
     integers: &BTreeMap<&str, NpyIntegers>,
 ) -> Result<(), SceneError> {
-    let bytes = archive_bytes(floats, integers).map_err(|source| SceneError::Write {
-        path: path.into(),
-        source,
-    })?;
+    let bytes =
+        archive_bytes(floats, integers).map_err(|source| SceneError::write(path, source))?;
     file::write_atomically(path, &bytes)
 }
 
@@ -189,13 +190,15 @@ fn archive_bytes(
 ) -> io::Result<Vec<u8>> {
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, array) in floats {
+    let mut write = |name: &str, array: io::Result<Vec<u8>>| {
         archive.start_file(npyz::npz::file_name_from_array_name(name), options)?;
-        archive.write_all(&npy_bytes(&array.shape, &array.values)?)?;
+        archive.write_all(&array?)
+    };
+    for (name, array) in floats {
+        write(name, npy_bytes(&array.shape, &array.values))?;
     }
     for (name, array) in integers {
-        archive.start_file(npyz::npz::file_name_from_array_name(name), options)?;
-        archive.write_all(&npy_bytes(&array.shape, &array.values)?)?;
+        write(name, npy_bytes(&array.shape, &array.values))?;
     }
     Ok(archive.finish()?.into_inner())
 }
@@ -267,13 +270,6 @@ fn c_order_from_fortran(shape: &[usize], values: &[f64]) -> Vec<f64> {
         }
     }
     reordered
-}
-
-fn malformed(path: &Path, reason: impl Into<String>) -> SceneError {
-    SceneError::Malformed {
-        path: path.into(),
-        reason: reason.into(),
-    }
 }
 
 #[cfg(test)]

@@ -64,6 +64,16 @@ pub struct SparsePoint {
     pub observations: Vec<Observation>,
 }
 
+impl SparsePoint {
+    /// A point of which nobody says which views saw it.
+    pub fn unseen(position_in_world: Vector3<f64>) -> Self {
+        Self {
+            position_in_world,
+            observations: Vec::new(),
+        }
+    }
+}
+
 /// Where a view saw a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
@@ -143,11 +153,8 @@ impl Scene {
             return Err(SceneError::NoView { path });
         }
         for view in &self.views {
-            view.validate().map_err(|problem| SceneError::View {
-                path: path.clone(),
-                view: view.name.clone(),
-                problem,
-            })?;
+            view.validate()
+                .map_err(|problem| SceneError::view(&path, &view.name, problem))?;
         }
         check_names(self.views.iter().map(|view| view.name.as_str()), &path)
     }

@@ -186,10 +186,7 @@ impl ImageStore {
             std::fs::create_dir_all(dir)?;
             tempfile::tempfile_in(dir)
         };
-        let file = create().map_err(|source| SceneError::Write {
-            path: dir.into(),
-            source,
-        })?;
+        let file = create().map_err(|source| SceneError::write(dir, source))?;
         Ok(Self(Some(Arc::new(StoreFile {
             file,
             dir: dir.into(),

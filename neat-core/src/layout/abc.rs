@@ -14,10 +14,10 @@ use super::images;
 use super::poses::{
     CAMERAS_NPZ, NPZ_REMEDY, PIXEL_CENTER, PosedImage, Poses, SPHERE_RADIUS, check_counts,
     intrinsics_of, matrix4, number_array, read_pixel_center, read_sphere_radius, similarity_of,
-    view_error, wrong_shape,
+    wrong_shape,
 };
 use crate::npz::{NpyArray, NpzReader, write_npz};
-use crate::{Distortion, Scene, SceneError, Similarity, View, ViewError, file, hawp_json};
+use crate::{Distortion, Scene, SceneError, Similarity, View, file, hawp_json};
 use nalgebra::{Matrix3, Matrix4, SMatrix};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -61,8 +61,8 @@ fn parse(
         images.into_iter().zip(&intrinsics).zip(extrinsics)
     {
         let name = hawp_json::file_stem(&image);
-        let intrinsics = intrinsics_of(intrinsics)
-            .map_err(|problem| view_error(&path, &name, ViewError::Camera(problem)))?;
+        let intrinsics =
+            intrinsics_of(intrinsics).map_err(|problem| SceneError::view(&path, &name, problem))?;
         views.push(PosedImage {
             name,
             image,
@@ -72,15 +72,11 @@ fn parse(
             size: None,
         });
     }
-    views.sort_by(|a, b| a.name.cmp(&b.name));
-
     Ok(Poses {
         original_from_world: read_scale_mat(&mut npz, &path)?,
         pixel_center: read_pixel_center(&mut npz, &path)?,
-        points: Vec::new(),
         declared_radius: read_sphere_radius(&mut npz, &path)?,
-        path,
-        views,
+        ..Poses::new(&path, views)?
     })
 }
 

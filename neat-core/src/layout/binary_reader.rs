@@ -1,6 +1,5 @@
 //! Little-endian binary files, read without trusting a number in them.
 
-use super::poses::malformed;
 use crate::SceneError;
 use std::path::Path;
 
@@ -87,7 +86,7 @@ impl<'a> BinaryReader<'a> {
     fn utf8(&self, text: &[u8], what: &str) -> Result<String, SceneError> {
         match std::str::from_utf8(text) {
             Ok(text) => Ok(text.into()),
-            Err(_) => Err(malformed(
+            Err(_) => Err(SceneError::malformed(
                 self.path,
                 format!("the name of {what} is not UTF-8"),
             )),
@@ -95,6 +94,6 @@ impl<'a> BinaryReader<'a> {
     }
 
     fn cut_off(&self, what: &str) -> SceneError {
-        malformed(self.path, format!("it ends within {what}"))
+        SceneError::malformed(self.path, format!("it ends within {what}"))
     }
 }

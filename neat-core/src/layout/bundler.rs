@@ -16,7 +16,7 @@
 //! pixel has its centre at (0.5, 0.5).
 
 use super::images::{self, ReadSize};
-use super::poses::{PosedImage, Poses, malformed, pose_of};
+use super::poses::{PosedImage, Poses, pose_of};
 use super::reconstruction::Reconstruction;
 use super::text_lines::{Line, Records, expected_records, records};
 use crate::hawp_json::file_stem;
@@ -33,8 +33,7 @@ const LIST_REMEDY: &str = "provide the list of images that Bundler was run with"
 
 /// The file of this layout in the folder `dir`, where there is one.
 pub(super) fn find(dir: &Path) -> Option<PathBuf> {
-    let mut paths = FILE_NAMES.iter().map(|name| dir.join(name));
-    paths.find(|path| path.is_file())
+    images::first_of(dir, &FILE_NAMES)
 }
 
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
@@ -89,7 +88,7 @@ fn parse(
             "it has {camera_count} cameras, but `{LIST_NAME}` names {} images",
             names.len()
         );
-        return Err(malformed(path, reason));
+        return Err(SceneError::malformed(path, reason));
     }
 
     let mut views = Vec::new();
@@ -127,7 +126,7 @@ fn check_version(path: &Path, bytes: &[u8]) -> Result<(), SceneError> {
         .unwrap_or_default();
     let first = String::from_utf8_lossy(first);
     match first.trim_end().strip_prefix("# Bundle file ") {
-        Some(version) if version != "v0.3" => Err(malformed(
+        Some(version) if version != "v0.3" => Err(SceneError::malformed(
             path,
             format!("it is of the version {version}, but only v0.3 is read"),
         )),

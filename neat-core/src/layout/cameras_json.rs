@@ -6,7 +6,7 @@
 //! the object, to the original frame. Other keys are ignored.
 
 use super::images;
-use super::poses::{PosedImage, Poses, similarity_of, view_error};
+use super::poses::{PosedImage, Poses, similarity_of};
 use crate::hawp_json::file_stem;
 use crate::{Distortion, Intrinsics, SceneError, Similarity, file};
 use nalgebra::{Matrix3, Matrix4};
@@ -38,11 +38,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
 
 fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
     let path = dir.join(FILE_NAME);
-    let json: CamerasJson = serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
-        path: path.clone(),
-        format: "list of cameras",
-        source,
-    })?;
+    let json: CamerasJson = file::parse_json(bytes, &path, "list of cameras")?;
     // Who normalised the world did so for the unit ball.
     let declared_radius = json.scale_mat.is_some().then_some(1.0);
     let original_from_world = json.scale_mat.map_or(Ok(Similarity::identity()), |rows| {
@@ -53,8 +49,8 @@ fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
         let name = file_stem(Path::new(&frame.file));
         // `From` takes the inner arrays for columns.
         let k = Matrix3::from(frame.k).transpose();
-        let intrinsics =
-            Intrinsics::try_from_matrix(&k).map_err(|problem| view_error(&path, &name, problem))?;
+        let intrinsics = Intrinsics::try_from_matrix(&k)
+            .map_err(|problem| SceneError::view(&path, &name, problem))?;
         views.push(PosedImage {
             image: images::locate(&path, &[dir.into()], &frame.file)?,
             name,
@@ -64,14 +60,10 @@ fn parse(bytes: &[u8], dir: &Path) -> Result<Poses, SceneError> {
             size: Some((frame.width, frame.height)),
         });
     }
-    views.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(Poses {
-        path,
-        views,
         original_from_world,
-        pixel_center: None,
-        points: Vec::new(),
         declared_radius,
+        ..Poses::new(&path, views)?
     })
 }
 

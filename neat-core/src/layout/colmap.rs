@@ -22,7 +22,7 @@ mod camera_model;
 mod text;
 
 use super::images;
-use super::poses::{PosedImage, Poses, malformed, pose_of, rotation_of, view_error};
+use super::poses::{PosedImage, Poses, pose_of, rotation_of};
 use super::reconstruction::Reconstruction;
 use crate::hawp_json::file_stem;
 use crate::{CameraError, Distortion, Intrinsics, Observation, SceneError, SparsePoint, file};
@@ -152,10 +152,8 @@ pub(super) fn is_in(dir: &Path) -> bool {
 
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let Some(model) = Model::find(dir) else {
-        return Err(SceneError::Missing {
-            path: dir.join(MODEL_AND_IMAGES_DIRS[0][0]),
-            remedy: REMEDY.into(),
-        });
+        let usual = dir.join(MODEL_AND_IMAGES_DIRS[0][0]);
+        return Err(SceneError::missing(&usual, REMEDY));
     };
     let read = |name| file::read(&model.file(name), REMEDY);
     let (cameras, images) = (read("cameras")?, read("images")?);
@@ -190,7 +188,7 @@ fn parse(
                 image.camera,
                 cameras_path.display()
             );
-            return Err(malformed(&path, reason));
+            return Err(SceneError::malformed(&path, reason));
         };
         let (intrinsics, distortion) = lens_of(camera, &cameras_path, &name)?;
         let posed = PosedImage {
@@ -220,7 +218,10 @@ fn by_id(
     for camera in cameras {
         let id = camera.id;
         if found.insert(id, camera).is_some() {
-            return Err(malformed(path, format!("camera {id} appears twice")));
+            return Err(SceneError::malformed(
+                path,
+                format!("camera {id} appears twice"),
+            ));
         }
     }
     Ok(found)
@@ -238,7 +239,7 @@ fn sparse_points(
     let mut found = Vec::with_capacity(points.len());
     for point in points {
         if point.position.iter().any(|x| !x.is_finite()) {
-            return Err(malformed(path, "a point is not finite".into()));
+            return Err(SceneError::malformed(path, "a point is not finite"));
         }
         let pixel = |image: u32, index: u32| images.get(&image)?.points.get(index as usize);
         let observations = point.track.iter().filter_map(|&[image, index]| {
@@ -276,14 +277,14 @@ fn lens_of(
     view: &str,
 ) -> Result<(Intrinsics, Distortion), SceneError> {
     if camera.parameters.iter().any(|x| !x.is_finite()) {
-        return Err(view_error(path, view, CameraError::NotFinite));
+        return Err(SceneError::view(path, view, CameraError::NotFinite));
     }
     let Some((intrinsics, distortion)) = camera.model.lens(&camera.parameters) else {
         return Err(unknown_model(path, camera.id, camera.model.name.into()));
     };
     match intrinsics.validate() {
         Ok(()) => Ok((intrinsics, distortion)),
-        Err(problem) => Err(view_error(path, view, problem)),
+        Err(problem) => Err(SceneError::view(path, view, problem)),
     }
 }
 
@@ -293,7 +294,7 @@ fn size_of(camera: &ColmapCamera, path: &Path) -> Result<(u32, u32), SceneError>
     } = *camera;
     match (u32::try_from(width), u32::try_from(height)) {
         (Ok(width), Ok(height)) => Ok((width, height)),
-        _ => Err(malformed(
+        _ => Err(SceneError::malformed(
             path,
             format!("camera {id} has images of {width}×{height} pixels"),
         )),
@@ -307,7 +308,7 @@ fn world_from_camera(
 ) -> Result<Matrix4<f64>, SceneError> {
     let translation = Vector3::from(image.translation);
     if translation.iter().any(|x| !x.is_finite()) {
-        return Err(view_error(path, view, CameraError::NotFinite));
+        return Err(SceneError::view(path, view, CameraError::NotFinite));
     }
     let camera_from_world = rotation_of(image.quaternion, path, view)?;
     // camera = R · world + t, so the centre of the camera is −Rᵀ t.

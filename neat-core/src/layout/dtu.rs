@@ -12,7 +12,7 @@
 use super::images;
 use super::poses::{
     CAMERAS_NPZ, NPZ_REMEDY, PosedImage, Poses, check_counts, matrix4, read_pixel_center,
-    similarity_of, upper_left, view_error,
+    similarity_of, upper_left,
 };
 use crate::hawp_json::file_stem;
 use crate::npz::NpzReader;
@@ -72,17 +72,15 @@ fn parse(
     for (index, image) in images.into_iter().enumerate() {
         let scale = matrix(scale_mat(index))?;
         if *original_from_world.get_or_insert(scale) != scale {
-            return Err(SceneError::Malformed {
-                path,
-                reason: format!(
-                    "`scale_mat_{index}` differs from `scale_mat_0`, but views of one scene share their world"
-                ),
-            });
+            let reason = format!(
+                "`scale_mat_{index}` differs from `scale_mat_0`, but views of one scene share their world"
+            );
+            return Err(SceneError::malformed(&path, reason));
         }
         let name = file_stem(&image);
         let (intrinsics, world_from_camera) =
             decompose_projection(&(matrix(world_mat(index))? * scale))
-                .map_err(|problem| view_error(&path, &name, problem))?;
+                .map_err(|problem| SceneError::view(&path, &name, problem))?;
         views.push(PosedImage {
             name,
             image,
@@ -92,20 +90,12 @@ fn parse(
             size: None,
         });
     }
-    views.sort_by(|a, b| a.name.cmp(&b.name));
-
-    let pixel_center = read_pixel_center(&mut npz, &path)?;
-    let original_from_world = similarity_of(
-        &path,
-        &original_from_world.unwrap_or_else(Matrix4::identity),
-    )?;
+    let original_from_world = original_from_world.unwrap_or_else(Matrix4::identity);
     Ok(Poses {
-        path,
-        views,
-        original_from_world,
-        pixel_center,
-        points: Vec::new(),
+        pixel_center: read_pixel_center(&mut npz, &path)?,
+        original_from_world: similarity_of(&path, &original_from_world)?,
         declared_radius: Some(DECLARED_RADIUS),
+        ..Poses::new(&path, views)?
     })
 }
 

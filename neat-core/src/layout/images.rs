@@ -8,6 +8,12 @@ use std::{fs, io};
 /// The endings of the images that are read.
 pub(super) const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
 
+/// The first of these files of the folder `dir` that is there.
+pub(super) fn first_of(dir: &Path, names: &[&str]) -> Option<PathBuf> {
+    let mut paths = names.iter().map(|name| dir.join(name));
+    paths.find(|path| path.is_file())
+}
+
 /// The first file by name in `dir` with this ending. Hidden files do not count,
 /// nor do the files of a folder that cannot be read.
 pub(super) fn first_with_ending(dir: &Path, ending: &str) -> Option<PathBuf> {
@@ -70,10 +76,7 @@ pub(super) type ReadSize = fn(&Path) -> Result<(u32, u32), SceneError>;
 
 /// The error about an image that is not there.
 pub(super) fn missing(path: &Path) -> SceneError {
-    SceneError::Missing {
-        path: path.into(),
-        remedy: REMEDY.into(),
-    }
+    SceneError::missing(path, REMEDY)
 }
 
 /// Width and height, from the first bytes of an image.
@@ -166,10 +169,7 @@ pub(super) fn decode_rgb(
     let is_jpeg = image::guess_format(bytes).is_ok_and(|format| format == ImageFormat::Jpeg);
     if is_jpeg && !jpeg_is_complete(bytes) {
         let error = io::Error::new(io::ErrorKind::UnexpectedEof, "the file is truncated");
-        return Err(SceneError::Image {
-            path: path.into(),
-            source: ImageError::IoError(error),
-        });
+        return Err(SceneError::image(path, ImageError::IoError(error)));
     }
     let image = image_file::decode(bytes, path, u32::MAX)?;
     if image.color().has_alpha() {

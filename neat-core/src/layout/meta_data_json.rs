@@ -12,9 +12,8 @@
 //! are undistorted. Other keys, such as `scene_box`, are ignored.
 
 use super::images;
-use super::poses::{PosedImage, Poses, malformed, similarity_of, view_error};
+use super::poses::{PosedImage, Poses, similarity_of};
 use crate::hawp_json::file_stem;
-use crate::scene::check_names;
 use crate::{Distortion, Intrinsics, SceneError, Similarity, file};
 use nalgebra::Matrix4;
 use serde::Deserialize;
@@ -57,16 +56,12 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
 }
 
 fn parse(bytes: &[u8], path: &Path, dirs: &[PathBuf]) -> Result<Poses, SceneError> {
-    let json: MetaData = serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
-        path: path.into(),
-        format: "sdfstudio scene",
-        source,
-    })?;
+    let json: MetaData = file::parse_json(bytes, path, "sdfstudio scene")?;
     if let Some(model) = &json.camera_model
         && !PINHOLES.contains(&model.to_uppercase().as_str())
     {
         let reason = format!("its camera model `{model}` is not read: undistort the images first");
-        return Err(malformed(path, reason));
+        return Err(SceneError::malformed(path, reason));
     }
     // `From` takes the inner arrays for columns.
     let original_from_world = json.worldtogt.map_or(Ok(Similarity::identity()), |rows| {
@@ -85,15 +80,9 @@ fn parse(bytes: &[u8], path: &Path, dirs: &[PathBuf]) -> Result<Poses, SceneErro
             name,
         });
     }
-    views.sort_by(|a, b| a.name.cmp(&b.name));
-    check_names(views.iter().map(|view| view.name.as_str()), path)?;
     Ok(Poses {
-        path: path.into(),
-        views,
         original_from_world,
-        pixel_center: None,
-        points: Vec::new(),
-        declared_radius: None,
+        ..Poses::new(path, views)?
     })
 }
 
@@ -102,10 +91,10 @@ fn intrinsics(frame: &Frame, path: &Path, name: &str) -> Result<Intrinsics, Scen
     let side = rows.len();
     if !(3..=4).contains(&side) || rows.iter().any(|row| row.len() != side) {
         let reason = format!("the `intrinsics` of view `{name}` are not 3×3 or 4×4 numbers");
-        return Err(malformed(path, reason));
+        return Err(SceneError::malformed(path, reason));
     }
     let k = nalgebra::Matrix3::from_fn(|row, column| rows[row][column]);
-    Intrinsics::try_from_matrix(&k).map_err(|problem| view_error(path, name, problem))
+    Intrinsics::try_from_matrix(&k).map_err(|problem| SceneError::view(path, name, problem))
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ pub mod cameras_json;
 pub mod colmap;
 pub mod dtu;
 mod images;
-mod links;
+mod input_files;
 mod load;
 mod load_options;
 mod masks;
@@ -29,6 +29,7 @@ mod sphere;
 pub mod strecha;
 mod text_lines;
 pub mod transforms_json;
+mod view_reader;
 mod warning;
 
 pub use abc::HAWP_DIR;
@@ -116,10 +117,7 @@ impl Layout {
             });
         }
         if !dir.is_dir() {
-            return Err(SceneError::Missing {
-                path: dir.into(),
-                remedy: remedy.into(),
-            });
+            return Err(SceneError::missing(dir, remedy));
         }
         for npz_path in dtu::candidates(dir) {
             if npz_path.exists() {

@@ -21,7 +21,7 @@
 //! of most cameras is read, of several the first.
 
 use super::images::{self, ReadSize};
-use super::poses::{PosedImage, Poses, malformed, pose_of, rotation_of};
+use super::poses::{PosedImage, Poses, pose_of, rotation_of};
 use super::reconstruction::Reconstruction;
 use super::text_lines::{Line, Records, expected_records};
 use crate::hawp_json::file_stem;
@@ -133,7 +133,7 @@ fn parse(
                     "a point was measured in image {view}, but its model has {} images",
                     principal_points.len()
                 );
-                return Err(malformed(path, reason));
+                return Err(SceneError::malformed(path, reason));
             };
             let pixel = principal_point + Vector2::from(measurement);
             observations.push(Observation { view, pixel });

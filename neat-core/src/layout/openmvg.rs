@@ -19,7 +19,7 @@
 //! Other members are ignored.
 
 use super::images;
-use super::poses::{PosedImage, Poses, malformed, pose_of};
+use super::poses::{PosedImage, Poses, pose_of};
 use super::reconstruction::Reconstruction;
 use crate::hawp_json::file_stem;
 use crate::{Distortion, Intrinsics, Observation, SceneError, SparsePoint, file};
@@ -96,8 +96,7 @@ struct Feature {
 
 /// The file of this layout in the folder `dir`, where there is one.
 pub(super) fn find(dir: &Path) -> Option<PathBuf> {
-    let mut paths = FILE_NAMES.iter().map(|name| dir.join(name));
-    paths.find(|path| path.is_file())
+    images::first_of(dir, &FILE_NAMES)
 }
 
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
@@ -107,11 +106,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
 }
 
 fn parse(bytes: &[u8], path: &Path, dirs: &[PathBuf]) -> Result<Poses, SceneError> {
-    let json: SfmData = serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
-        path: path.into(),
-        format: "OpenMVG scene",
-        source,
-    })?;
+    let json: SfmData = file::parse_json(bytes, path, "OpenMVG scene")?;
     let mut types = BTreeMap::new();
     let views = objects(json.views, &mut types);
     let intrinsics = objects(json.intrinsics, &mut types);
@@ -299,7 +294,7 @@ impl Context<'_> {
     }
 
     fn error(&self, reason: &str) -> SceneError {
-        malformed(self.path, format!("view {} {reason}", self.key))
+        SceneError::malformed(self.path, format!("view {} {reason}", self.key))
     }
 }
 

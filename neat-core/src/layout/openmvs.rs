@@ -17,7 +17,7 @@
 
 use super::binary_reader::BinaryReader;
 use super::images::{self, ReadSize};
-use super::poses::{PosedImage, Poses, malformed, pose_of, view_error};
+use super::poses::{PosedImage, Poses, pose_of};
 use super::reconstruction::Reconstruction;
 use crate::hawp_json::file_stem;
 use crate::{Camera, Distortion, Intrinsics, Observation, SceneError, SparsePoint, file};
@@ -134,12 +134,12 @@ fn version(reader: &mut BinaryReader, path: &Path) -> Result<u32, SceneError> {
         let reason = "it does not start with MVSI: it is a project of OpenMVS and not in its \
                       interface format, or no scene; export the cameras again with an \
                       `Interface…` program of OpenMVS";
-        return Err(malformed(path, reason.into()));
+        return Err(SceneError::malformed(path, reason));
     }
     let version = reader.u32(what)?;
     if !VERSIONS.contains(&version) {
         let reason = format!("it is of version {version}, but only 1 to 7 are known");
-        return Err(malformed(path, reason));
+        return Err(SceneError::malformed(path, reason));
     }
     let _reserved = reader.u32(what)?;
     Ok(version)
@@ -248,7 +248,7 @@ fn posed_image(
     let pose = platform.and_then(|platform| platform.poses.get(image.pose as usize));
     let (Some(camera), Some(pose)) = (camera, pose) else {
         let reason = format!("view `{name}` names a camera or a pose that is not in the file");
-        return Err(malformed(path, reason));
+        return Err(SceneError::malformed(path, reason));
     };
     let size = camera.size.map_or_else(|| size_of(&located), Ok)?;
     let pixels = match camera.size {
@@ -257,7 +257,7 @@ fn posed_image(
     };
     let scale = Matrix3::from_diagonal(&Vector3::new(pixels, pixels, 1.0));
     let intrinsics = Intrinsics::try_from_matrix(&(scale * camera.k))
-        .map_err(|problem| view_error(path, &name, problem))?;
+        .map_err(|problem| SceneError::view(path, &name, problem))?;
     // From the world to the platform, then to the camera on it.
     let rotation = camera.mount.rotation * pose.rotation;
     let center = pose.rotation.tr_mul(&camera.mount.center) + pose.center;

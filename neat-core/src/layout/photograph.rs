@@ -2,7 +2,7 @@
 //! run has kept of that.
 
 use super::images;
-use super::poses::{PosedImage, view_error};
+use super::poses::PosedImage;
 use super::rectify::Rectification;
 use crate::file_cache::{CacheKey, FileCache};
 use crate::{ImageStore, SceneError, ViewImage};
@@ -14,9 +14,11 @@ const KIND: &str = "undistorted";
 /// To be raised whenever the same photograph and lens give another image.
 const VERSION: u32 = 1;
 
-/// An image, and why it is not in the cache though it should be.
+/// An image, whether it was in the cache, and why it is not there now though it should
+/// be.
 pub(super) struct Photograph<Image = RgbImage> {
     pub image: Image,
+    pub was_cached: bool,
     pub not_cached: Option<SceneError>,
 }
 
@@ -37,6 +39,7 @@ impl Photograph {
     ) -> Result<Photograph<ViewImage>, SceneError> {
         Ok(Photograph {
             image: store.keep(&posed.name, self.image)?,
+            was_cached: self.was_cached,
             not_cached: self.not_cached,
         })
     }
@@ -59,32 +62,26 @@ pub(super) fn read(
         let photograph = images::decode_rgb(&bytes, &posed.image, background)?;
         rectification
             .image(photograph)
-            .map_err(|problem| view_error(&posed.image, &posed.name, problem))
+            .map_err(|problem| SceneError::view(&posed.image, &posed.name, problem))
     };
-    let cache = cache.filter(|_| rectification.lens().is_some());
-    let Some(cache) = cache else {
-        return Ok(Photograph {
-            image: rectify()?,
-            not_cached: None,
-        });
+    let photograph = |image, was_cached, not_cached| Photograph {
+        image,
+        was_cached,
+        not_cached,
     };
-
+    let Some(cache) = cache.filter(|_| rectification.lens().is_some()) else {
+        return Ok(photograph(rectify()?, false, None));
+    };
     let key = key(&bytes, rectification, background);
     if let Some(image) = cached(cache, &key, rectification.size()) {
-        return Ok(Photograph {
-            image,
-            not_cached: None,
-        });
+        return Ok(photograph(image, true, None));
     }
     let image = rectify()?;
     let not_cached = png(&image)
-        .map_err(|source| SceneError::Image {
-            path: cache.dir().into(),
-            source,
-        })
+        .map_err(|source| SceneError::image(cache.dir(), source))
         .and_then(|png| cache.put(&key, &png))
         .err();
-    Ok(Photograph { image, not_cached })
+    Ok(photograph(image, false, not_cached))
 }
 
 /// The key of the image that `rectification` makes of the file `bytes`.

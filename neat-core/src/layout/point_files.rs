@@ -1,5 +1,6 @@
 //! Sparse points in a file beside the poses, for layouts that hold none.
 
+use super::images;
 use crate::ply::read_points;
 use crate::{Camera, SceneError, Similarity, SparsePoint};
 use nalgebra::Vector3;
@@ -18,10 +19,7 @@ pub(super) fn read(
     original_from_world: &Similarity,
     is_mirrored: bool,
 ) -> Result<Vec<SparsePoint>, SceneError> {
-    let Some(path) = (FILES.iter())
-        .map(|name| dir.join(name))
-        .find(|path| path.is_file())
-    else {
+    let Some(path) = images::first_of(dir, &FILES) else {
         return Ok(Vec::new());
     };
     let mut as_written = read_points(&path)?;
@@ -33,15 +31,12 @@ pub(super) fn read(
     let world_from_original = original_from_world.inverse();
     let from_original = |point: &Vector3<f64>| world_from_original.apply(point);
     let moved: Vec<_> = as_written.iter().map(from_original).collect();
-    let positions = match times_seen(cameras, &moved) >= times_seen(cameras, &as_written) {
-        true => moved,
-        false => as_written,
+    let positions = if times_seen(cameras, &moved) >= times_seen(cameras, &as_written) {
+        moved
+    } else {
+        as_written
     };
-    let point = |position_in_world| SparsePoint {
-        position_in_world,
-        observations: Vec::new(),
-    };
-    Ok(positions.into_iter().map(point).collect())
+    Ok(positions.into_iter().map(SparsePoint::unseen).collect())
 }
 
 /// How often the cameras see one of some thousand points.

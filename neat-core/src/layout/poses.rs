@@ -1,7 +1,8 @@
 //! What every layout says about its images: file, intrinsics and pose.
 
 use crate::npz::{NpyArray, NpzReader};
-use crate::{CameraError, Distortion, Intrinsics, SceneError, Similarity, SparsePoint, ViewError};
+use crate::scene::{check_names, keep_observations};
+use crate::{CameraError, Distortion, Intrinsics, SceneError, Similarity, SparsePoint};
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 
@@ -21,6 +22,33 @@ pub(super) struct Poses {
     /// Radius of the ball around the origin that holds the object, where the
     /// layout's world is made so.
     pub declared_radius: Option<f64>,
+}
+
+impl Poses {
+    /// What the file at `path` says about its images alone. They are sorted by name,
+    /// and the world is the frame of the file.
+    ///
+    /// # Errors
+    /// If a name appears twice or is no file name.
+    pub fn new(path: &Path, mut views: Vec<PosedImage>) -> Result<Self, SceneError> {
+        views.sort_by(|a, b| a.name.cmp(&b.name));
+        check_names(views.iter().map(|view| view.name.as_str()), path)?;
+        Ok(Self {
+            path: path.into(),
+            views,
+            original_from_world: Similarity::identity(),
+            pixel_center: None,
+            points: Vec::new(),
+            declared_radius: None,
+        })
+    }
+
+    /// Leaves the views that are `kept`; points lose what the others observed.
+    pub fn retain_views(&mut self, kept: &[bool]) {
+        keep_observations(&mut self.points, kept);
+        let mut kept = kept.iter();
+        self.views.retain(|_| kept.next() == Some(&true));
+    }
 }
 
 /// An image on disk with its camera.
@@ -92,10 +120,10 @@ fn read_number(
     }
     match npz.array(name)?.values.as_slice() {
         [value] if is_good(*value) => Ok(Some(*value)),
-        other => Err(SceneError::Malformed {
-            path: path.into(),
-            reason: format!("`{name}` holds {other:?}, not {expected}"),
-        }),
+        other => Err(SceneError::malformed(
+            path,
+            format!("`{name}` holds {other:?}, not {expected}"),
+        )),
     }
 }
 
@@ -117,23 +145,6 @@ pub(super) fn check_counts(
     })
 }
 
-/// A problem of one view, with the file that it is in.
-pub(super) fn view_error(path: &Path, view: &str, problem: impl Into<ViewError>) -> SceneError {
-    SceneError::View {
-        path: path.into(),
-        view: view.into(),
-        problem: problem.into(),
-    }
-}
-
-/// A file that breaks the rules of its format.
-pub(super) fn malformed(path: &Path, reason: String) -> SceneError {
-    SceneError::Malformed {
-        path: path.into(),
-        reason,
-    }
-}
-
 /// The rotation of a quaternion w, x, y, z of any length, as file and view have it.
 pub(super) fn rotation_of(
     quaternion: [f64; 4],
@@ -142,14 +153,14 @@ pub(super) fn rotation_of(
 ) -> Result<UnitQuaternion<f64>, SceneError> {
     let [w, x, y, z] = quaternion;
     if quaternion.iter().any(|x| !x.is_finite()) {
-        return Err(view_error(path, view, CameraError::NotFinite));
+        return Err(SceneError::view(path, view, CameraError::NotFinite));
     }
     let quaternion = Quaternion::new(w, x, y, z);
     // Not zero, and neither so small nor so large that it cannot be divided by.
     if !quaternion.norm().is_normal() {
         let reason =
             format!("the quaternion ({w}, {x}, {y}, {z}) of view `{view}` is not a rotation");
-        return Err(malformed(path, reason));
+        return Err(SceneError::malformed(path, reason));
     }
     Ok(UnitQuaternion::from_quaternion(quaternion))
 }
@@ -205,12 +216,9 @@ pub(super) fn similarity_of(path: &Path, matrix: &Matrix4<f64>) -> Result<Simila
     };
     let deviation = (similarity.matrix() - matrix).amax();
     if similarity.scale <= 0.0 || deviation > 1e-5 * similarity.scale {
-        return Err(SceneError::Malformed {
-            path: path.into(),
-            reason:
-                "its scale matrix is not a positive scale, the same for all axes, and a translation"
-                    .into(),
-        });
+        let reason =
+            "its scale matrix is not a positive scale, the same for all axes, and a translation";
+        return Err(SceneError::malformed(path, reason));
     }
     Ok(similarity)
 }

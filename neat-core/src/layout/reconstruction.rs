@@ -1,9 +1,8 @@
 //! What structure from motion writes: posed images under the numbers of its
 //! files, and points with the numbers of the images that saw them.
 
-use super::poses::{PosedImage, Poses, malformed, view_error};
-use crate::scene::check_names;
-use crate::{CameraError, Distortion, Observation, SceneError, Similarity, SparsePoint};
+use super::poses::{PosedImage, Poses};
+use crate::{Observation, SceneError, SparsePoint};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -34,16 +33,18 @@ impl Reconstruction {
         let mut views = Vec::with_capacity(self.views.len());
         for (index, (number, mut view)) in self.views.into_iter().enumerate() {
             if index_of.insert(number, index).is_some() {
-                return Err(malformed(&path, format!("image {number} appears twice")));
+                return Err(SceneError::malformed(
+                    &path,
+                    format!("image {number} appears twice"),
+                ));
             }
             let lens = view.intrinsics.validate();
-            let lens = lens.and_then(|()| check_finite(&view.distortion));
-            lens.map_err(|problem| view_error(&path, &view.name, problem))?;
-            view.distortion = simplest(view.distortion);
+            let lens = lens.and_then(|()| view.distortion.validate());
+            lens.map_err(|problem| SceneError::view(&path, &view.name, problem))?;
+            view.distortion = view.distortion.simplest();
             views.push(view);
         }
-        check_names(views.iter().map(|view| view.name.as_str()), &path)?;
-
+        let poses = Poses::new(&path, views)?;
         for point in &mut self.points {
             let seen = point.observations.iter();
             let mut numbers = point
@@ -51,7 +52,7 @@ impl Reconstruction {
                 .iter()
                 .chain(seen.flat_map(|seen| &seen.pixel));
             if numbers.any(|x| !x.is_finite()) {
-                return Err(malformed(&path, "a point is not finite".into()));
+                return Err(SceneError::malformed(&path, "a point is not finite"));
             }
             point.observations = (point.observations.iter())
                 .filter_map(|&Observation { view, pixel }| {
@@ -61,51 +62,17 @@ impl Reconstruction {
                 .collect();
         }
         Ok(Poses {
-            path,
-            views,
-            original_from_world: Similarity::identity(),
             pixel_center: Some(self.pixel_center),
             points: self.points,
-            declared_radius: None,
+            ..poses
         })
     }
-}
-
-/// `None` for a lens that does not bend rays.
-pub(super) fn simplest(distortion: Distortion) -> Distortion {
-    match distortion.is_none() {
-        true => Distortion::None,
-        false => distortion,
-    }
-}
-
-/// Errs if a coefficient of the lens is NaN or infinite.
-pub(super) fn check_finite(distortion: &Distortion) -> Result<(), CameraError> {
-    let all = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
-    let finite = match distortion {
-        Distortion::None => true,
-        Distortion::Brown { radial, tangential } => all(radial) && all(tangential),
-        Distortion::Fisheye {
-            radial,
-            tangential,
-            thin_prism,
-        } => all(radial) && all(tangential) && all(thin_prism),
-        Distortion::ThinPrismFisheye {
-            radial,
-            tangential,
-            thin_prism,
-        } => all(radial) && all(tangential) && all(thin_prism),
-        Distortion::Fov { omega } => omega.is_finite(),
-        Distortion::ReverseRadial { k } | Distortion::Division { k } => k.is_finite(),
-        Distortion::ExtendedUnified { alpha, beta } => all(&[*alpha, *beta]),
-    };
-    finite.then_some(()).ok_or(CameraError::NotFinite)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Intrinsics;
+    use crate::{Distortion, Intrinsics};
     use nalgebra::{Matrix4, Vector2, Vector3};
 
     fn view(name: &str) -> PosedImage {

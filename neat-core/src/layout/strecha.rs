@@ -12,11 +12,10 @@
 //! documented.
 
 use super::images;
-use super::poses::{PosedImage, Poses, malformed, pose_of, view_error};
+use super::poses::{PosedImage, Poses, pose_of};
 use super::text_lines::expected_records;
 use crate::hawp_json::file_stem;
-use crate::scene::check_names;
-use crate::{Distortion, Intrinsics, SceneError, Similarity, file};
+use crate::{Distortion, Intrinsics, SceneError, file};
 use nalgebra::{Matrix3, Vector3};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -47,26 +46,14 @@ fn camera_files(dir: &Path) -> Vec<PathBuf> {
 
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     let Some(cameras_dir) = find(dir) else {
-        return Err(SceneError::Missing {
-            path: dir.join(CAMERAS_DIRS[0]),
-            remedy: REMEDY.into(),
-        });
+        return Err(SceneError::missing(&dir.join(CAMERAS_DIRS[0]), REMEDY));
     };
     let dirs = [dir.join("images"), cameras_dir.clone(), dir.into()];
     let mut views = Vec::new();
     for path in camera_files(&cameras_dir) {
         views.push(parse(&file::read(&path, REMEDY)?, &path, &dirs)?);
     }
-    views.sort_by(|a, b| a.name.cmp(&b.name));
-    check_names(views.iter().map(|view| view.name.as_str()), &cameras_dir)?;
-    Ok(Poses {
-        path: cameras_dir,
-        views,
-        original_from_world: Similarity::identity(),
-        pixel_center: None,
-        points: Vec::new(),
-        declared_radius: None,
-    })
+    Poses::new(&cameras_dir, views)
 }
 
 fn parse(bytes: &[u8], path: &Path, dirs: &[PathBuf]) -> Result<PosedImage, SceneError> {
@@ -89,10 +76,10 @@ fn parse(bytes: &[u8], path: &Path, dirs: &[PathBuf]) -> Result<PosedImage, Scen
     let name = file_stem(&image);
     if distortion != [0.0; 3] {
         let reason = format!("view `{name}` has lens distortion: undistort the images first");
-        return Err(malformed(path, reason));
+        return Err(SceneError::malformed(path, reason));
     }
-    let intrinsics =
-        Intrinsics::try_from_matrix(&k).map_err(|problem| view_error(path, &name, problem))?;
+    let intrinsics = Intrinsics::try_from_matrix(&k)
+        .map_err(|problem| SceneError::view(path, &name, problem))?;
     Ok(PosedImage {
         name,
         image,

@@ -1,6 +1,5 @@
 //! Text files of lines with fields between white space.
 
-use super::poses::malformed;
 use crate::SceneError;
 use std::path::Path;
 use std::str::FromStr;
@@ -54,7 +53,7 @@ impl<'a> Line<'a> {
             .owner
             .as_deref()
             .map_or(String::new(), |owner| format!(", {owner}"));
-        malformed(self.path, format!("line {}{owner}: {reason}", self.number))
+        SceneError::malformed(self.path, format!("line {}{owner}: {reason}", self.number))
     }
 }
 
@@ -73,7 +72,7 @@ pub(super) fn lines<'a>(
     bytes: &'a [u8],
 ) -> Result<impl Iterator<Item = Line<'a>>, SceneError> {
     let text = std::str::from_utf8(bytes)
-        .map_err(|error| malformed(path, format!("it is not UTF-8 text: {error}")))?;
+        .map_err(|error| SceneError::malformed(path, format!("it is not UTF-8 text: {error}")))?;
     Ok((1..).zip(text.lines()).map(move |(number, rest)| Line {
         path,
         number,
@@ -114,6 +113,6 @@ impl<'a, I: Iterator<Item = Line<'a>>> Records<'a, I> {
     /// The next record, which is `what`.
     pub fn expect(&mut self, what: &str) -> Result<Line<'a>, SceneError> {
         self.next()
-            .ok_or_else(|| malformed(self.path, format!("it ends before {what}")))
+            .ok_or_else(|| SceneError::malformed(self.path, format!("it ends before {what}")))
     }
 }

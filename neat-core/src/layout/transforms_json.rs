@@ -18,12 +18,10 @@
 mod lens;
 
 use super::images::{self, ENDINGS, has_known_ending, read_size, with_existing_ending};
-use super::poses::{PosedImage, Poses, upper_left, view_error};
-use super::reconstruction::{check_finite, simplest};
+use super::poses::{PosedImage, Poses, upper_left};
 use crate::hawp_json::file_stem;
 use crate::ply::read_points;
-use crate::scene::check_names;
-use crate::{SceneError, Similarity, SparsePoint, file};
+use crate::{SceneError, SparsePoint, file};
 use nalgebra::Matrix4;
 use serde::Deserialize;
 use std::path::{Component, Path, PathBuf};
@@ -79,8 +77,7 @@ struct Lens {
 
 /// The file of this layout in the folder `dir`, where there is one.
 pub(super) fn find(dir: &Path) -> Option<PathBuf> {
-    let mut paths = FILE_NAMES.iter().map(|name| dir.join(name));
-    paths.find(|path| path.exists())
+    images::first_of(dir, &FILE_NAMES)
 }
 
 pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
@@ -90,12 +87,7 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
 }
 
 fn parse(bytes: &[u8], path: PathBuf, dir: &Path) -> Result<Poses, SceneError> {
-    let json: TransformsJson =
-        serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
-            path: path.clone(),
-            format: "list of transforms",
-            source,
-        })?;
+    let json: TransformsJson = file::parse_json(bytes, &path, "list of transforms")?;
     if json.frames.is_empty() {
         return Err(SceneError::NoView { path });
     }
@@ -116,18 +108,13 @@ fn parse(bytes: &[u8], path: PathBuf, dir: &Path) -> Result<Poses, SceneError> {
         Some(value) if [0.0, 0.5].contains(&value) => Some(value),
         Some(value) => {
             let reason = format!("`pixel_center` is {value}, not 0 or 0.5");
-            return Err(SceneError::Malformed { path, reason });
+            return Err(SceneError::malformed(&path, reason));
         }
     };
-    views.sort_by(|a, b| a.name.cmp(&b.name));
-    check_names(views.iter().map(|view| view.name.as_str()), &path)?;
     Ok(Poses {
         points: sparse_points(&path, dir, json.ply_file_path.as_deref())?,
-        path,
-        views,
-        original_from_world: Similarity::identity(),
         pixel_center,
-        declared_radius: None,
+        ..Poses::new(&path, views)?
     })
 }
 
@@ -145,11 +132,7 @@ fn sparse_points(
         return Ok(Vec::new());
     }
     let positions = read_points(&points_path)?.into_iter();
-    let points = positions.map(|position_in_world| SparsePoint {
-        position_in_world,
-        observations: Vec::new(),
-    });
-    Ok(points.collect())
+    Ok(positions.map(SparsePoint::unseen).collect())
 }
 
 /// A frame with what its file says about all frames.
@@ -170,13 +153,13 @@ impl FrameContext<'_> {
         let intrinsics = self.intrinsics(size, &image)?;
         intrinsics
             .validate()
-            .and_then(|()| check_finite(&distortion))
-            .map_err(|problem| view_error(self.path, &name, problem))?;
+            .and_then(|()| distortion.validate())
+            .map_err(|problem| SceneError::view(self.path, &name, problem))?;
         Ok(PosedImage {
             name,
             image,
             intrinsics,
-            distortion: simplest(distortion),
+            distortion: distortion.simplest(),
             world_from_camera,
             size,
         })
@@ -188,10 +171,8 @@ impl FrameContext<'_> {
     }
 
     fn error(&self, reason: impl std::fmt::Display) -> SceneError {
-        SceneError::Malformed {
-            path: self.path.into(),
-            reason: format!("frame `{}` {reason}", self.frame.file_path),
-        }
+        let reason = format!("frame `{}` {reason}", self.frame.file_path);
+        SceneError::malformed(self.path, reason)
     }
 
     /// The pose in OpenCV axes: y and z of the camera change their signs. What
@@ -309,6 +290,7 @@ fn existing_image(image: PathBuf) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Similarity;
     use crate::mutation::{CASES, damaged};
     use proptest::prelude::*;
 

@@ -6,7 +6,7 @@
 use super::malformed;
 use crate::edge_model::{CubicBezier, EdgeModel, wireframe_of_segments};
 use nalgebra::Vector3;
-use neat_core::{LineSegment3, SceneError};
+use neat_core::{LineSegment3, SceneError, file};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -54,12 +54,7 @@ pub(super) fn is_parametric(bytes: &[u8]) -> bool {
 /// If the text is no such JSON, or the numbers do not make whole segments and
 /// curves.
 pub fn parse_parametric_edges(bytes: &[u8], path: &Path) -> Result<EdgeModel, SceneError> {
-    let json: ParametricEdges =
-        serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
-            path: path.into(),
-            format: "parametric edges",
-            source,
-        })?;
+    let json: ParametricEdges = file::parse_json(bytes, path, "parametric edges")?;
     let flat = |nested: &Nested| {
         let mut numbers = Vec::new();
         nested.flatten(&mut numbers);

@@ -7,7 +7,6 @@ use super::camera_model::CameraModel;
 use super::{ColmapCamera, ColmapImage, ColmapPoint, unknown_model};
 use crate::SceneError;
 use crate::layout::binary_reader::BinaryReader;
-use crate::layout::poses::malformed;
 use std::path::Path;
 
 /// x, y and the number of the 3D point.
@@ -102,7 +101,7 @@ fn records<'a, T>(
     }
     match reader.remaining() {
         0 => Ok(records),
-        bytes => Err(malformed(
+        bytes => Err(SceneError::malformed(
             path,
             format!("{bytes} bytes follow the last {what} of {count}"),
         )),
