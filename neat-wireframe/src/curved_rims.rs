@@ -5,8 +5,8 @@
 //! graph, and results ought to say so.
 
 use crate::Wireframe3d;
-use crate::disjoint_sets::DisjointSets;
 use nalgebra::Vector3;
+use pathfinding::undirected::connected_components::components;
 
 /// Pieces of a curve turn by at least this angle …
 const MIN_TURN_IN_DEGREES: f64 = 5.0;
@@ -48,7 +48,7 @@ pub fn curved_chains(wireframe: &Wireframe3d) -> Vec<bool> {
             turns_of[*edge].push((index, place));
         }
     }
-    let mut runs = DisjointSets::new(turns.len());
+    let mut same_curve: Vec<Vec<usize>> = Vec::new();
     for of_edge in &turns_of {
         let [(first, i), (second, j)] = of_edge[..] else {
             continue;
@@ -57,17 +57,13 @@ pub fn curved_chains(wireframe: &Wireframe3d) -> Vec<bool> {
         // other as its first; a turn walked backwards has the opposite axis.
         let sign = if i == j { -1.0 } else { 1.0 };
         if sign * turns[first].axis.dot(&turns[second].axis) >= MIN_AXIS_COSINE {
-            runs.join(first, second);
+            same_curve.push(vec![first, second]);
         }
     }
-    let mut count = vec![0; turns.len()];
-    for turn in 0..turns.len() {
-        count[runs.first(turn)] += 1;
-    }
     let mut curved = vec![false; wireframe.edges.len()];
-    for (index, turn) in turns.iter().enumerate() {
-        if count[runs.first(index)] >= MIN_TURNS {
-            for edge in turn.edges {
+    for curve in components(&same_curve) {
+        if curve.len() >= MIN_TURNS {
+            for edge in curve.into_iter().flat_map(|turn| turns[turn].edges) {
                 curved[edge] = true;
             }
         }

@@ -43,17 +43,13 @@ pub mod projection;
 pub mod proposals;
 pub mod validity;
 
-mod block_cholesky;
-mod disjoint_sets;
+mod index;
 mod interval_cover;
-mod normal_equations;
 mod observation;
-mod point_grid;
-mod point_index;
 mod segment_ends;
-mod segment_grid;
 mod segment_matching;
 mod signed_distance;
+mod solve;
 mod triangulation;
 mod used_junctions;
 

@@ -1,8 +1,7 @@
 //! Junctions re-estimated from the 2D ends that belong to them.
 
 use crate::ViewObservation;
-use crate::point_grid::GrowingPointGrid;
-use crate::point_index::PointIndex;
+use crate::index::{GrowingPointGrid, PointIndex};
 use crate::projection::{project_in_front, project_with_jacobian};
 use crate::segment_ends::SegmentEnd;
 use nalgebra::{Matrix3, Vector2, Vector3};

@@ -17,10 +17,10 @@
 use super::config::CovarianceConfig;
 use super::detected_ends::{DetectedEnd, Shown};
 use super::noise::{DetectionNoise, NoiseKind};
-use super::sparse_cholesky::{BlockCholesky, BlockMatrix};
 use super::view_correlation::{JunctionView, ViewCorrelation};
 use crate::ViewObservation;
 use crate::projection::project_with_jacobian;
+use crate::solve::{BlockCholesky, Elimination};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
 
@@ -54,7 +54,12 @@ pub(super) fn estimate(
             noise: DetectionNoise::usual(config),
         };
     };
+    let lines = ends.iter().filter_map(|end| match &end.shows {
+        Shown::Lines(edges) => Some(edges),
+        Shown::Junction { .. } => None,
+    });
     let adjustment = Adjustment {
+        elimination: Elimination::new(junctions.len(), lines.flatten().copied()),
         observations,
         ends,
         given: junctions,
@@ -128,6 +133,7 @@ fn as_noise(residuals: &[Residual]) -> Vec<(NoiseKind, f64)> {
 
 /// The problem whose solution is the best estimate.
 struct Adjustment<'a> {
+    elimination: Elimination,
     observations: &'a [ViewObservation],
     ends: &'a [DetectedEnd],
     given: &'a [Vector3<f64>],
@@ -229,22 +235,24 @@ impl Adjustment<'_> {
         junctions: &[Vector3<f64>],
         residuals: &[Residual],
         noise: &DetectionNoise,
-    ) -> Option<(BlockCholesky, Vec<Vector3<f64>>)> {
-        let mut information = BlockMatrix::identity(junctions.len(), self.prior_information);
+    ) -> Option<(BlockCholesky<'_>, Vec<Vector3<f64>>)> {
+        let prior = Matrix3::identity() * self.prior_information;
+        let mut diagonal = vec![prior; junctions.len()];
+        let mut off_diagonal = Vec::new();
         let mut gradient: Vec<Vector3<f64>> = (self.given.iter().zip(junctions))
             .map(|(given, junction)| self.prior_information * (given - junction))
             .collect();
         for residual in residuals.iter().filter(|r| self.is_noise(r, noise)) {
             let weight = residual.share / noise.of(residual.kind).powi(2);
             for (junction, by) in residual.by_junctions.into_iter().flatten() {
-                information.add_diagonal(junction, &(weight * by * by.transpose()));
+                diagonal[junction] += weight * by * by.transpose();
                 gradient[junction] += weight * residual.value * by;
             }
             if let [Some((a, by_a)), Some((b, by_b))] = residual.by_junctions {
-                information.add_pair([a, b], &(weight * by_a * by_b.transpose()));
+                off_diagonal.push(([a, b], weight * by_a * by_b.transpose()));
             }
         }
-        let factor = information.factor()?;
+        let factor = self.elimination.factor(&diagonal, &off_diagonal)?;
         let step = factor.solve(&gradient);
         Some((factor, step))
     }

@@ -34,7 +34,6 @@ mod existence;
 mod expected_views;
 mod noise;
 mod provenance;
-mod sparse_cholesky;
 mod view_correlation;
 
 pub use config::{ConfidenceConfig, CovarianceConfig, ExistenceConfig, ProvenanceConfig};

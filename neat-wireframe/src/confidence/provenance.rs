@@ -7,7 +7,7 @@
 
 use super::config::ProvenanceConfig;
 use crate::ViewObservation;
-use crate::line_tracks::segment_index::SegmentIndex;
+use crate::index::SegmentGrid;
 use crate::metrics::visible_projection;
 use neat_core::{Camera, LineSegment2, LineSegment3};
 use rayon::prelude::*;
@@ -42,7 +42,7 @@ pub(super) struct IndexedView<'a> {
     observation: &'a ViewObservation,
     /// Indices into the observation's segments, in the order of `index`.
     segments: Vec<usize>,
-    index: SegmentIndex,
+    index: SegmentGrid,
 }
 
 impl<'a> IndexedView<'a> {
@@ -58,7 +58,7 @@ impl<'a> IndexedView<'a> {
             .filter(|(_, segment)| segment.length().is_finite() && segment.length() > 0.0)
             .unzip();
         Some(Self {
-            index: SegmentIndex::new(&shapes, camera.width, camera.height),
+            index: SegmentGrid::new(&shapes, camera.width, camera.height),
             observation,
             segments,
         })

@@ -1,7 +1,7 @@
 //! Edges that proposals suggest by attracting their ends to junctions.
 
 use crate::SegmentProposal;
-use crate::point_index::PointIndex;
+use crate::index::PointIndex;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

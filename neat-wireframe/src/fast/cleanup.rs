@@ -2,8 +2,7 @@
 //! isolated.
 
 use crate::evidence::edge_support::SupportedEdge;
-use crate::point_grid::GrowingPointGrid;
-use crate::point_index::PointIndex;
+use crate::index::{GrowingPointGrid, PointIndex};
 use crate::used_junctions::UsedJunctions;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;

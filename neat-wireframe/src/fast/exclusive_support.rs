@@ -6,7 +6,7 @@
 
 use crate::ViewObservation;
 use crate::evidence::edge_support::{EdgeSupportConfig, SupportedEdge};
-use crate::point_index::PointIndex;
+use crate::index::PointIndex;
 use crate::projection::project_in_front;
 use nalgebra::{Vector2, Vector3};
 use neat_core::LineSegment2;

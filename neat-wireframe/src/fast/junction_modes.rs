@@ -1,8 +1,7 @@
 //! Junction candidates: the modes of the density of segment ends, and the
 //! perceived junctions that segment ends support.
 
-use crate::point_grid::{GrowingPointGrid, PointGrid, one_per_cell};
-use crate::point_index::PointIndex;
+use crate::index::{GrowingPointGrid, PointGrid, PointIndex, one_per_cell};
 use crate::segment_ends::SegmentEnd;
 use nalgebra::Vector3;
 use rayon::prelude::*;

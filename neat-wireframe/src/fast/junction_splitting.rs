@@ -12,7 +12,7 @@
 //! apart: most views show only one of the two, so none is asked to show both.
 
 use crate::ViewObservation;
-use crate::point_index::PointIndex;
+use crate::index::PointIndex;
 use crate::projection::project_in_front;
 use crate::triangulation::{JunctionObservation, TriangulationConfig, triangulate};
 use nalgebra::{Matrix3, Vector2, Vector3};

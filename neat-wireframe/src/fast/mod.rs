@@ -452,6 +452,7 @@ impl BackEnd<'_> {
             association_in_pixels,
             &self.config.adjustment,
         )
+        .junctions
     }
 
     /// The edges with support in enough of the views that could see them.

@@ -6,7 +6,7 @@
 
 use super::cleanup::near_segment;
 use crate::evidence::edge_support::SupportedEdge;
-use crate::point_index::PointIndex;
+use crate::index::PointIndex;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};

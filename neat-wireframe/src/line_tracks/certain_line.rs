@@ -54,7 +54,7 @@ impl CertainLine {
             .collect();
         pixels.sort_by(f64::total_cmp);
         let pixel = *pixels.get(pixels.len() / 2)?;
-        let (hessian, _) = normal_equations(views, supports, line, &across, refinement);
+        let (hessian, _) = normal_equations(views, supports, line, &across, refinement.loss());
         let least = (FARTHEST_IN_PIXELS * pixel).powi(-2);
         let covariance = (hessian + Matrix4::identity() * least)
             .cholesky()?

@@ -6,10 +6,10 @@ use super::clustering::view_count;
 use super::junction_graph::{GraphEdge, JunctionGraph};
 use super::line_refinement::{LineRefinementConfig, shown_interval};
 use super::view_segments::{SegmentId, TrackView};
-use crate::disjoint_sets::DisjointSets;
 use crate::projection::project_in_front;
 use nalgebra::Vector2;
 use neat_core::{LineSegment2, LineSegment3};
+use pathfinding::undirected::connected_components::components;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -82,7 +82,7 @@ pub(super) fn split_edges(
     splits.sort_unstable();
     splits.dedup();
 
-    let mut same = DisjointSets::new(graph.junctions.len());
+    let mut same: Vec<Vec<usize>> = Vec::new();
     let mut pieces: Vec<GraphEdge> = Vec::new();
     let mut cut = 0;
     let mut rest = splits.as_slice();
@@ -97,9 +97,17 @@ pub(super) fn split_edges(
         cut += usize::from(!places.is_empty());
         pieces.extend(cut_edge(views, graph, edge, &places, min_views));
     }
+    // The first of those at one place stands for all.
+    let mut first: Vec<usize> = (0..graph.junctions.len()).collect();
+    for place in components(&same) {
+        let smallest = place.iter().copied().min();
+        for junction in place {
+            first[junction] = smallest.unwrap_or(junction);
+        }
+    }
     let mut edges: BTreeMap<[usize; 2], Vec<SegmentId>> = BTreeMap::new();
     for piece in pieces {
-        let [a, b] = piece.junctions.map(|junction| same.first(junction));
+        let [a, b] = piece.junctions.map(|junction| first[junction]);
         if a != b {
             edges
                 .entry([a.min(b), a.max(b)])
@@ -200,7 +208,7 @@ fn inner_places(
     line: &CertainLine,
     splits: &[Split],
     config: &EdgeSplittingConfig,
-    same: &mut DisjointSets,
+    same: &mut Vec<Vec<usize>>,
 ) -> Vec<usize> {
     let mut places: Vec<(f64, usize)> = splits
         .iter()
@@ -217,7 +225,7 @@ fn inner_places(
     places.dedup_by(|later, earlier| {
         let near = (later.0 - earlier.0) * line.length_in_pixels() < config.min_length_in_pixels;
         if near {
-            same.join(later.1, earlier.1);
+            same.push(vec![later.1, earlier.1]);
         }
         near
     });

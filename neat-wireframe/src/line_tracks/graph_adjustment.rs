@@ -4,9 +4,8 @@ use super::junction_graph::{GraphEdge, JunctionGraph};
 use super::projected_line::ProjectedLine;
 use super::track_merging::project_segment;
 use super::view_segments::{TrackView, segment_of};
-use crate::bundle_adjustment::{
-    BundleAdjustmentConfig, EdgeObservation, ObservedEdge, adjust_observed,
-};
+use crate::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, adjust_observed};
+use crate::solve::Cauchy;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -15,8 +14,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GraphAdjustmentConfig {
-    /// Loss and iteration; its association settings play no role here.
-    pub adjustment: BundleAdjustmentConfig,
+    /// Weight of junction-to-end residuals relative to end-to-line ones.
+    pub end_weight: f64,
+    /// Scale of the Cauchy loss.
+    pub cauchy_scale_in_pixels: f64,
     /// Ends of 2D segments this near to a projected junction pull it.
     pub end_distance_in_pixels: f64,
 }
@@ -24,10 +25,8 @@ pub struct GraphAdjustmentConfig {
 impl Default for GraphAdjustmentConfig {
     fn default() -> Self {
         Self {
-            adjustment: BundleAdjustmentConfig {
-                end_weight: 0.3,
-                ..Default::default()
-            },
+            end_weight: 0.3,
+            cauchy_scale_in_pixels: 1.0,
             end_distance_in_pixels: 4.0,
         }
     }
@@ -47,7 +46,13 @@ pub(super) fn adjust_graph(
             observations: observations(views, graph, edge, config),
         })
         .collect();
-    graph.junctions = adjust_observed(&observed, &graph.junctions, &config.adjustment);
+    let loss = Loss {
+        cauchy: Cauchy {
+            scale: config.cauchy_scale_in_pixels,
+        },
+        end_weight: config.end_weight,
+    };
+    graph.junctions = adjust_observed(&observed, &graph.junctions, loss).junctions;
 }
 
 fn observations(

@@ -9,7 +9,7 @@ use super::clustering::{Track, view_count};
 use super::end_joining::{Joining, TrackEnds};
 use super::track_merging::{TrackOfSegment, tracks_of_segments};
 use super::view_segments::{SegmentId, TrackView, VertexEnd};
-use crate::point_index::PointIndex;
+use crate::index::PointIndex;
 use crate::projection::project_in_front;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -3,6 +3,7 @@
 
 use super::projected_line::{LineDistance, ProjectedLine, line_parameter_of_ray};
 use super::view_segments::{SegmentId, TrackView, segment_of};
+use crate::solve::{Cauchy, LeastSquares, Options, minimise};
 use nalgebra::{Matrix3x2, Matrix4, Vector3, Vector4};
 use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};
@@ -39,10 +40,14 @@ impl Default for LineRefinementConfig {
     }
 }
 
-/// Attempts per step to find a damping that lowers the cost.
-const MAX_ATTEMPTS: usize = 6;
-/// A smaller relative decrease of the cost ends the iteration.
-const RELATIVE_TOLERANCE: f64 = 1e-5;
+impl LineRefinementConfig {
+    /// Of the distances in pixels.
+    pub(super) fn loss(&self) -> Cauchy {
+        Cauchy {
+            scale: self.cauchy_scale_in_pixels,
+        }
+    }
+}
 
 /// Levenberg–Marquardt on the distances of the members' ends from the projected
 /// line. The two points that carry the line move across it only: four degrees of
@@ -53,41 +58,80 @@ pub(super) fn refine_line(
     line: &LineSegment3,
     config: &LineRefinementConfig,
 ) -> LineSegment3 {
-    let mut line = *line;
-    let mut cost = total_cost(views, members, &line, config);
-    let mut damping = 1e-3;
-    for _ in 0..config.max_iterations {
-        let Some(across) = directions_across(&line) else {
-            break;
+    let problem = LineProblem {
+        views,
+        members,
+        loss: config.loss(),
+    };
+    let options = Options {
+        max_iterations: config.max_iterations,
+        max_attempts: 6,
+        initial_damping: 1e-3,
+        min_damping: 1e-9,
+        decrease: 0.2,
+        relative_tolerance: 1e-5,
+    };
+    minimise(&problem, *line, &options).0
+}
+
+/// A line and the 2D segments that show it.
+struct LineProblem<'a> {
+    views: &'a [TrackView],
+    members: &'a [SegmentId],
+    loss: Cauchy,
+}
+
+/// The normal equations of a line's two points, each moving across the line.
+struct LineEquations {
+    across: Matrix3x2<f64>,
+    hessian: Matrix4<f64>,
+    gradient: Vector4<f64>,
+}
+
+impl LeastSquares for LineProblem<'_> {
+    type State = LineSegment3;
+    type Equations = LineEquations;
+
+    fn cost(&self, line: &LineSegment3) -> f64 {
+        let of_member = |id: &SegmentId| {
+            let ends = segment_of(self.views, *id).segment.ends();
+            ProjectedLine::new(&self.views[id.view].camera, line).map_or(f64::INFINITY, |line| {
+                let cost = |end| self.loss.cost(line.distance(end));
+                ends.iter().map(cost).sum()
+            })
         };
-        let (hessian, gradient) = normal_equations(views, members, &line, &across, config);
-        let mut accepted = None;
-        for _ in 0..MAX_ATTEMPTS {
-            let damped = hessian + Matrix4::from_diagonal(&hessian.diagonal()) * damping;
-            if let Some(step) = damped.cholesky().map(|factor| factor.solve(&gradient)) {
-                let moved = LineSegment3::new(
-                    line.start - across * step.fixed_rows::<2>(0),
-                    line.end - across * step.fixed_rows::<2>(2),
-                );
-                let moved_cost = total_cost(views, members, &moved, config);
-                if moved_cost < cost {
-                    accepted = Some((moved, moved_cost));
-                    break;
-                }
-            }
-            damping *= 10.0;
-        }
-        let Some((moved, moved_cost)) = accepted else {
-            break;
-        };
-        let converged = cost - moved_cost < RELATIVE_TOLERANCE * cost;
-        (line, cost) = (moved, moved_cost);
-        damping = (0.2 * damping).max(1e-9);
-        if converged {
-            break;
-        }
+        self.members.iter().map(of_member).sum()
     }
-    line
+
+    fn linearise(&self, line: &LineSegment3) -> Option<LineEquations> {
+        let across = directions_across(line)?;
+        let (hessian, gradient) =
+            normal_equations(self.views, self.members, line, &across, self.loss);
+        Some(LineEquations {
+            across,
+            hessian,
+            gradient,
+        })
+    }
+
+    fn step(
+        &self,
+        line: &LineSegment3,
+        equations: &LineEquations,
+        damping: f64,
+    ) -> Option<LineSegment3> {
+        let LineEquations {
+            across,
+            hessian,
+            gradient,
+        } = equations;
+        let damped = hessian + Matrix4::from_diagonal(&hessian.diagonal()) * damping;
+        let step = damped.cholesky()?.solve(gradient);
+        Some(LineSegment3::new(
+            line.start - across * step.fixed_rows::<2>(0),
+            line.end - across * step.fixed_rows::<2>(2),
+        ))
+    }
 }
 
 /// Two unit vectors across a line; `None` for a line without direction.
@@ -98,34 +142,14 @@ pub(super) fn directions_across(line: &LineSegment3) -> Option<Matrix3x2<f64>> {
     Some(Matrix3x2::from_columns(&[first, direction.cross(&first)]))
 }
 
-fn total_cost(
-    views: &[TrackView],
-    members: &[SegmentId],
-    line: &LineSegment3,
-    config: &LineRefinementConfig,
-) -> f64 {
-    let cost = |distance: f64| (distance / config.cauchy_scale_in_pixels).powi(2).ln_1p();
-    members
-        .iter()
-        .map(|id| {
-            let segment = &segment_of(views, *id).segment;
-            ProjectedLine::new(&views[id.view].camera, line).map_or(f64::INFINITY, |line| {
-                segment
-                    .ends()
-                    .iter()
-                    .map(|end| cost(line.distance(end)))
-                    .sum()
-            })
-        })
-        .sum()
-}
-
+/// The normal equations of both points of a line in the frame `across` it, with
+/// the weights of the robust loss.
 pub(super) fn normal_equations(
     views: &[TrackView],
     members: &[SegmentId],
     line: &LineSegment3,
     across: &Matrix3x2<f64>,
-    config: &LineRefinementConfig,
+    loss: Cauchy,
 ) -> (Matrix4<f64>, Vector4<f64>) {
     let mut hessian = Matrix4::zeros();
     let mut gradient = Vector4::zeros();
@@ -141,7 +165,7 @@ pub(super) fn normal_equations(
             } = projected.distance_with_gradient(camera, &end);
             let [start, end] = [by_start, by_end].map(|by_point| across.tr_mul(&by_point));
             let row = Vector4::new(start.x, start.y, end.x, end.y);
-            let robust = 1.0 / (1.0 + (distance / config.cauchy_scale_in_pixels).powi(2));
+            let robust = loss.weight(distance * distance);
             hessian += robust * row * row.transpose();
             gradient += robust * distance * row;
         }

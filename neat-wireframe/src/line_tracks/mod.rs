@@ -40,7 +40,6 @@ mod neighbours;
 mod parallel_edges;
 mod projected_line;
 mod report;
-pub(crate) mod segment_index;
 mod straight_junctions;
 mod track_merging;
 mod view_segments;

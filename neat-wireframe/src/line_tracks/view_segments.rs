@@ -1,8 +1,8 @@
 //! The 2D evidence of one view, ready for geometry: back-projected rays and
 //! planes, shared vertices, and an index of where each segment lies.
 
-use super::segment_index::SegmentIndex;
 use crate::ViewObservation;
+use crate::index::SegmentGrid;
 use nalgebra::{Vector2, Vector3};
 use neat_core::{Camera, LineSegment2, LineSegment3};
 use std::collections::HashMap;
@@ -55,7 +55,7 @@ pub(super) struct TrackView {
     /// the same vertex: that is how 2D wireframes reach this crate.
     pub vertices: Vec<Vec<VertexEnd>>,
     /// Where the segments lie.
-    pub index: SegmentIndex,
+    pub index: SegmentGrid,
 }
 
 impl TrackView {
@@ -111,7 +111,7 @@ impl TrackView {
         let shapes: Vec<LineSegment2> = segments.iter().map(|s| s.segment).collect();
         Self {
             focal_in_pixels: 0.5 * (camera.intrinsics.fx + camera.intrinsics.fy),
-            index: SegmentIndex::new(&shapes, camera.width, camera.height),
+            index: SegmentGrid::new(&shapes, camera.width, camera.height),
             camera,
             segments,
             vertices,

@@ -161,13 +161,14 @@ pub fn adjusted(observations: &[ViewObservation], truth: &Wireframe3d, seed: u64
     let mut wireframe = displaced(truth, seed);
     let passes = config.association_in_pixels.iter();
     for association in passes.chain([&config.final_association_in_pixels]) {
-        wireframe.junctions = bundle_adjust(
+        let adjusted = bundle_adjust(
             observations,
             &wireframe.junctions,
             &wireframe.edges,
             *association,
             &config,
         );
+        wireframe.junctions = adjusted.junctions;
     }
     wireframe
 }

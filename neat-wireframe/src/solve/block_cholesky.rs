@@ -1,11 +1,12 @@
 //! Cholesky decomposition of a sparse symmetric matrix of 3×3 blocks, one row of
-//! blocks per junction.
+//! blocks per junction, and the diagonal of its inverse.
 //!
 //! A wireframe joins a junction to three or four others: eliminated in the order
 //! of least degree, it leaves little fill, and time and memory stay near linear.
 
 use nalgebra::{Cholesky, Const, Matrix3, Vector3};
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// The order of elimination and the places of the blocks. It depends on the
 /// graph alone and serves every matrix over it.
@@ -72,16 +73,15 @@ impl Elimination {
         }
     }
 
-    /// Solves `H x = right` for the matrix with these blocks; several blocks of
-    /// one pair add up. `None` where it is not positive definite.
+    /// Factorises the matrix with these blocks; several blocks of one pair add up.
+    /// `None` where it is not positive definite.
     ///
     /// Every pair must be one of those given to [`Self::new`].
-    pub(crate) fn solve(
+    pub(crate) fn factor(
         &self,
         diagonal: &[Matrix3<f64>],
         off_diagonal: &[OffDiagonal],
-        right: &[Vector3<f64>],
-    ) -> Option<Vec<Vector3<f64>>> {
+    ) -> Option<BlockCholesky<'_>> {
         let mut diagonal: Vec<_> = self.order.iter().map(|i| diagonal[*i]).collect();
         let mut below = vec![Matrix3::zeros(); self.rows.len()];
         for ([a, b], block) in off_diagonal {
@@ -92,44 +92,14 @@ impl Elimination {
                 below[self.find(column, row)] += block.transpose();
             }
         }
-        let factors = self.factorise(&mut diagonal, &mut below)?;
-
-        let mut x: Vec<_> = self.order.iter().map(|i| right[*i]).collect();
-        for column in 0..x.len() {
-            factors[column]
-                .l_dirty()
-                .solve_lower_triangular_mut(&mut x[column]);
-            for entry in self.begins[column]..self.begins[column + 1] {
-                let known = below[entry] * x[column];
-                x[self.rows[entry]] -= known;
-            }
-        }
-        for column in (0..x.len()).rev() {
-            for entry in self.begins[column]..self.begins[column + 1] {
-                let known = below[entry].tr_mul(&x[self.rows[entry]]);
-                x[column] -= known;
-            }
-            factors[column]
-                .l_dirty()
-                .tr_solve_lower_triangular_mut(&mut x[column]);
-        }
-        Some(self.place.iter().map(|place| x[*place]).collect())
-    }
-
-    /// Turns the blocks into those of the factor, column by column.
-    fn factorise(
-        &self,
-        diagonal: &mut [Matrix3<f64>],
-        below: &mut [Matrix3<f64>],
-    ) -> Option<Vec<Cholesky<f64, Const<3>>>> {
-        let mut factors = Vec::with_capacity(diagonal.len());
+        let mut pivots = Vec::with_capacity(diagonal.len());
         for column in 0..diagonal.len() {
-            let factor = diagonal[column].cholesky()?;
-            let entries = self.begins[column]..self.begins[column + 1];
+            let pivot = diagonal[column].cholesky()?;
+            let entries = self.entries(column);
             for entry in entries.clone() {
                 // X Lᵀ = A
                 let mut transposed = below[entry].transpose();
-                factor.l_dirty().solve_lower_triangular_mut(&mut transposed);
+                pivot.l_dirty().solve_lower_triangular_mut(&mut transposed);
                 below[entry] = transposed.transpose();
             }
             for left in entries.clone() {
@@ -141,9 +111,18 @@ impl Elimination {
                     below[target] -= product;
                 }
             }
-            factors.push(factor);
+            pivots.push(pivot);
         }
-        Some(factors)
+        Some(BlockCholesky {
+            elimination: self,
+            pivots,
+            below,
+        })
+    }
+
+    /// The indices of a column's blocks in `rows`.
+    fn entries(&self, column: usize) -> Range<usize> {
+        self.begins[column]..self.begins[column + 1]
     }
 
     /// Where the block in this row and column, both places, is kept.
@@ -151,6 +130,80 @@ impl Elimination {
         let begin = self.begins[column];
         let rows = &self.rows[begin..self.begins[column + 1]];
         begin + rows.partition_point(|other| *other < row)
+    }
+}
+
+/// The factor L of a matrix `L Lᵀ`.
+pub(crate) struct BlockCholesky<'a> {
+    elimination: &'a Elimination,
+    /// The blocks on the diagonal, by place.
+    pivots: Vec<Cholesky<f64, Const<3>>>,
+    /// The blocks below it, as in [`Elimination::rows`].
+    below: Vec<Matrix3<f64>>,
+}
+
+impl BlockCholesky<'_> {
+    /// Solves `H x = right`.
+    pub(crate) fn solve(&self, right: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let Elimination {
+            order, place, rows, ..
+        } = self.elimination;
+        let mut x: Vec<_> = order.iter().map(|i| right[*i]).collect();
+        for (column, pivot) in self.pivots.iter().enumerate() {
+            pivot.l_dirty().solve_lower_triangular_mut(&mut x[column]);
+            for entry in self.elimination.entries(column) {
+                let known = self.below[entry] * x[column];
+                x[rows[entry]] -= known;
+            }
+        }
+        for (column, pivot) in self.pivots.iter().enumerate().rev() {
+            for entry in self.elimination.entries(column) {
+                let known = self.below[entry].tr_mul(&x[rows[entry]]);
+                x[column] -= known;
+            }
+            pivot
+                .l_dirty()
+                .tr_solve_lower_triangular_mut(&mut x[column]);
+        }
+        place.iter().map(|place| x[*place]).collect()
+    }
+
+    /// The blocks of the inverse on its diagonal, by the recursion of Takahashi,
+    /// Fagan and Chen (1973): it needs the inverse only where the factor has blocks.
+    pub(crate) fn inverse_diagonal(&self) -> Vec<Matrix3<f64>> {
+        let Elimination { place, rows, .. } = self.elimination;
+        let mut diagonal = vec![Matrix3::zeros(); self.pivots.len()];
+        let mut below = vec![Matrix3::zeros(); rows.len()];
+        for (column, pivot) in self.pivots.iter().enumerate().rev() {
+            let entries = self.elimination.entries(column);
+            // The column of the factor with the identity on its diagonal.
+            let unit: Vec<Matrix3<f64>> = (self.below[entries.clone()].iter())
+                .map(|block| {
+                    let mut transposed = block.transpose();
+                    pivot
+                        .l_dirty()
+                        .tr_solve_lower_triangular_mut(&mut transposed);
+                    transposed.transpose()
+                })
+                .collect();
+            let rows = &rows[entries.clone()];
+            let mut own = pivot.inverse();
+            for (i, row) in rows.iter().enumerate() {
+                let mut block = -diagonal[*row] * unit[i];
+                for (j, other) in rows.iter().enumerate() {
+                    // What hangs on the column hangs together: the block exists.
+                    if other < row {
+                        block -= below[self.elimination.find(*row, *other)] * unit[j];
+                    } else if other > row {
+                        block -= below[self.elimination.find(*other, *row)].tr_mul(&unit[j]);
+                    }
+                }
+                own -= unit[i].tr_mul(&block);
+                below[entries.start + i] = block;
+            }
+            diagonal[column] = 0.5 * (own + own.transpose());
+        }
+        place.iter().map(|place| diagonal[*place]).collect()
     }
 }
 
@@ -211,18 +264,25 @@ mod tests {
     }
 
     #[test]
-    fn the_solution_is_that_of_the_full_matrix() {
-        let pairs = graph(7);
-        let example = example(49, &pairs);
-        let mut noise = Noise(5);
-        let right: Vec<_> = (0..49).map(|_| noise.vector()).collect();
-        let solution = Elimination::new(49, pairs.into_iter())
-            .solve(&example.diagonal, &example.off_diagonal, &right)
-            .unwrap();
-        let flat = DVector::from_iterator(147, right.iter().flatten().copied());
-        let expected = example.full.cholesky().unwrap().solve(&flat);
-        for (i, x) in solution.iter().enumerate() {
-            assert!((x - expected.fixed_rows::<3>(3 * i)).norm() < 1e-9 * expected.norm());
+    fn solution_and_inverse_are_those_of_the_full_matrix() {
+        for (junctions, pairs) in [(49, graph(7)), (2, vec![[1, 0]]), (1, Vec::new())] {
+            let example = example(junctions, &pairs);
+            let inverse = example.full.try_inverse().unwrap();
+            let mut noise = Noise(5);
+            let right: Vec<_> = (0..junctions).map(|_| noise.vector()).collect();
+            let flat = DVector::from_iterator(3 * junctions, right.iter().flatten().copied());
+            let expected = &inverse * flat;
+            let elimination = Elimination::new(junctions, pairs.into_iter());
+            let factor = elimination
+                .factor(&example.diagonal, &example.off_diagonal)
+                .unwrap();
+            for (i, x) in factor.solve(&right).iter().enumerate() {
+                assert!((x - expected.fixed_rows::<3>(3 * i)).norm() < 1e-9 * expected.norm());
+            }
+            for (i, block) in factor.inverse_diagonal().iter().enumerate() {
+                let expected = inverse.fixed_view::<3, 3>(3 * i, 3 * i);
+                assert!((block - expected).norm() < 1e-9 * inverse.norm());
+            }
         }
     }
 
@@ -241,15 +301,15 @@ mod tests {
         let elimination = Elimination::new(2, [[0, 1]].into_iter());
         let coupling = [([0, 1], Matrix3::identity() * 2.0)];
         let identity = [Matrix3::identity(); 2];
+        assert!(elimination.factor(&identity, &coupling).is_none());
         let right = [Vector3::x(); 2];
-        assert_eq!(elimination.solve(&identity, &coupling, &right), None);
-        assert_eq!(
-            elimination.solve(&identity, &[], &right),
-            Some(right.to_vec())
-        );
+        let factor = elimination.factor(&identity, &[]).unwrap();
+        assert_eq!(factor.solve(&right), right);
+        assert_eq!(factor.inverse_diagonal(), identity);
         let nan = [Matrix3::repeat(f64::NAN); 2];
-        assert_eq!(elimination.solve(&nan, &[], &right), None);
+        assert!(elimination.factor(&nan, &[]).is_none());
         let none = Elimination::new(0, std::iter::empty());
-        assert_eq!(none.solve(&[], &[], &[]), Some(Vec::new()));
+        let factor = none.factor(&[], &[]).unwrap();
+        assert!(factor.solve(&[]).is_empty() && factor.inverse_diagonal().is_empty());
     }
 }

@@ -1,0 +1,10 @@
+//! Least squares: one damped driver, one robust loss, one sparse factorisation.
+
+mod block_cholesky;
+mod cauchy;
+mod levenberg_marquardt;
+
+pub(crate) use block_cholesky::{BlockCholesky, Elimination, OffDiagonal};
+pub(crate) use cauchy::Cauchy;
+pub(crate) use levenberg_marquardt::{LeastSquares, Options, minimise};
+pub use levenberg_marquardt::{Summary, Termination};
