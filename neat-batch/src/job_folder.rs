@@ -3,12 +3,16 @@
 use crate::error::BatchError;
 use crate::job::Job;
 use crate::job_record::{JobRecord, JobState};
+use crate::json_file;
 use crate::log_file::LogFile;
 use neat_core::{SceneError, file};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
+
+/// What `job.json` is, for messages.
+const FORMAT: &str = "record of a job";
 
 /// `OUT/NAME`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -93,12 +97,7 @@ impl JobFolder {
             Err(SceneError::Missing { .. }) => return Ok(None),
             bytes => bytes?,
         };
-        let record = serde_json::from_slice(&bytes).map_err(|source| SceneError::Json {
-            path,
-            format: "record of a job",
-            source,
-        })?;
-        Ok(Some(record))
+        Ok(Some(json_file::parse(&bytes, &path, FORMAT)?))
     }
 
     /// Writes `job.json`, completely or not at all.
@@ -106,14 +105,7 @@ impl JobFolder {
     /// # Errors
     /// If the folder cannot be written or the disk is full.
     pub fn write_record(&self, record: &JobRecord) -> Result<(), BatchError> {
-        let path = self.record();
-        let mut text = serde_json::to_vec_pretty(record).map_err(|source| SceneError::Json {
-            path: path.clone(),
-            format: "record of a job",
-            source,
-        })?;
-        text.push(b'\n');
-        Ok(file::write_atomically(&path, &text)?)
+        Ok(json_file::write(&self.record(), FORMAT, record)?)
     }
 
     /// What there is to do, by `record` and what lies in the folder.

@@ -48,6 +48,7 @@ mod job;
 mod job_event;
 mod job_folder;
 mod job_record;
+mod json_file;
 mod log_file;
 mod manifest_file;
 mod options;

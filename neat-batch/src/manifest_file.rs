@@ -2,7 +2,8 @@
 
 use crate::error::BatchError;
 use crate::job::{Job, JobNames, folder_name};
-use neat_core::{SceneError, file};
+use crate::json_file::absolute;
+use neat_core::file;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -51,11 +52,7 @@ pub fn read(path: &Path) -> Result<Vec<Job>, BatchError> {
         line: line_of(error.as_bytes(), error.utf8_error().valid_up_to()),
         reason: "the text is not UTF-8: save it as such".to_owned(),
     })?;
-    // Children of the batch may run elsewhere.
-    let absolute = std::path::absolute(path).map_err(|source| SceneError::Read {
-        path: path.into(),
-        source,
-    })?;
+    let absolute = absolute(path)?;
     parse(&text, path, absolute.parent().unwrap_or(Path::new("/")))
 }
 

@@ -2,6 +2,7 @@
 
 use crate::error::BatchError;
 use crate::job_record::JobState;
+use crate::json_file;
 use neat_core::ground_truth::{parse, read_wireframe};
 use neat_core::{SceneError, file};
 use neat_eval::{NeatAbc, NeatAbcScores};
@@ -60,20 +61,10 @@ struct RunManifest {
     backend: String,
     steps: u64,
     warnings: Vec<String>,
-    status: RunStatus,
+    /// In its words, which are those of jobs.
+    status: JobState,
     /// Of each stage.
     seconds: BTreeMap<String, f64>,
-}
-
-/// How a run ended, by itself.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum RunStatus {
-    /// Or it was killed.
-    Running,
-    Interrupted,
-    Failed,
-    Finished,
 }
 
 /// The state and the seconds of a run that no batch has made, but `neat reconstruct`
@@ -87,16 +78,16 @@ pub fn read_state(run: &Path) -> Result<(JobState, f64), SceneError> {
         manifest => manifest?,
     };
     let state = match manifest.status {
-        RunStatus::Running | RunStatus::Interrupted => JobState::Interrupted,
-        RunStatus::Failed => JobState::Failed,
-        RunStatus::Finished => JobState::Finished,
+        // Nobody works on it: it was killed.
+        JobState::Running => JobState::Interrupted,
+        state => state,
     };
     Ok((state, manifest.seconds.values().sum()))
 }
 
 fn read_manifest(run: &Path) -> Result<RunManifest, SceneError> {
     let path = run.join("manifest.json");
-    from_json(&file::read(&path, REMEDY)?, &path, "manifest of a run")
+    json_file::parse(&file::read(&path, REMEDY)?, &path, "manifest of a run")
 }
 
 /// Reads the figures of a run from its `wireframe.json` and `manifest.json`, and
@@ -108,7 +99,7 @@ pub fn read_result(run: &Path, truth: Option<&Path>) -> Result<ResultFigures, Ba
     let path = run.join("wireframe.json");
     let bytes = file::read(&path, REMEDY)?;
     let wireframe = parse(&bytes, &path)?.wireframe;
-    let document: Document = from_json(&bytes, &path, "3D wireframe")?;
+    let document: Document = json_file::parse(&bytes, &path, "3D wireframe")?;
     let manifest = read_manifest(run)?;
     let agreement = document.metadata.agreement.as_ref();
     let evaluation = match truth {
@@ -131,17 +122,5 @@ pub fn read_result(run: &Path, truth: Option<&Path>) -> Result<ResultFigures, Ba
         backend: manifest.backend,
         warnings: manifest.warnings,
         evaluation,
-    })
-}
-
-fn from_json<'a, T: Deserialize<'a>>(
-    bytes: &'a [u8],
-    path: &Path,
-    format: &'static str,
-) -> Result<T, SceneError> {
-    serde_json::from_slice(bytes).map_err(|source| SceneError::Json {
-        path: path.into(),
-        format,
-        source,
     })
 }

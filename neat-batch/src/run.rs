@@ -4,11 +4,12 @@ use crate::batch::Batch;
 use crate::error::BatchError;
 use crate::job::Job;
 use crate::job_event::JobEvent;
+use crate::json_file::absolute;
 use crate::options::BatchOptions;
 use crate::queue::Queue;
 use crate::stop::StopSwitch;
 use crate::worker::Worker;
-use neat_core::{SceneError, file};
+use neat_core::file;
 use std::path::Path;
 use std::sync::mpsc::channel;
 use std::thread;
@@ -42,10 +43,7 @@ pub fn run(
     on_event: &mut dyn FnMut(&Job, JobEvent),
 ) -> Result<BatchEnd, BatchError> {
     file::create_dir(out)?;
-    let out = std::path::absolute(out).map_err(|source| SceneError::Read {
-        path: out.into(),
-        source,
-    })?;
+    let out = absolute(out)?;
     let jobs = batch.jobs();
     let queue = Queue::new(jobs.len());
     let workers = options.workers.get().min(jobs.len());

@@ -2,6 +2,7 @@
 
 use crate::error::BatchError;
 use crate::job::{Job, folder_name};
+use crate::json_file::absolute;
 use neat_core::SceneError;
 use std::path::{Path, PathBuf};
 
@@ -16,12 +17,7 @@ pub fn find(patterns: &[String]) -> Result<Vec<Job>, BatchError> {
             folders.extend(matches(pattern)?);
         }
     }
-    let absolute = folders.iter().map(|folder| {
-        std::path::absolute(folder).map_err(|source| SceneError::Read {
-            path: folder.clone(),
-            source,
-        })
-    });
+    let absolute = folders.iter().map(|folder| absolute(folder));
     let mut folders = absolute.collect::<Result<Vec<_>, _>>()?;
     folders.sort();
     folders.dedup();

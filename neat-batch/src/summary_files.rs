@@ -4,6 +4,7 @@
 use crate::batch::Batch;
 use crate::error::BatchError;
 use crate::job_record::JobState;
+use crate::json_file;
 use crate::summary::{Aggregate, JobSummary, Summary};
 use neat_core::{SceneError, file};
 use std::fmt::Write;
@@ -28,14 +29,7 @@ impl Summary {
         // Held until the end of the function.
         let _lock = locked.map_err(|source| SceneError::Write { path, source })?;
         let summary = Self::read(batch, out);
-        let json = out.join("summary.json");
-        let mut text = serde_json::to_vec_pretty(&summary).map_err(|source| SceneError::Json {
-            path: json.clone(),
-            format: "summary of a batch",
-            source,
-        })?;
-        text.push(b'\n');
-        file::write_atomically(&json, &text)?;
+        json_file::write(&out.join("summary.json"), "summary of a batch", &summary)?;
         file::write_atomically(&out.join("summary.md"), to_markdown(&summary).as_bytes())?;
         file::write_atomically(&out.join("summary.csv"), to_csv(&summary).as_bytes())?;
         Ok(summary)

@@ -56,12 +56,10 @@ impl Worker<'_> {
             match self.process(entry) {
                 Ok(Some(entry)) => queue.put_back(entry),
                 Ok(None) => {}
-                Err(error) => self.tell(
-                    position,
-                    JobEvent::Failed {
-                        reason: with_causes(&error),
-                    },
-                ),
+                Err(error) => {
+                    let reason = with_causes(&error);
+                    self.tell(position, JobEvent::Failed { reason });
+                }
             }
         }
     }

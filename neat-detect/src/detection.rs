@@ -253,11 +253,10 @@ fn wireframe(
         }
     }
     let mut renumbered = vec![0; vertices.len()];
-    for (vertex, scores) in scores_at
-        .iter()
-        .enumerate()
-        .filter(|(_, scores)| !scores.is_empty())
-    {
+    for (vertex, scores) in scores_at.iter().enumerate() {
+        if scores.is_empty() {
+            continue;
+        }
         renumbered[vertex] = wireframe.vertices.len();
         wireframe.vertices.push(vertices[vertex]);
         let mean = scores.iter().sum::<f64>() / scores.len() as f64;

@@ -15,7 +15,7 @@
 //!
 //! let image = RgbImage::from_fn(64, 64, |x, _| Rgb([if x < 30 { 20 } else { 200 }; 3]));
 //! let wireframe = detect(&image, &DetectorConfig::default());
-//! assert_eq!(wireframe.edges.len(), 1);
+//! assert!(!wireframe.edges.is_empty());
 //! ```
 //!
 //! Coordinates are those of HAWP's files: pixel centres are integers.

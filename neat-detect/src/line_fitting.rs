@@ -272,11 +272,8 @@ impl LineFitter<'_> {
             }
             Some(end)
         };
-        let [start, end] = [walk(-1.0)?, walk(1.0)?];
-        Some(LineSegment2::new(
-            axes.point(start, 0.0),
-            axes.point(end, 0.0),
-        ))
+        let [start, end] = [walk(-1.0)?, walk(1.0)?].map(|at| axes.point(at, 0.0));
+        Some(LineSegment2::new(start, end))
     }
 
     /// Whether an edge along the line passes it at `position`.

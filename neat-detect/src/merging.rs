@@ -87,15 +87,12 @@ fn joined(
     } else {
         short.segment.reversed()
     };
-    let [first, last] = short_way
-        .ends()
-        .map(|end| (end - long.segment.start).dot(&direction));
+    let offsets = short_way.ends().map(|end| end - long.segment.start);
+    let [first, last] = offsets.map(|offset| offset.dot(&direction));
     if first > length + fitter.max_gap || last < -fitter.max_gap {
         return None;
     }
-    let across = short_way
-        .ends()
-        .map(|end| (end - long.segment.start).dot(&normal).abs());
+    let across = offsets.map(|offset| offset.dot(&normal).abs());
     let same_contrast = (long.change.dot(&short.change) >= 0.0) == same_way;
     let distance = if same_contrast { DISTANCE } else { SAME_EDGE };
     if across[0].max(across[1]) > distance {
@@ -104,18 +101,13 @@ fn joined(
     if first >= -DISTANCE && last <= length + DISTANCE {
         return Some(long.clone());
     }
-    let whole = LineSegment2::new(
-        if first < 0.0 {
-            short_way.start
-        } else {
-            long.segment.start
-        },
-        if last > length {
-            short_way.end
-        } else {
-            long.segment.end
-        },
-    );
+    let mut whole = long.segment;
+    if first < 0.0 {
+        whole.start = short_way.start;
+    }
+    if last > length {
+        whole.end = short_way.end;
+    }
     fitter.fit_between_ends(&whole, DISTANCE).filter(|fitted| {
         let line = &fitted.segment;
         let off_line = |end: &Vector2<f64>| (line.point_at(line.line_parameter(end)) - end).norm();

@@ -1,6 +1,6 @@
 //! Rendered colours, depths and normals as images.
 
-use image::{ImageBuffer, Luma, Rgb, RgbImage};
+use image::{Rgb, RgbImage};
 
 /// What depths look like.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,26 +54,6 @@ pub fn depth_image(width: u32, height: u32, depths: &[f32], colors: DepthColors)
             DepthColors::Gray => [nearness; 3],
             DepthColors::Viridis => viridis(nearness),
         }
-    })
-}
-
-/// Depths, row by row, as whole numbers: `depth * levels_per_unit`, rounded, at
-/// most 65535; 0 where there is no depth. Other programs read such PNGs back.
-pub fn depth_image_16_bit(
-    width: u32,
-    height: u32,
-    depths: &[f32],
-    levels_per_unit: f32,
-) -> ImageBuffer<Luma<u16>, Vec<u16>> {
-    ImageBuffer::from_fn(width, height, |x, y| {
-        let depth = depths[y as usize * width as usize + x as usize];
-        let level = if depth.is_finite() {
-            // A cast saturates.
-            (depth * levels_per_unit).round() as u16
-        } else {
-            0
-        };
-        Luma([level])
     })
 }
 
@@ -134,14 +114,6 @@ mod tests {
         let image = depth_image(3, 1, &[2.0, 3.0, 4.0], DepthColors::Viridis);
         let pixels: Vec<[u8; 3]> = image.pixels().map(|p| p.0).collect();
         assert_eq!(pixels, [[253, 231, 37], [33, 144, 141], [68, 1, 84]]);
-    }
-
-    #[test]
-    fn sixteen_bits_keep_the_number() {
-        let depths = [1.2345, 0.0, f32::NAN, f32::INFINITY, -1.0, 1e9];
-        let image = depth_image_16_bit(3, 2, &depths, 1000.0);
-        let levels: Vec<u16> = image.pixels().map(|p| p.0[0]).collect();
-        assert_eq!(levels, [1235, 0, 0, 0, 0, u16::MAX]);
     }
 
     #[test]

@@ -77,7 +77,7 @@ mod total;
 pub use abc_nef::{EdgePointScores, EdgePoints, PointPrecisionRecall};
 pub use counts::WireframeCounts;
 pub use edge_model::{CubicBezier, EdgeModel, wireframe_of_segments};
-pub use edge_points::{EdgeSampling, VoxelGrid, sample_prediction, sample_truth};
+pub use edge_points::{EdgeSampling, VoxelGrid};
 pub use edit_distance::{EditDistance, EditScores};
 pub use error::EvalError;
 pub use limap_length::{LengthRecall, LengthScores, LimapLength};
@@ -87,7 +87,6 @@ pub use observation_mask::{GroundPlane, ObservationMask};
 pub use protocol::{EvaluationInput, EvaluationOptions, Protocol, Scores, UnknownProtocol};
 pub use report::EvaluationReport;
 pub use structure_score::{StructureScore, StructureScores};
-pub use thinning::thin_points;
 
 /// The example of the README compiles.
 #[cfg(doctest)]

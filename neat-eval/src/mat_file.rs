@@ -100,37 +100,28 @@ impl MatArray {
     /// # Panics
     /// If there is none.
     pub fn number(&self, index: usize) -> f64 {
-        let Numbers {
-            kind,
-            byte_order,
-            ref bytes,
-        } = self.numbers;
-        let width = kind.bytes();
-        let mut raw = [0; 8];
-        let raw = &mut raw[..width];
-        raw.copy_from_slice(&bytes[index * width..][..width]);
-        if byte_order == ByteOrder::Big {
+        match self.numbers.kind {
+            Kind::Int8 => i8::from_le_bytes(self.raw(index)).into(),
+            Kind::Uint8 => u8::from_le_bytes(self.raw(index)).into(),
+            Kind::Int16 => i16::from_le_bytes(self.raw(index)).into(),
+            Kind::Uint16 => u16::from_le_bytes(self.raw(index)).into(),
+            Kind::Int32 => i32::from_le_bytes(self.raw(index)).into(),
+            Kind::Uint32 => u32::from_le_bytes(self.raw(index)).into(),
+            Kind::Single => f32::from_le_bytes(self.raw(index)).into(),
+            Kind::Double => f64::from_le_bytes(self.raw(index)),
+            Kind::Int64 => i64::from_le_bytes(self.raw(index)) as f64,
+            Kind::Uint64 => u64::from_le_bytes(self.raw(index)) as f64,
+        }
+    }
+
+    /// The bytes of the element at `index`, the lowest first.
+    fn raw<const N: usize>(&self, index: usize) -> [u8; N] {
+        let mut raw = [0; N];
+        raw.copy_from_slice(&self.numbers.bytes[index * N..][..N]);
+        if self.numbers.byte_order == ByteOrder::Big {
             raw.reverse();
         }
-        match (kind, &*raw) {
-            (Kind::Int8, &[a]) => f64::from(a.cast_signed()),
-            (Kind::Uint8, &[a]) => f64::from(a),
-            (Kind::Int16, &[a, b]) => f64::from(i16::from_le_bytes([a, b])),
-            (Kind::Uint16, &[a, b]) => f64::from(u16::from_le_bytes([a, b])),
-            (Kind::Int32, &[a, b, c, d]) => f64::from(i32::from_le_bytes([a, b, c, d])),
-            (Kind::Uint32, &[a, b, c, d]) => f64::from(u32::from_le_bytes([a, b, c, d])),
-            (Kind::Single, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
-            (Kind::Double, &[a, b, c, d, e, f, g, h]) => {
-                f64::from_le_bytes([a, b, c, d, e, f, g, h])
-            }
-            (Kind::Int64, &[a, b, c, d, e, f, g, h]) => {
-                i64::from_le_bytes([a, b, c, d, e, f, g, h]) as f64
-            }
-            (Kind::Uint64, &[a, b, c, d, e, f, g, h]) => {
-                u64::from_le_bytes([a, b, c, d, e, f, g, h]) as f64
-            }
-            _ => unreachable!("MatArray::number: {kind:?} has {width} bytes"),
-        }
+        raw
     }
 
     /// All elements, the first axis fastest.

@@ -63,8 +63,14 @@ fn line_tracks(document: &WireframeDocument) -> Vec<LineTrack> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{ExportOptions, Format, Written, export};
     use nalgebra::Vector3;
     use neat_wireframe::export::{read_all_tracks, read_image_list, read_track_folder};
+    use std::path::Path;
+
+    fn write(dir: &Path, document: &WireframeDocument) -> Result<Written, ExportError> {
+        export(document, dir, Format::Limap, &ExportOptions::default())
+    }
 
     #[test]
     fn the_folder_reads_back_as_tracks() {

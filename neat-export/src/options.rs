@@ -63,17 +63,3 @@ pub enum LengthUnit {
     /// The metre.
     Metre,
 }
-
-impl LengthUnit {
-    /// All units.
-    pub const ALL: [Self; 3] = [Self::Millimetre, Self::Centimetre, Self::Metre];
-
-    /// Its symbol, for command lines.
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Self::Millimetre => "mm",
-            Self::Centimetre => "cm",
-            Self::Metre => "m",
-        }
-    }
-}

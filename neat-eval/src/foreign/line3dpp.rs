@@ -5,9 +5,8 @@
 //! coordinates for each, and the number of its 2D residuals, each with camera,
 //! segment and four pixel coordinates.
 
-use super::malformed;
+use super::{malformed, segment_of};
 use crate::edge_model::wireframe_of_segments;
-use nalgebra::Vector3;
 use neat_core::{LineSegment3, SceneError, Wireframe3d};
 use std::path::Path;
 
@@ -41,13 +40,7 @@ fn line_segments(line: &str) -> Option<Vec<LineSegment3>> {
     let (coordinates, rest) = counted(&numbers)?;
     let (_residuals, rest) = counted(rest)?;
     let (ends, _) = coordinates.as_chunks::<6>();
-    rest.is_empty().then(|| {
-        ends.iter()
-            .map(|&[a, b, c, d, e, f]| {
-                LineSegment3::new(Vector3::new(a, b, c), Vector3::new(d, e, f))
-            })
-            .collect()
-    })
+    (rest.is_empty()).then(|| ends.iter().map(segment_of).collect())
 }
 
 /// The sixes that a leading number announces, and what follows them.
@@ -63,6 +56,7 @@ fn counted(numbers: &[f64]) -> Option<(&[f64], &[f64])> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     #[test]
     fn collinear_segments_and_residuals() {

@@ -27,8 +27,9 @@ pub use ply::parse_ply_edges;
 
 use crate::edge_model::EdgeModel;
 use crate::error::EvalError;
+use nalgebra::Vector3;
 use neat_core::ground_truth::{self, GroundTruth};
-use neat_core::{SceneError, Wireframe3d, file};
+use neat_core::{LineSegment3, SceneError, Wireframe3d, file};
 use std::path::Path;
 
 const REMEDY: &str = "give a result as .json, .obj, .ply, .npz, .npy or Line3D++'s .txt";
@@ -85,6 +86,11 @@ fn malformed(path: &Path, reason: String) -> SceneError {
         path: path.into(),
         reason,
     }
+}
+
+/// A segment of six numbers: one end, then the other.
+fn segment_of(&[a, b, c, d, e, f]: &[f64; 6]) -> LineSegment3 {
+    LineSegment3::new(Vector3::new(a, b, c), Vector3::new(d, e, f))
 }
 
 /// The graph, if its edges name vertices that exist and all is finite.

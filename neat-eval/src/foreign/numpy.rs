@@ -1,8 +1,7 @@
 //! Segments as NumPy arrays: of the published NEAT, and of LIMAP.
 
-use super::malformed;
+use super::{malformed, segment_of};
 use crate::edge_model::wireframe_of_segments;
-use nalgebra::Vector3;
 use neat_core::npz::{NpyArray, NpzReader, parse_npy};
 use neat_core::{LineSegment3, SceneError, Wireframe3d};
 use std::path::Path;
@@ -34,10 +33,7 @@ fn segments_of(array: &NpyArray, path: &Path) -> Result<Wireframe3d, SceneError>
         return Err(malformed(path, reason));
     }
     let (ends, _) = array.values.as_chunks::<6>();
-    let segments: Vec<LineSegment3> = ends
-        .iter()
-        .map(|&[a, b, c, d, e, f]| LineSegment3::new(Vector3::new(a, b, c), Vector3::new(d, e, f)))
-        .collect();
+    let segments: Vec<LineSegment3> = ends.iter().map(segment_of).collect();
     Ok(wireframe_of_segments(&segments))
 }
 

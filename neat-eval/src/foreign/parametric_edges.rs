@@ -3,7 +3,7 @@
 //! `lines_end_pts` are segments of six numbers, `curves_ctl_pts` cubic Bézier
 //! curves of twelve, nested in whatever way: the published readers flatten them.
 
-use super::malformed;
+use super::{malformed, segment_of};
 use crate::edge_model::{CubicBezier, EdgeModel, wireframe_of_segments};
 use nalgebra::Vector3;
 use neat_core::{LineSegment3, SceneError, file};
@@ -72,10 +72,7 @@ pub fn parse_parametric_edges(bytes: &[u8], path: &Path) -> Result<EdgeModel, Sc
     let numbers = flat(&json.lines_end_pts);
     let (ends, rest) = numbers.as_chunks::<6>();
     whole("lines_end_pts", 6, rest)?;
-    let segments: Vec<LineSegment3> = ends
-        .iter()
-        .map(|&[a, b, c, d, e, f]| LineSegment3::new(Vector3::new(a, b, c), Vector3::new(d, e, f)))
-        .collect();
+    let segments: Vec<LineSegment3> = ends.iter().map(segment_of).collect();
     let numbers = flat(&json.curves_ctl_pts);
     let (curves, rest) = numbers.as_chunks::<12>();
     whole("curves_ctl_pts", 12, rest)?;
