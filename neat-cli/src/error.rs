@@ -9,8 +9,8 @@ use neat_pipeline::compare_backends::CompareError;
 use neat_pipeline::error::PipelineError;
 use neat_pipeline::overrides::OverrideError;
 use neat_pipeline::run_dir::RunDirError;
-use neat_pipeline::trainer::TrainError;
 use neat_tensor::BackendError;
+use neat_train::TrainError;
 use std::process::ExitCode;
 
 /// Exit code of a run that failed.

@@ -4,7 +4,7 @@
 use crate::{duration, output};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use neat_pipeline::event::{Event, Stage};
-use neat_pipeline::trainer::StepReport;
+use neat_train::trainer::StepReport;
 use std::io::{IsTerminal, stderr};
 use std::time::{Duration, Instant};
 

@@ -3,13 +3,9 @@
 //! Every time stands beside a yardstick of the same run: a large matrix product
 //! on the same backend.
 
-use crate::config::ModelConfig;
-use crate::flops::{StepFlops, StepRows};
 use crate::latents::fit_latents;
-use crate::model::host_vec;
 use crate::preset::Preset;
 use crate::scene::scaled_for;
-use crate::trainer::{StepTimings, TrainError, Trainer};
 use burn::tensor::{Device, Tensor, TensorData};
 use neat_core::synthetic::{SyntheticScene, generate};
 use neat_sdf::ImplicitNetwork;
@@ -17,6 +13,11 @@ use neat_tensor::Backend;
 use neat_tensor::backend::software_driver;
 use neat_tensor::fused::has_own_kernels;
 use neat_tensor::random::{Purpose, stream};
+use neat_train::TrainError;
+use neat_train::config::ModelConfig;
+use neat_train::flops::{StepFlops, StepRows};
+use neat_train::model::host_vec;
+use neat_train::trainer::{StepTimings, Trainer};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -147,7 +148,7 @@ pub fn benchmark(
         let mut config = preset.config();
         let scene = scaled_for(&config.data, views.clone());
         fit_latents(&mut config, &scene);
-        let mut trainer = Trainer::new(&scene, &config, 0, device)?;
+        let mut trainer = Trainer::new(&scene, &config.training(), 0, device)?;
         let mut run = Run::default();
         warm_up(&mut trainer, backend, &mut progress)?;
         synchronise(device);
@@ -446,7 +447,7 @@ mod tests {
             config.train.eikonal.uniform_points = Some(8);
             let scene = scaled_for(&config.data, views.clone());
             fit_latents(&mut config, &scene);
-            let mut trainer = Trainer::new(&scene, &config, 0, &Device::flex()).unwrap();
+            let mut trainer = Trainer::new(&scene, &config.training(), 0, &Device::flex()).unwrap();
             trainer.step(SCHEDULE).unwrap();
             let rows = trainer.rows();
             let all = [rows.sampler, rows.samples, rows.full, rows.segment];

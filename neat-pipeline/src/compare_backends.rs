@@ -1,10 +1,11 @@
 //! The same seeds on every backend: time, memory and agreement.
 
 use crate::config::Config;
-use crate::trainer::{Probe, TrainError, Trainer};
 use burn::tensor::TensorData;
 use neat_core::Scene;
 use neat_tensor::{Backend, BackendError};
+use neat_train::TrainError;
+use neat_train::trainer::{Probe, Trainer};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -86,7 +87,7 @@ pub fn compare_backends(
             backend: *backend,
             source,
         };
-        let mut trainer = Trainer::new(scene, config, seed, &device).map_err(fail)?;
+        let mut trainer = Trainer::new(scene, &config.training(), seed, &device).map_err(fail)?;
         let probe = trainer.probe(0.0).map_err(fail)?;
         let (mut losses, mut times) = (Vec::new(), Vec::new());
         let mut peak: Option<f64> = None;

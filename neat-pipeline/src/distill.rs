@@ -3,11 +3,11 @@
 mod thin_regions;
 
 use crate::config::{BackEnd, Config};
-use crate::field::TrainedField;
-use crate::model::host_vec;
 use nalgebra::Vector3;
 use neat_core::{LineSegment3, Scene, Wireframe3d};
 use neat_sdf::RayBundle;
+use neat_train::TrainedField;
+use neat_train::model::host_vec;
 use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::curved_rims::curved_chains;
 use neat_wireframe::export::WireframeDocument;

@@ -4,10 +4,10 @@
 use crate::benchmark::matrix_product_rate;
 use crate::config::Config;
 use crate::event::{Event, OnEvent};
-use crate::flops::{StepFlops, StepRows};
 use burn::tensor::Device;
 use neat_core::{MemoryLimit, Scene};
 use neat_sdf::RaySamplerConfig;
+use neat_train::flops::{StepFlops, StepRows};
 use serde::Serialize;
 
 /// Side of the matrices whose product tells the speed: a few hundredths of a

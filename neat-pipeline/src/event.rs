@@ -2,7 +2,7 @@
 //! draws.
 
 use crate::error::PipelineError;
-use crate::trainer::StepReport;
+use neat_train::trainer::StepReport;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::path::PathBuf;

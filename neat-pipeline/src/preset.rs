@@ -143,6 +143,16 @@ mod tests {
     }
 
     #[test]
+    fn presets_are_accepted() {
+        for preset in Preset::ALL {
+            let mut config = preset.config().training();
+            // "auto" is decided by the scene.
+            config.model.perceiver.junctions = JunctionCount::Fixed(1024);
+            config.validate().unwrap();
+        }
+    }
+
+    #[test]
     fn published_presets_follow_the_published_code() {
         for preset in [Preset::PaperAbc, Preset::PaperDtu, Preset::PaperBlendedmvs] {
             let train = preset.config().train;
@@ -180,5 +190,40 @@ mod tests {
         assert_eq!(config.data.scene_radius, None);
         assert_eq!(config.model.implicit.skip_layer, 0);
         assert_eq!(config.model.implicit.bounding_sphere_slope, 0.0);
+    }
+
+    fn refusal(change: impl Fn(&mut Config)) -> String {
+        let mut config = Preset::Fast.config();
+        change(&mut config);
+        let result = config.training().validate();
+        result.map_or_else(|error| error.to_string(), |()| String::new())
+    }
+
+    #[test]
+    fn sizes_beyond_any_machine_are_refused_by_name() {
+        let huge = 100_000_000_000;
+        let rays = refusal(|config| config.train.rays = huge);
+        assert!(rays.contains("train.rays times the samples"), "{rays}");
+        let most = refusal(|config| config.train.rays = usize::MAX);
+        assert!(most.contains("67108864"), "{most}");
+        let width = refusal(|config| config.model.implicit.width = huge);
+        assert!(
+            width.contains("model.implicit.width is 100000000000"),
+            "{width}"
+        );
+        let layers = refusal(|config| config.model.attraction.hidden_layers = huge);
+        assert!(
+            layers.contains("model.attraction.hidden_layers"),
+            "{layers}"
+        );
+        let points = refusal(|config| config.train.eikonal.uniform_points = Some(huge));
+        assert!(points.contains("train.eikonal.uniform_points"), "{points}");
+        let junctions = refusal(|config| {
+            config.model.perceiver.junctions = JunctionCount::Fixed(huge);
+        });
+        assert!(
+            junctions.contains("model.perceiver.junctions"),
+            "{junctions}"
+        );
     }
 }

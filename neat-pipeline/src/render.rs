@@ -1,10 +1,10 @@
 //! A whole view, rendered.
 
-use crate::field::TrainedField;
-use crate::model::{host_points, host_vec};
-use crate::training_data::push_ray;
 use neat_core::Camera;
 use neat_sdf::RayBundle;
+use neat_train::TrainedField;
+use neat_train::model::{host_points, host_vec};
+use neat_train::training_data::push_ray;
 
 /// Rays per rendering call: bounds the memory.
 const RAY_CHUNK: usize = 2048;

@@ -23,9 +23,9 @@
 
 use crate::config::Config;
 use crate::manifest::Manifest;
-use crate::trainer::AVERAGE_LOSS;
 use neat_core::{SceneError, file};
 use neat_tensor::checkpoint::{Checkpoint, CheckpointError};
+use neat_train::AVERAGE_LOSS;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -357,7 +357,7 @@ impl RunDir {
         serde_json::from_slice(&bytes).map_err(|error| malformed(&path, &error))
     }
 
-    /// `metrics.jsonl`: losses and the like, see [`crate::step_log`].
+    /// `metrics.jsonl`: losses and the like, see [`neat_train::step_log`].
     pub fn metrics(&self) -> PathBuf {
         self.root.join(METRICS)
     }

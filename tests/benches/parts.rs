@@ -3,7 +3,7 @@
 //! `cargo bench --workspace --bench parts -- [FILTER]`
 //!
 //! *Items* are floating-point operations that the part cannot avoid
-//! (`neat_pipeline::flops`), so a row's items per second stand beside those of
+//! (`neat_train::flops`), so a row's items per second stand beside those of
 //! `yardstick`, a large matrix product in the same run. `neat bench` measures
 //! whole steps.
 
@@ -14,13 +14,13 @@ use nalgebra::Vector2;
 use neat_core::LineSegment2;
 use neat_core::assignment::assign;
 use neat_field::attraction_region::AttractionRegions;
-use neat_pipeline::flops::{StepFlops, StepRows};
-use neat_pipeline::model::{NeatModel, host_vec};
 use neat_pipeline::preset::Preset;
 use neat_sdf::RayBundle;
 use neat_sdf::ray_sampler::Deterministic;
 use neat_tensor::{CoordinateMlp, Field, FieldQuery};
 use neat_tests::finite_differences::normal;
+use neat_train::flops::{StepFlops, StepRows};
+use neat_train::model::{NeatModel, host_vec};
 use rayon::prelude::*;
 
 const PRESETS: [Preset; 2] = [Preset::Fast, Preset::PaperAbc];

@@ -3,9 +3,9 @@
 use super::session::Session;
 use crate::config::OverlayGround;
 use crate::error::PipelineError;
-use crate::step_log::{JunctionsLine, read_log};
-use crate::trainer::StepReport;
 use neat_report::{Curve, FactGroup, JunctionSnapshot, PhotographConfig, Report};
+use neat_train::step_log::{JunctionsLine, read_log};
+use neat_train::trainer::StepReport;
 use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::metrics::ImageEvidence;
 use std::path::{MAIN_SEPARATOR, PathBuf};

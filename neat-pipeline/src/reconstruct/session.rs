@@ -6,17 +6,16 @@ use crate::config::Config;
 use crate::error::PipelineError;
 use crate::estimate::fit_memory;
 use crate::event::{Event, OnEvent, Stage, timed};
-use crate::field::TrainedField;
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
 use crate::resources::Resources;
 use crate::run_dir::{Existing, RunDir, RunDirError, RunLock};
 use crate::scene::{examine_quickly, prepare_scene};
-use crate::trainer::TrainError;
-use crate::validation::validate;
 use burn::tensor::Device;
 use neat_core::{Scene, SceneError, file, hawp_json};
 use neat_tensor::Backend;
 use neat_tensor::backend::software_driver;
+use neat_train::TrainError;
+use neat_train::TrainedField;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -75,7 +74,7 @@ impl<'a> Session<'a> {
         };
         let prepared = prepare_scene(&scene_dir, &mut config, placed, resources, on_event)?;
         // Before anything is written; what depends on the scene is decided now.
-        validate(&config)?;
+        config.training().validate()?;
         let limit = options.memory_limit;
         // A GPU has memory of its own.
         if let Some(earlier) = &earlier {
@@ -348,7 +347,7 @@ fn read_run(
         let used = usable.path.display();
         on_event(Event::Warning(format!("{error}: {used} is used instead")));
     }
-    let field = TrainedField::load(&config, &usable.checkpoint, &device)?;
+    let field = TrainedField::load(&config.training(), &usable.checkpoint, &device)?;
     Ok(OpenedRun {
         dir,
         config,

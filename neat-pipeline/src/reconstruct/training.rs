@@ -7,15 +7,15 @@ use super::session::Session;
 use crate::changes::Belonging;
 use crate::error::PipelineError;
 use crate::event::{Event, Stage};
-use crate::field::TrainedField;
 use crate::manifest::Manifest;
 use crate::run_dir::{Existing, RunDir};
-use crate::step_log::{JunctionsLine, StepLog};
-use crate::trainer::Trainer;
 use nalgebra::Vector3;
 use neat_tensor::Backend;
 use neat_tensor::checkpoint::Checkpoint;
 use neat_tensor::fused::is_fused;
+use neat_train::TrainedField;
+use neat_train::Trainer;
+use neat_train::step_log::{JunctionsLine, StepLog};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -189,7 +189,7 @@ impl Session<'_> {
 
     /// A trainer that continues from the last checkpoint, or a new one.
     fn trainer(&self, options: &RunOptions) -> Result<Trainer, PipelineError> {
-        let mut config = self.config.clone();
+        let mut config = self.config.training();
         if let Some(chunk) = self.ray_chunk {
             config.train.ray_chunk = Some(chunk);
         }

@@ -11,11 +11,7 @@ use neat_gjp::JunctionCount;
 use neat_gjp::candidates::{CandidateConfig, JunctionView};
 use neat_pipeline::config::Config;
 use neat_pipeline::distill::support_point;
-use neat_pipeline::losses::{StepInput, StepLoss, step_loss};
-use neat_pipeline::model::{NeatModel, PlacedSamples, RenderRequest};
 use neat_pipeline::preset::Preset;
-use neat_pipeline::trainer::learning_rate_factor;
-use neat_pipeline::training_data::{Batch, push_ray_through};
 use neat_sdf::{RayBundle, RaySamples};
 use neat_tensor::adam::{Adam, AdamConfig};
 use neat_tensor::parameters::{load_parameters, named_parameters};
@@ -25,6 +21,10 @@ use neat_tests::golden::Golden;
 use neat_tests::named_gradients::{assert_gradients_close, named_gradients};
 use neat_tests::published_names::{model_gradients, model_parameters};
 use neat_tests::tensors::numbers;
+use neat_train::losses::{StepInput, StepLoss, step_loss};
+use neat_train::model::{NeatModel, PlacedSamples, RenderRequest};
+use neat_train::trainer::learning_rate_factor;
+use neat_train::training_data::{Batch, push_ray_through};
 
 /// How local junctions are found, by the names of the golden tensors.
 const MODES: [&str; 2] = ["dbscan", "median"];

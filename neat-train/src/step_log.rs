@@ -1,8 +1,7 @@
 //! Logs of the training with one line of JSON per step: `metrics.jsonl` and
 //! `junctions.jsonl`.
 
-use crate::run_dir::{RunDirError, malformed, read_error, write_error};
-use neat_core::file;
+use neat_core::{SceneError, file};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File, OpenOptions};
@@ -33,7 +32,7 @@ impl<T: Serialize> StepLog<T> {
     ///
     /// # Errors
     /// If the file cannot be read or written.
-    pub fn open(path: &Path, iteration: u64) -> Result<Self, RunDirError> {
+    pub fn open(path: &Path, iteration: u64) -> Result<Self, SceneError> {
         let kept: String = read_text(path)?
             .split_inclusive('\n')
             .filter(|line| iteration_of(line).is_some_and(|i| i <= iteration))
@@ -54,21 +53,22 @@ impl<T: Serialize> StepLog<T> {
     ///
     /// # Errors
     /// If the disk is full.
-    pub fn append(&mut self, record: &T) -> Result<(), RunDirError> {
-        let mut line = serde_json::to_vec(record).map_err(|error| malformed(&self.path, &error))?;
+    pub fn append(&mut self, record: &T) -> Result<(), SceneError> {
+        let line = serde_json::to_vec(record);
+        let mut line = line.map_err(|error| write_error(&self.path, error.into()))?;
         line.push(b'\n');
         self.file
             .write_all(&line)
-            .map_err(|error| write_error(&self.path, error).into())
+            .map_err(|error| write_error(&self.path, error))
     }
 
     /// Brings the lines to the disk.
     ///
     /// # Errors
     /// If the disk is full.
-    pub fn sync(&self) -> Result<(), RunDirError> {
+    pub fn sync(&self) -> Result<(), SceneError> {
         let synced = self.file.sync_data();
-        synced.map_err(|error| write_error(&self.path, error).into())
+        synced.map_err(|error| write_error(&self.path, error))
     }
 }
 
@@ -77,7 +77,7 @@ impl<T: Serialize> StepLog<T> {
 ///
 /// # Errors
 /// If the file cannot be read.
-pub fn read_log<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, RunDirError> {
+pub fn read_log<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, SceneError> {
     let text = read_text(path)?;
     Ok(text
         .lines()
@@ -85,12 +85,22 @@ pub fn read_log<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, RunDirError>
         .collect())
 }
 
-fn read_text(path: &Path) -> Result<String, RunDirError> {
+fn read_text(path: &Path) -> Result<String, SceneError> {
     match fs::read(path) {
         // A damaged line is passed over; it must not cost the others.
         Ok(bytes) => Ok(String::from_utf8_lossy(&bytes).into_owned()),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(String::new()),
-        Err(error) => Err(read_error(path, error).into()),
+        Err(source) => Err(SceneError::Read {
+            path: path.into(),
+            source,
+        }),
+    }
+}
+
+fn write_error(path: &Path, source: io::Error) -> SceneError {
+    SceneError::Write {
+        path: path.into(),
+        source,
     }
 }
 

@@ -1,85 +1,37 @@
 //! The optimisation of one scene.
 
 use crate::awake::with_awake_worker;
+use crate::checkpoint_metadata::{AVERAGE_LOSS, LEARNING_RATE_SCALE, metadata};
 use crate::chunked_step::{StepGradients, chunked_step};
-use crate::config::{Config, TrainConfig};
-pub use crate::field::TrainedField;
+use crate::config::{TrainConfig, TrainingConfig};
+use crate::error::TrainError;
+use crate::field::TrainedField;
 use crate::flops::StepRows;
 use crate::losses::{Losses, StepInput, StepLoss, step_loss};
 use crate::model::{NeatModel, host_points, host_vec};
 use crate::sample_placement::{SamplePlacement, StepSamples, StepToSample};
 use crate::surface_points::SurfacePoints;
 use crate::training_data::{Batch, TrainingData};
-use crate::validation::validate;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
+use neat_core::Scene;
 use neat_core::assignment::AssignmentError;
-use neat_core::{Scene, SceneError};
 use neat_gjp::candidates::JunctionView;
 use neat_sdf::ImplicitNetwork;
 use neat_sdf::density::BetaSchedule;
 use neat_tensor::adam::Adam;
 use neat_tensor::checkpoint::Checkpoint;
 use neat_tensor::fused::is_fused;
-use neat_tensor::parameters::{GradientCheck, ParameterError, load_parameters, named_parameters};
+use neat_tensor::parameters::{GradientCheck, load_parameters, named_parameters};
 use neat_tensor::random::{Purpose, stream};
 use rand::RngExt;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// Key of a checkpoint's metadata: [`Trainer::learning_rate_scale`].
-const LEARNING_RATE_SCALE: &str = "learning_rate_scale";
-
-/// Key of a checkpoint's metadata: [`Trainer::average_loss`].
-pub const AVERAGE_LOSS: &str = "average_loss";
 /// A step counts in the average loss with one of so many parts.
 const AVERAGED_STEPS: f64 = 50.0;
-
-/// Why training cannot start or go on.
-#[derive(Debug, thiserror::Error)]
-pub enum TrainError {
-    /// The configuration contradicts itself.
-    #[error("the configuration cannot be used: {0}")]
-    Config(String),
-    /// No pixel of the scene lies in an attraction region.
-    #[error(
-        "no pixel lies within {0} px of a 2D segment: look at the scene's 2D wireframes, or raise data.attraction_distance"
-    )]
-    NoRegionPixel(f64),
-    /// The loss is no number any more.
-    #[error("the loss became {value} in iteration {iteration}")]
-    NonFiniteLoss {
-        /// The iteration.
-        iteration: u64,
-        /// The loss.
-        value: f64,
-    },
-    /// A gradient is no number any more, although the loss is.
-    #[error("the gradient became infinite or no number in iteration {iteration}")]
-    NonFiniteGradient {
-        /// The iteration.
-        iteration: u64,
-    },
-    /// Junctions could not be matched.
-    #[error("junctions could not be matched in iteration {iteration}: {source}")]
-    Assignment {
-        /// The iteration.
-        iteration: u64,
-        /// What the assignment said.
-        source: AssignmentError,
-    },
-    /// An image that lies in a file cannot be read.
-    #[error(transparent)]
-    Image(#[from] SceneError),
-    /// The checkpoint belongs to another model.
-    #[error("the checkpoint does not fit this configuration: {0}")]
-    Parameters(#[from] ParameterError),
-    /// The checkpoint lacks something.
-    #[error("the checkpoint has no usable `{0}`")]
-    Checkpoint(String),
-}
 
 /// What one iteration did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -140,7 +92,7 @@ impl std::ops::AddAssign for StepTimings {
 pub struct Trainer {
     data: TrainingData,
     surface_points: SurfacePoints,
-    config: Config,
+    config: TrainingConfig,
     seed: u64,
     device: Device,
     scene_radius: f64,
@@ -194,22 +146,6 @@ pub struct Probe {
     pub gradients: BTreeMap<String, TensorData>,
 }
 
-impl TrainError {
-    /// Whether a number became none: a lower learning rate may avoid it.
-    pub fn is_numerical(&self) -> bool {
-        // Costs that are no numbers cannot be assigned either.
-        matches!(
-            self,
-            Self::NonFiniteLoss { .. }
-                | Self::NonFiniteGradient { .. }
-                | Self::Assignment {
-                    source: AssignmentError::Cost { .. },
-                    ..
-                }
-        )
-    }
-}
-
 impl Trainer {
     /// Networks at their start and the scene prepared.
     ///
@@ -217,16 +153,16 @@ impl Trainer {
     /// If the configuration contradicts itself or the scene has no usable pixel.
     pub fn new(
         scene: &Scene,
-        config: &Config,
+        config: &TrainingConfig,
         seed: u64,
         device: &Device,
     ) -> Result<Self, TrainError> {
-        validate(config)?;
+        config.validate()?;
         let data = TrainingData::new(scene, config);
         if data.region_pixels() == 0 {
-            return Err(TrainError::NoRegionPixel(config.data.attraction_distance));
+            return Err(TrainError::NoRegionPixel(config.attraction_distance));
         }
-        let scene_radius = config.data.scene_radius.unwrap_or(scene.sphere_radius);
+        let scene_radius = config.scene_radius.unwrap_or(scene.sphere_radius);
         let device = device.clone().autodiff();
         let model = NeatModel::new(&config.model, scene_radius, seed, &device);
         let initial_radius = config.model.implicit.initial_sphere * scene_radius;
@@ -256,7 +192,7 @@ impl Trainer {
     /// As [`Self::new`], and if the checkpoint does not fit.
     pub fn resume(
         scene: &Scene,
-        config: &Config,
+        config: &TrainingConfig,
         seed: u64,
         device: &Device,
         checkpoint: Checkpoint,
@@ -542,7 +478,7 @@ impl Trainer {
             }
         }
         let start = Instant::now();
-        let batch = (self.data).batch(&self.config, self.seed, self.iteration)?;
+        let batch = (self.data).batch(&self.config.train, self.seed, self.iteration)?;
         self.timings.batch = start.elapsed();
         let start = Instant::now();
         let to_sample = StepToSample {
@@ -664,17 +600,6 @@ impl Trainer {
             self.device.clone().inner(),
         )
     }
-}
-
-pub(crate) fn metadata<T: std::str::FromStr>(
-    checkpoint: &Checkpoint,
-    key: &str,
-) -> Result<T, TrainError> {
-    checkpoint
-        .metadata
-        .get(key)
-        .and_then(|value| value.parse().ok())
-        .ok_or_else(|| TrainError::Checkpoint(key.to_owned()))
 }
 
 /// Factor on the learning rates in iteration `iteration` (counted from 0), when

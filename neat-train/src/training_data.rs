@@ -1,7 +1,7 @@
 //! What training needs of a scene, prepared once: attraction regions, segments
 //! and the pixels to draw rays through.
 
-use crate::config::{BatchViews, Config};
+use crate::config::{BatchViews, TrainConfig, TrainingConfig};
 use nalgebra::Vector2;
 use neat_core::{Camera, Scene, SceneError, ScoredSegment2, ViewImage};
 use neat_field::region_pixels::RegionPixels;
@@ -53,17 +53,16 @@ pub struct Batch {
 
 impl TrainingData {
     /// Prepares a scene: segments, attraction regions, pixels.
-    pub fn new(scene: &Scene, config: &Config) -> Self {
-        let data = &config.data;
-        let regions =
-            RegionPixels::of_scene(scene, data.min_segment_score, data.attraction_distance);
+    pub fn new(scene: &Scene, config: &TrainingConfig) -> Self {
+        let min_score = config.min_segment_score;
+        let regions = RegionPixels::of_scene(scene, min_score, config.attraction_distance);
         let views: Vec<TrainingView> = scene
             .views
             .iter()
             .zip(regions)
             .map(|(view, regions)| TrainingView {
                 camera: view.camera,
-                segments: view.wireframe.segments(data.min_segment_score),
+                segments: view.wireframe.segments(min_score),
                 junctions: view.wireframe.vertices.clone(),
                 regions,
                 image: view.image.clone(),
@@ -90,8 +89,12 @@ impl TrainingData {
     ///
     /// # Errors
     /// If an image lies in a file that cannot be read.
-    pub fn batch(&self, config: &Config, seed: u64, iteration: u64) -> Result<Batch, SceneError> {
-        let train = &config.train;
+    pub fn batch(
+        &self,
+        train: &TrainConfig,
+        seed: u64,
+        iteration: u64,
+    ) -> Result<Batch, SceneError> {
         let mut rng = stream(seed, Purpose::Rays, iteration);
         let background = (train.rays as f64 * train.background_share) as usize;
         let through_regions = train.rays - background;

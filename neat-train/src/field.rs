@@ -1,10 +1,11 @@
 //! A trained field: what distillation and rendering ask.
 
-use crate::config::Config;
+use crate::checkpoint_metadata::metadata;
+use crate::config::TrainingConfig;
+use crate::error::TrainError;
 use crate::model::{
     NeatModel, PlacedSamples, RenderRequest, Rendering, host_points, host_vec, point_tensor,
 };
-use crate::trainer::{TrainError, metadata};
 use burn::tensor::{Device, Tensor};
 use nalgebra::Vector3;
 use neat_sdf::ray_sampler::{Deterministic, DistanceGrid, RaySampler, RaySamples};
@@ -62,7 +63,7 @@ impl TrainedField {
     /// # Errors
     /// If the checkpoint does not fit the configuration.
     pub fn load(
-        config: &Config,
+        config: &TrainingConfig,
         checkpoint: &Checkpoint,
         device: &Device,
     ) -> Result<Self, TrainError> {

@@ -1,0 +1,152 @@
+//! Configurations that contradict themselves.
+
+use crate::config::{BatchViews, TrainingConfig};
+use crate::error::TrainError;
+use neat_sdf::RaySamplerConfig;
+
+/// Most samples of a step: their arrays on the host take some 50 bytes each, and
+/// their indices are 32 bits wide.
+const MAX_SAMPLES: usize = 1 << 26;
+/// Widest layer and longest vector of features.
+const MAX_WIDTH: usize = 1 << 14;
+/// Most layers of a network.
+const MAX_LAYERS: usize = 1 << 8;
+/// Most junctions that the perceiver may have: their assignment is a matrix.
+const MAX_JUNCTIONS: usize = 1 << 16;
+/// Most nodes of the sampler's grid along an axis.
+const MAX_RESOLUTION: usize = 1 << 10;
+
+impl TrainingConfig {
+    /// Refuses configurations that would fail or silently ignore something.
+    ///
+    /// # Errors
+    /// What contradicts itself, in a sentence with the names of the settings.
+    pub fn validate(&self) -> Result<(), TrainError> {
+        let refuse = |reason: &str| Err(TrainError::Config(reason.to_owned()));
+        let (implicit, train) = (&self.model.implicit, &self.train);
+        let encoded = 3 * (1 + 2 * implicit.octaves);
+        if implicit.hidden_layers == 0 || implicit.width == 0 {
+            return refuse("model.implicit needs at least one hidden layer and a width above 0");
+        }
+        if implicit.skip_layer > 0 {
+            if implicit.skip_layer >= implicit.hidden_layers {
+                return refuse("model.implicit.skip_layer must come before the last hidden layer");
+            }
+            if implicit.width <= encoded {
+                return refuse(
+                    "model.implicit.width must exceed the width of the encoding, 3 + 6 octaves, where a skip layer is used",
+                );
+            }
+        }
+        if implicit.octaves > 24 || self.model.attraction.octaves > 24 {
+            return refuse("more than 24 octaves exceed what float32 resolves");
+        }
+        for (name, value, most) in sizes(self) {
+            if value > most {
+                return refuse(&format!(
+                    "{name} is {value}; the most that neat takes is {most}"
+                ));
+            }
+        }
+        if train.rays == 0 || !(0.0..1.0).contains(&train.background_share) {
+            return refuse("train.rays must be positive and train.background_share in [0, 1)");
+        }
+        if train.ray_chunk == Some(0) {
+            return refuse("train.ray_chunk must be positive");
+        }
+        if train.steps == 0 {
+            return refuse("train.steps must be positive");
+        }
+        if train.checkpoint_interval == 0 || train.kept_checkpoints == 0 {
+            return refuse("train.checkpoint_interval and kept_checkpoints must be positive");
+        }
+        if train.checkpoint_seconds.is_nan() || train.checkpoint_seconds <= 0.0 {
+            return refuse("train.checkpoint_seconds must be positive");
+        }
+        match self.model.perceiver.junctions.fixed() {
+            None => return refuse("model.perceiver.junctions is not decided for this scene"),
+            Some(0) => return refuse("model.perceiver needs junctions"),
+            Some(_) if self.model.perceiver.width == 0 => {
+                return refuse("model.perceiver needs a width");
+            }
+            Some(_) => {}
+        }
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        let density = &self.model.density;
+        if !positive(density.initial_beta) || !positive(density.final_beta) {
+            return refuse("model.density.initial_beta and final_beta must be positive");
+        }
+        if self.scene_radius.is_some_and(|r| !positive(r)) {
+            return refuse("data.scene_radius must be positive");
+        }
+        if !positive(train.learning_rate) || !positive(train.learning_rate_decay) {
+            return refuse("train.learning_rate and learning_rate_decay must be positive");
+        }
+        if train.views == BatchViews::All
+            && (train.loss.junction_2d > 0.0 || train.matching.weight_2d > 0.0)
+        {
+            return refuse(
+                "train.loss.junction_2d and train.matching.weight_2d need train.views = \"one\": a junction from many views has no single image",
+            );
+        }
+        Ok(())
+    }
+}
+
+/// What memory follows from: name, value, and the most that is reasonable.
+fn sizes(config: &TrainingConfig) -> Vec<(&'static str, usize, usize)> {
+    let (model, train) = (&config.model, &config.train);
+    let (samples, what) = match &train.sampler {
+        RaySamplerConfig::ErrorBound(sampler) => {
+            let refined = (sampler.samples_per_iteration).saturating_mul(sampler.max_iterations);
+            let drawn = (sampler.samples).saturating_add(sampler.extra_samples);
+            let samples = refined.max(drawn.saturating_add(2));
+            (samples, "train.rays times the samples of train.sampler")
+        }
+        RaySamplerConfig::GridCached(sampler) => {
+            let drawn = (sampler.importance_samples).saturating_add(sampler.uniform_samples);
+            let samples = sampler.lookups.max(drawn);
+            (samples, "train.rays times the samples of train.sampler")
+        }
+        RaySamplerConfig::Uniform(sampler) => {
+            (sampler.samples, "train.rays times train.sampler.samples")
+        }
+    };
+    let resolution = match &train.sampler {
+        RaySamplerConfig::GridCached(sampler) => sampler.resolution,
+        RaySamplerConfig::ErrorBound(_) | RaySamplerConfig::Uniform(_) => 0,
+    };
+    let uniform_points = train.eikonal.uniform_points.unwrap_or(0);
+    let junctions = model.perceiver.junctions.fixed().unwrap_or(0);
+    vec![
+        (what, train.rays.saturating_mul(samples.max(1)), MAX_SAMPLES),
+        ("train.sampler.resolution", resolution, MAX_RESOLUTION),
+        ("train.eikonal.uniform_points", uniform_points, MAX_SAMPLES),
+        ("train.surface_points", train.surface_points, MAX_SAMPLES),
+        ("model.perceiver.junctions", junctions, MAX_JUNCTIONS),
+        ("model.perceiver.width", model.perceiver.width, MAX_WIDTH),
+        ("model.implicit.width", model.implicit.width, MAX_WIDTH),
+        (
+            "model.implicit.features",
+            model.implicit.features,
+            MAX_WIDTH,
+        ),
+        (
+            "model.implicit.hidden_layers",
+            model.implicit.hidden_layers,
+            MAX_LAYERS,
+        ),
+        ("model.rendering.width", model.rendering.width, MAX_WIDTH),
+        (
+            "model.rendering.hidden_layers",
+            model.rendering.hidden_layers,
+            MAX_LAYERS,
+        ),
+        ("model.attraction.width", model.attraction.width, MAX_WIDTH),
+        (
+            "model.attraction.hidden_layers",
+            model.attraction.hidden_layers,
+            MAX_LAYERS,
+        ),
+    ]
+}
