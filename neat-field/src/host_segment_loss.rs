@@ -1,5 +1,5 @@
 //! The segment loss with its gradient in one pass on the host: what
-//! [`crate::segment_rendering`] and [`crate::segment_loss`] say in some sixty
+//! [`neat_tensor::cameras`] and [`crate::segment_loss`] say in some sixty
 //! tensor operations over a few hundred rays, each of which costs more than its
 //! arithmetic. Those are its oracle, and its fallback on other devices.
 

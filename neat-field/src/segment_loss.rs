@@ -2,8 +2,8 @@
 //! of the ends by squared distance, the mean absolute difference in calibrated
 //! coordinates, weighted by the detector's score, with a cut-off in pixels.
 
-use crate::segment_rendering::{RayCameras, calibrated_difference_in_pixels};
 use burn::tensor::Tensor;
+use neat_tensor::cameras::{RayCameras, calibrated_difference_in_pixels};
 
 /// How rays are counted in the segment loss.
 #[derive(Clone, Copy, Debug, PartialEq)]

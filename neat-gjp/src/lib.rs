@@ -3,6 +3,14 @@
 //!
 //! This crate takes candidate end points and 2D junctions from anywhere; it
 //! knows no field.
+//!
+//! ```
+//! use neat_gjp::clustering::dbscan_means;
+//!
+//! // Two ends that agree, and one that is alone.
+//! let ends = [[0.0, 0.0, 0.0], [0.002, 0.0, 0.0], [0.5, 0.5, 0.5]];
+//! assert_eq!(dbscan_means(&ends, 0.01, 2).means.len(), 1);
+//! ```
 
 #![forbid(unsafe_code)]
 

@@ -2,8 +2,8 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
-use neat_tensor::ReluMlp;
 use neat_tensor::random::standard_normal;
+use neat_tensor::{NetworkSizeError, ReluMlp};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -70,20 +70,28 @@ pub struct JunctionPerceiver {
 impl PerceiverConfig {
     /// Random latents and decoder.
     ///
-    /// # Panics
-    /// If the number of junctions is not decided; configurations are validated
-    /// before.
-    pub fn init(&self, rng: &mut impl Rng, device: &Device) -> JunctionPerceiver {
-        let junctions = (self.junctions.fixed())
-            .expect("PerceiverConfig::init: the number of junctions is decided");
+    /// # Errors
+    /// If the number of junctions is not decided, or there is none.
+    pub fn init(
+        &self,
+        rng: &mut impl Rng,
+        device: &Device,
+    ) -> Result<JunctionPerceiver, NetworkSizeError> {
+        let junctions = match self.junctions.fixed() {
+            None => Err("model.perceiver.junctions is not decided for this scene"),
+            Some(0) => Err("model.perceiver needs junctions"),
+            Some(_) if self.width == 0 => Err("model.perceiver needs a width"),
+            Some(junctions) => Ok(junctions),
+        };
+        let junctions = junctions.map_err(NetworkSizeError)?;
         let latents: Vec<f32> = (0..junctions * self.width)
             .map(|_| standard_normal(rng) as f32)
             .collect();
         let widths = [self.width, self.width, self.width, 3];
-        JunctionPerceiver {
+        Ok(JunctionPerceiver {
             latents: Param::from_data(TensorData::new(latents, [junctions, self.width]), device),
             decoder: ReluMlp::new(&widths, false, rng, device),
-        }
+        })
     }
 }
 

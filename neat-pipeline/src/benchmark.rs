@@ -6,13 +6,12 @@
 use crate::latents::fit_latents;
 use crate::preset::Preset;
 use crate::scene::scaled_for;
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{DType, Device, Tensor, TensorData};
 use neat_core::synthetic::{SyntheticScene, generate};
 use neat_sdf::ImplicitNetwork;
-use neat_tensor::Backend;
 use neat_tensor::backend::software_driver;
-use neat_tensor::fused::has_own_kernels;
 use neat_tensor::random::{Purpose, stream};
+use neat_tensor::{Backend, Kernels};
 use neat_train::TrainError;
 use neat_train::config::ModelConfig;
 use neat_train::flops::{StepFlops, StepRows};
@@ -118,7 +117,7 @@ impl Part {
 }
 
 /// Measures `presets` on `backend`, each until `seconds` have passed (one step at
-/// least). `progress` hears what comes next, and which share of all is done.
+/// least), with kernels or `plain` tensor operations. `progress` hears what comes next, and which share of all is done.
 ///
 /// # Errors
 /// If a preset cannot be trained.
@@ -127,8 +126,14 @@ pub fn benchmark(
     device: &Device,
     presets: &[Preset],
     seconds: f64,
+    plain: bool,
     progress: &mut dyn FnMut(&str, f64),
 ) -> Result<Benchmark, TrainError> {
+    let kernels = if plain {
+        Kernels::plain()
+    } else {
+        Kernels::default()
+    };
     progress("matrix product", 0.0);
     let views = generate(&views())
         .expect("benchmark: the default scene is valid")
@@ -148,7 +153,9 @@ pub fn benchmark(
         let mut config = preset.config();
         let scene = scaled_for(&config.data, views.clone());
         fit_latents(&mut config, &scene);
-        let mut trainer = Trainer::new(&scene, &config.training(), 0, device)?;
+        let mut training = config.training();
+        training.kernels = kernels.clone();
+        let mut trainer = Trainer::new(&scene, &training, 0, device)?;
         let mut run = Run::default();
         warm_up(&mut trainer, backend, &mut progress)?;
         synchronise(device);
@@ -182,7 +189,7 @@ pub fn benchmark(
         backend,
         device: device_name(device),
         threads: rayon::current_num_threads(),
-        fused: has_own_kernels(device),
+        fused: kernels.on(device, DType::F32).has_kernels(),
         yardstick_side: side,
         yardstick,
         yardstick_again,

@@ -3,7 +3,7 @@
 use crate::config::Config;
 use burn::tensor::TensorData;
 use neat_core::Scene;
-use neat_tensor::{Backend, BackendError};
+use neat_tensor::{Backend, BackendError, Kernels};
 use neat_train::TrainError;
 use neat_train::trainer::{Probe, Trainer};
 use serde::Serialize;
@@ -32,6 +32,8 @@ pub enum CompareError {
 pub struct BackendResult {
     /// The backend.
     pub backend: Backend,
+    /// Whether it ran plain tensor operations alone, without kernels of our own.
+    pub plain: bool,
     /// Median time of a step after the first, in milliseconds.
     pub milliseconds_per_step: f64,
     /// Time of the first step, which compiles kernels on a GPU.
@@ -67,7 +69,8 @@ pub struct Comparison {
     pub backends: Vec<BackendResult>,
 }
 
-/// Trains `steps` steps with the same seed on every backend.
+/// Trains `steps` steps with the same seed on every backend; with `plain`, on each once
+/// more in plain tensor operations alone, which its kernels are compared with so.
 ///
 /// # Errors
 /// If a backend has no device, or a step fails.
@@ -77,17 +80,24 @@ pub fn compare_backends(
     seed: u64,
     steps: u64,
     backends: &[Backend],
+    plain: bool,
     progress: &mut dyn FnMut(&str, f64),
 ) -> Result<Comparison, CompareError> {
     let mut reference: Option<(Probe, Vec<f64>)> = None;
     let mut results = Vec::new();
-    for backend in backends {
+    let twins: &[bool] = if plain { &[false, true] } else { &[false] };
+    let all = backends.iter();
+    for (backend, plain) in all.flat_map(|b| twins.iter().map(move |plain| (b, *plain))) {
         let device = backend.device()?;
         let fail = |source| CompareError::Train {
             backend: *backend,
             source,
         };
-        let mut trainer = Trainer::new(scene, &config.training(), seed, &device).map_err(fail)?;
+        let mut training = config.training();
+        if plain {
+            training.kernels = Kernels::plain();
+        }
+        let mut trainer = Trainer::new(scene, &training, seed, &device).map_err(fail)?;
         let probe = trainer.probe(0.0).map_err(fail)?;
         let (mut losses, mut times) = (Vec::new(), Vec::new());
         let mut peak: Option<f64> = None;
@@ -109,6 +119,7 @@ pub fn compare_backends(
         let gradients = compare_gradients(&reference_probe.gradients, &probe.gradients);
         results.push(BackendResult {
             backend: *backend,
+            plain,
             milliseconds_per_step: later.get(later.len() / 2).copied().unwrap_or(0.0),
             first_step_milliseconds,
             largest_loss_difference: largest(
@@ -200,8 +211,9 @@ impl Comparison {
             // Writing to a string cannot fail.
             let _ = writeln!(
                 table,
-                "| {} | {:.1} | {:.0} ms | {:.1e} | {:.1e} | {:.1e} {} | {:.1e} | {} |",
+                "| {}{} | {:.1} | {:.0} ms | {:.1e} | {:.1e} | {:.1e} {} | {:.1e} | {} |",
                 b.backend,
+                if b.plain { ", plain" } else { "" },
                 b.milliseconds_per_step,
                 b.first_step_milliseconds,
                 b.largest_loss_difference,

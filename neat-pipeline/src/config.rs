@@ -7,6 +7,7 @@ use crate::background::Background;
 use neat_core::SphereChoice;
 use neat_core::layout::PoseConvention;
 use neat_detect::DetectorConfig;
+use neat_tensor::Kernels;
 use neat_train::config::{ModelConfig, TrainConfig, TrainingConfig};
 use neat_wireframe::confidence::ConfidenceConfig;
 use neat_wireframe::fast::FastBackEndConfig;
@@ -40,6 +41,7 @@ impl Config {
             min_segment_score: self.data.min_segment_score,
             attraction_distance: self.data.attraction_distance,
             scene_radius: self.data.scene_radius,
+            kernels: Kernels::default(),
         }
     }
 }

@@ -154,6 +154,7 @@ impl PipelineError {
             Self::Train(error) => matches!(
                 error,
                 TrainError::Config(_)
+                    | TrainError::Network(_)
                     | TrainError::NoRegionPixel(_)
                     | TrainError::Parameters(_)
                     | TrainError::Checkpoint(_)

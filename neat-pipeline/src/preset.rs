@@ -122,6 +122,7 @@ mod tests {
     use super::*;
     use crate::overrides::apply_overrides;
     use neat_gjp::JunctionCount;
+    use neat_train::config::TrainingConfig;
 
     #[test]
     fn every_preset_survives_the_way_to_disk_and_back() {
@@ -140,6 +141,17 @@ mod tests {
         }
         let message = "fats".parse::<Preset>().unwrap_err().to_string();
         assert!(message.contains("`fats`") && message.contains("paper-dtu"));
+    }
+
+    #[test]
+    fn the_default_of_training_is_the_published_one() {
+        let (preset, default) = (
+            Preset::PaperAbc.config().training(),
+            TrainingConfig::default(),
+        );
+        assert_eq!((preset.model, preset.train), (default.model, default.train));
+        assert_eq!(preset.attraction_distance, default.attraction_distance);
+        assert_eq!(preset.scene_radius, default.scene_radius);
     }
 
     #[test]
@@ -190,40 +202,5 @@ mod tests {
         assert_eq!(config.data.scene_radius, None);
         assert_eq!(config.model.implicit.skip_layer, 0);
         assert_eq!(config.model.implicit.bounding_sphere_slope, 0.0);
-    }
-
-    fn refusal(change: impl Fn(&mut Config)) -> String {
-        let mut config = Preset::Fast.config();
-        change(&mut config);
-        let result = config.training().validate();
-        result.map_or_else(|error| error.to_string(), |()| String::new())
-    }
-
-    #[test]
-    fn sizes_beyond_any_machine_are_refused_by_name() {
-        let huge = 100_000_000_000;
-        let rays = refusal(|config| config.train.rays = huge);
-        assert!(rays.contains("train.rays times the samples"), "{rays}");
-        let most = refusal(|config| config.train.rays = usize::MAX);
-        assert!(most.contains("67108864"), "{most}");
-        let width = refusal(|config| config.model.implicit.width = huge);
-        assert!(
-            width.contains("model.implicit.width is 100000000000"),
-            "{width}"
-        );
-        let layers = refusal(|config| config.model.attraction.hidden_layers = huge);
-        assert!(
-            layers.contains("model.attraction.hidden_layers"),
-            "{layers}"
-        );
-        let points = refusal(|config| config.train.eikonal.uniform_points = Some(huge));
-        assert!(points.contains("train.eikonal.uniform_points"), "{points}");
-        let junctions = refusal(|config| {
-            config.model.perceiver.junctions = JunctionCount::Fixed(huge);
-        });
-        assert!(
-            junctions.contains("model.perceiver.junctions"),
-            "{junctions}"
-        );
     }
 }

@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ..ImplicitNetworkConfig::default()
     };
     // The geometric initialisation: about the distance from a sphere of radius 0.5.
-    let network = config.init(1.0, &mut stream(0, Purpose::Weights, 0), &device);
+    let network = config.init(1.0, &mut stream(0, Purpose::Weights, 0), &device)?;
 
     let points = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, -0.9, 0.0]];
     let data = TensorData::new(points.concat(), [points.len(), 3]);

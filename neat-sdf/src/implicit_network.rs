@@ -3,10 +3,11 @@
 use crate::ray_sampler::DistanceQuery;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
-use neat_tensor::fused::{KnownPass, KnownRows};
-use neat_tensor::kernels::softplus_network::SoftplusNetwork;
+use neat_tensor::kernels::cpu::softplus_network::SoftplusNetwork;
 use neat_tensor::linear::{Linear, LinearInit};
-use neat_tensor::{CoordinateMlp, FieldQuery, PositionalEncoding};
+use neat_tensor::{
+    CoordinateMlp, FieldQuery, Kernels, KnownPass, KnownRows, NetworkSizeError, PositionalEncoding,
+};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 use std::sync::{Arc, OnceLock};
@@ -90,14 +91,29 @@ impl ImplicitNetworkConfig {
     /// A network that approximates a sphere (geometric initialisation, SAL,
     /// Atzmon & Lipman 2020, in the published variant: see `docs/parity.md`).
     ///
-    /// # Panics
-    /// If a skip layer leaves the layer before it without outputs; configurations
-    /// are validated before.
-    pub fn init(&self, scene_radius: f64, rng: &mut impl Rng, device: &Device) -> ImplicitNetwork {
+    /// # Errors
+    /// If there is no hidden layer, or a skip layer leaves the layer before it without
+    /// outputs.
+    pub fn init(
+        &self,
+        scene_radius: f64,
+        rng: &mut impl Rng,
+        device: &Device,
+    ) -> Result<ImplicitNetwork, NetworkSizeError> {
+        if self.hidden_layers == 0 || self.width == 0 {
+            return Err(NetworkSizeError(
+                "model.implicit needs at least one hidden layer and a width above 0",
+            ));
+        }
         let encoding = PositionalEncoding {
             octaves: self.octaves,
         };
         let encoded = encoding.output_width(3);
+        if self.skip_layer > 0 && self.width <= encoded {
+            return Err(NetworkSizeError(
+                "model.implicit.width must exceed the width of the encoding, 3 + 6 octaves, where a skip layer is used",
+            ));
+        }
         let last = self.hidden_layers;
         let radius = self.initial_sphere * scene_radius;
         let mut layers = Vec::with_capacity(last + 1);
@@ -105,11 +121,7 @@ impl ImplicitNetworkConfig {
             let inputs = if l == 0 { encoded } else { self.width };
             let outputs = match l {
                 _ if l == last => 1 + self.features,
-                _ if self.skip_layer == l + 1 => self
-                    .width
-                    .checked_sub(encoded)
-                    .filter(|w| *w > 0)
-                    .expect("ImplicitNetworkConfig::init: width exceeds the encoding's"),
+                _ if self.skip_layer == l + 1 => self.width - encoded,
                 _ => self.width,
             };
             let init = if l == last {
@@ -134,16 +146,17 @@ impl ImplicitNetworkConfig {
                 device,
             ));
         }
-        ImplicitNetwork {
+        Ok(ImplicitNetwork {
             mlp: CoordinateMlp {
                 layers,
                 octaves: self.octaves,
                 skip: Some(self.skip_layer).filter(|l| *l > 0),
                 sharpness: SOFTPLUS_SHARPNESS,
+                kernels: Kernels::default(),
             },
             bounding_sphere_slope: Some(self.bounding_sphere_slope).filter(|s| *s > 0.0),
             scene_radius,
-        }
+        })
     }
 
     fn last_layer(
@@ -333,7 +346,7 @@ impl Distances {
     pub fn pass(&self, points: &[[f32; 3]]) -> (Vec<f32>, Option<Arc<KnownPass>>) {
         let pass = self
             .on_host()
-            .and_then(|network| KnownPass::run(network, points.as_flattened()));
+            .and_then(|network| self.network.mlp.known_pass(network, points.as_flattened()));
         match pass {
             Some(pass) => (pass.pass.first.clone(), Some(Arc::new(pass))),
             None => (self.uncapped(points), None),

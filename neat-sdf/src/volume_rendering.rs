@@ -2,7 +2,7 @@
 
 use crate::ray_sampler::RaySamples;
 use burn::tensor::{IndexingUpdateOp, Int, Tensor, TensorData};
-use neat_tensor::kernels::density::passed_shares;
+use neat_tensor::kernels::cpu::density::passed_shares;
 
 /// Weight of every sample: `w_i = (1 − exp(−δ_i σ_i)) · exp(−Σ_{j<i} δ_j σ_j)`.
 ///

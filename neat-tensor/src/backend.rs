@@ -126,6 +126,19 @@ impl Backend {
     }
 }
 
+/// Whether `device` is the CPU, whose memory is the host's.
+#[allow(deprecated)] // ndarray is still one of the backends that neat promises
+pub fn is_on_host(device: &Device) -> bool {
+    use burn::backend::DispatchDevice;
+    match device.clone().inner().as_dispatch() {
+        #[cfg(feature = "flex")]
+        DispatchDevice::Flex(_) => true,
+        #[cfg(feature = "ndarray")]
+        DispatchDevice::NdArray(_) => true,
+        _ => false,
+    }
+}
+
 /// The name of the software driver that `device` computes through, if it does:
 /// right, but many times slower than the CPU backends. [`Backend::Auto`] never
 /// picks one.

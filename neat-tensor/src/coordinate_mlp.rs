@@ -7,16 +7,17 @@
 //! of the recorded pre-activations like any other, which reverse mode then
 //! differentiates for the eikonal, colour and segment terms.
 //!
-//! On the CPU in float32, [`CoordinateMlp::field`] is one fused operation instead
-//! ([`crate::fused`]), which these tensor operations explain and check.
+//! On the CPU in float32, [`CoordinateMlp::field`] is one operation instead
+//! ([`crate::kernels::cpu`]), which these tensor operations explain and check.
 
 use crate::encoding::PositionalEncoding;
-use crate::fused::{self, KnownRows, SoftplusRequest};
-use crate::kernels::softplus_network::{SoftplusNetwork, SoftplusShape};
-use crate::linear::{Linear, affine, flat_parameters, layer_shapes};
-use crate::softplus::{softplus, times_softplus_slope};
+use crate::kernel_choice::Kernels;
+use crate::kernels::cpu::KnownPass;
+use crate::kernels::cpu::softplus_network::SoftplusNetwork;
+use crate::linear::{Linear, affine, flat_parameters};
+use crate::neat_backend::{DistanceNetwork, Field, FieldQuery, NeatBackend};
 use burn::module::Module;
-use burn::tensor::{DType, Tensor};
+use burn::tensor::Tensor;
 use pulp::Arch;
 
 /// A softplus perceptron over the positional encoding of points.
@@ -33,6 +34,9 @@ pub struct CoordinateMlp {
     /// Sharpness of the softplus (100 in VolSDF).
     #[module(skip)]
     pub sharpness: f64,
+    /// Which operations it runs.
+    #[module(skip)]
+    pub kernels: Kernels,
 }
 
 impl CoordinateMlp {
@@ -45,8 +49,12 @@ impl CoordinateMlp {
     /// Evaluates the network at `points` `[N, 3]` and keeps what the gradient
     /// needs: callers decide by the outputs where they want it.
     pub fn record(&self, points: Tensor<2>) -> Recorded {
+        self.record_by(self.kernels.of(&points), points)
+    }
+
+    fn record_by(&self, by: &(impl NeatBackend + ?Sized), points: Tensor<2>) -> Recorded {
         let weights: Vec<_> = self.layers.iter().map(Linear::effective_weight).collect();
-        let encoded = self.encoding().encode(points.clone());
+        let encoded = by.encode(self.encoding(), points.clone());
         let last = self.layers.len() - 1;
         let mut pre_activations = Vec::with_capacity(last);
         let mut h = encoded.clone();
@@ -57,7 +65,7 @@ impl CoordinateMlp {
             let z = affine(h, weights[l].clone(), layer.bias.val());
             if l < last {
                 pre_activations.push(z.clone());
-                h = softplus(z, self.sharpness);
+                h = by.softplus(z, self.sharpness);
             } else {
                 h = z;
             }
@@ -76,50 +84,29 @@ impl CoordinateMlp {
     }
 }
 
-/// Which rows of a query want what.
-#[derive(Clone, Debug, Default)]
-pub struct FieldQuery {
-    /// Of so many last rows only the first output is wanted; the others are full
-    /// rows.
-    pub light_rows: usize,
-    /// What an earlier pass with the same parameters says of the rows: a fused
-    /// operation does not compute it again.
-    pub known: Option<KnownRows>,
-    /// Whether full rows want the outputs beyond the first.
-    pub others: bool,
-}
-
-/// What a network says of `N` points, the first `H` of them full rows.
-#[derive(Clone, Debug)]
-pub struct Field {
-    /// First output `[N, 1]`.
-    pub first: Tensor<2>,
-    /// Its gradient with respect to the point `[H, 3]`.
-    pub gradient: Tensor<2>,
-    /// The other outputs `[H, out − 1]`, if asked for.
-    pub others: Option<Tensor<2>>,
-}
-
 impl CoordinateMlp {
     /// First output, its gradient and the other outputs at `points` `[N, 3]`, as
     /// far as `query` wants them.
     pub fn field(&self, points: Tensor<2>, query: FieldQuery) -> Field {
-        if fused::takes_fused(&points) {
-            self.fused_field(points, query)
-        } else {
-            self.plain_field(points, query)
-        }
+        let backend = self.kernels.of(&points);
+        let fused = backend.distance_network(self.network(), points.clone(), query.clone());
+        fused.unwrap_or_else(|| self.field_by(backend, points, query))
     }
 
-    /// [`Self::field`] in plain tensor operations, on any device: the readable
-    /// twin of the fused operation.
-    pub fn plain_field(&self, points: Tensor<2>, query: FieldQuery) -> Field {
+    /// [`Self::field`] in tensor operations, each as `by` does it: with
+    /// [`crate::Plain`], the readable twin of all kernels.
+    pub fn field_by(
+        &self,
+        by: &(impl NeatBackend + ?Sized),
+        points: Tensor<2>,
+        query: FieldQuery,
+    ) -> Field {
         let full_rows = points.dims()[0] - query.light_rows;
-        let pass = self.record(points);
+        let pass = self.record_by(by, points);
         let outputs = pass.outputs.dims()[1];
         Field {
             first: pass.outputs.clone().narrow(1, 0, 1),
-            gradient: pass.head(full_rows).gradient(self),
+            gradient: pass.head(full_rows).gradient_by(by, self),
             others: query.others.then(|| {
                 let full = pass.outputs.narrow(0, 0, full_rows);
                 full.narrow(1, 1, outputs - 1)
@@ -127,40 +114,34 @@ impl CoordinateMlp {
         }
     }
 
-    fn fused_field(&self, points: Tensor<2>, query: FieldQuery) -> Field {
-        let request = SoftplusRequest {
-            shape: self.shape(),
-            full_rows: points.dims()[0] - query.light_rows,
-            others: query.others,
-            known: query.known,
-        };
-        let (first, gradient, others) =
-            fused::softplus_network(points, flat_parameters(&self.layers), request);
-        Field {
-            first,
-            gradient,
-            others,
-        }
-    }
-
     /// The network on the host, for queries without gradients: where it computes
     /// on the CPU in float32.
     pub fn on_host(&self) -> Option<SoftplusNetwork> {
         let parameters = flat_parameters(&self.layers).detach();
-        if parameters.dtype() != DType::F32 || !fused::is_fused(&parameters.device()) {
+        if !self.kernels.of(&parameters).works_on_host() {
             return None;
         }
         let parameters = parameters.into_data();
         let parameters = parameters.as_slice().ok()?;
-        Some(SoftplusNetwork::new(Arch::new(), &self.shape(), parameters))
+        Some(SoftplusNetwork::new(
+            Arch::new(),
+            &self.network().shape(),
+            parameters,
+        ))
     }
 
-    fn shape(&self) -> SoftplusShape {
-        SoftplusShape {
-            layers: layer_shapes(&self.layers),
+    /// A pass of `network`, which is this one [`Self::on_host`], over `points` `[N · 3]`,
+    /// where there is room to keep it.
+    pub fn known_pass(&self, network: &SoftplusNetwork, points: &[f32]) -> Option<KnownPass> {
+        KnownPass::run(network, points, self.kernels.memory())
+    }
+
+    fn network(&self) -> DistanceNetwork<'_> {
+        DistanceNetwork {
+            layers: &self.layers,
             octaves: self.octaves,
             skip: self.skip,
-            sharpness: self.sharpness as f32,
+            sharpness: self.sharpness,
         }
     }
 }
@@ -193,6 +174,10 @@ impl Recorded {
     /// Gradient of output 0 with respect to the points, `[N, 3]`: the reverse
     /// sweep through `mlp`, which made the pass.
     pub fn gradient(&self, mlp: &CoordinateMlp) -> Tensor<2> {
+        self.gradient_by(mlp.kernels.of(&self.points), mlp)
+    }
+
+    fn gradient_by(&self, by: &(impl NeatBackend + ?Sized), mlp: &CoordinateMlp) -> Tensor<2> {
         let weights = &self.weights;
         let rows = self.points.dims()[0];
         let last = weights.len() - 1;
@@ -206,7 +191,8 @@ impl Recorded {
         for l in (0..=last).rev() {
             if l < last {
                 let z = self.pre_activations[l].clone();
-                g = times_softplus_slope(g, z, mlp.sharpness).matmul(weights[l].clone());
+                let slope = by.times_softplus_slope(g, z, mlp.sharpness);
+                g = slope.matmul(weights[l].clone());
             }
             if mlp.skip == Some(l) {
                 let scaled = g.div_scalar(std::f64::consts::SQRT_2);
@@ -218,6 +204,6 @@ impl Recorded {
         if let Some(skipped) = to_encoding {
             g = g + skipped;
         }
-        mlp.encoding().pull_back(self.points.clone(), g)
+        by.pull_back(mlp.encoding(), self.points.clone(), g)
     }
 }

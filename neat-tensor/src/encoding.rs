@@ -1,7 +1,5 @@
 //! Positional encoding of coordinates.
 
-#[cfg(feature = "wgpu")]
-use crate::device_kernels;
 use crate::sine::{cosine, sine};
 use burn::tensor::Tensor;
 
@@ -24,15 +22,6 @@ impl PositionalEncoding {
         if self.octaves == 0 {
             return x;
         }
-        #[cfg(feature = "wgpu")]
-        if device_kernels::takes_kernels(&x.device(), x.dtype()) {
-            return device_kernels::encoding::encode(x, self.octaves);
-        }
-        self.plain_encode(x)
-    }
-
-    /// [`Self::encode`] in tensor operations, with at least one octave.
-    pub fn plain_encode(&self, x: Tensor<2>) -> Tensor<2> {
         let (sines, cosines) = self.sines_and_cosines(x.clone());
         let width = x.dims()[1];
         let mut blocks = vec![x];
@@ -50,15 +39,6 @@ impl PositionalEncoding {
         if self.octaves == 0 {
             return gradient;
         }
-        #[cfg(feature = "wgpu")]
-        if device_kernels::takes_kernels(&x.device(), x.dtype()) {
-            return device_kernels::encoding::pull_back(x, gradient, self.octaves);
-        }
-        self.plain_pull_back(x, gradient)
-    }
-
-    /// [`Self::pull_back`] in tensor operations, with at least one octave.
-    pub fn plain_pull_back(&self, x: Tensor<2>, gradient: Tensor<2>) -> Tensor<2> {
         let width = x.dims()[1];
         let (sines, cosines) = self.sines_and_cosines(x);
         let mut sum = gradient.clone().narrow(1, 0, width);

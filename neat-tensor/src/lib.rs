@@ -1,35 +1,54 @@
-//! Devices, coordinate networks with input gradients, and checkpoints, on burn.
+//! Devices, coordinate networks with input gradients, an optimiser and checkpoints, on
+//! burn.
 //!
-//! A backend is a run-time [`burn::tensor::Device`]; nothing here is generic
-//! over backends. What the networks need beyond plain layers — the positional
-//! encoding's Jacobian, softplus with its derivative, a multilayer perceptron
-//! that also returns the gradient of its output with respect to its input — is
-//! written in plain tensor operations, so that first-order reverse mode
-//! differentiates the input gradient once more. Beside them stand hand-written
-//! twins that compute the same: for the CPU whole networks as single operations
-//! ([`fused`]) over [`kernels`], for GPUs `device_kernels`, one for what would
-//! take many.
+//! A backend is a run-time [`burn::tensor::Device`]; nothing here is generic over
+//! backends. What the networks need beyond plain layers (the positional encoding's
+//! Jacobian, softplus with its derivative, a perceptron that also returns the gradient of
+//! its output with respect to its input) is written in plain tensor operations, so that
+//! first-order reverse mode differentiates the input gradient once more. [`NeatBackend`]
+//! is the one trait of these operations: plain by default, and overridden by the kernels
+//! of the CPU and of GPUs in [`kernels`]; [`Kernels`] chooses.
+//!
+//! ```
+//! use burn::tensor::Tensor;
+//! use neat_tensor::random::{Purpose, stream};
+//! use neat_tensor::{Backend, ReluMlp};
+//!
+//! let device = Backend::Auto.device()?;
+//! let mlp = ReluMlp::new(&[3, 16, 1], false, &mut stream(0, Purpose::Weights, 0), &device);
+//! let outputs = mlp.forward(Tensor::zeros([5, 3], &device));
+//! assert_eq!(outputs.dims(), [5, 1]);
+//! # Ok::<(), neat_tensor::BackendError>(())
+//! ```
 
 pub mod adam;
 pub mod backend;
+pub mod cameras;
 pub mod checkpoint;
-pub mod coordinate_mlp;
+mod coordinate_mlp;
+mod cpu_backend;
+mod encoding;
 #[cfg(feature = "wgpu")]
-pub mod device_kernels;
-pub mod encoding;
-pub mod fused;
-#[allow(
-    unsafe_code,
-    reason = "register tiles over raw pointers, each with its bounds checked"
-)]
+mod gpu_backend;
+pub mod host;
+mod kernel_choice;
 pub mod kernels;
 pub mod linear;
+mod neat_backend;
 pub mod parameters;
 pub mod random;
-pub mod sine;
+mod relu_mlp;
+pub mod sampling;
+mod sine;
 pub mod softplus;
 
 pub use backend::{Backend, BackendError};
-pub use coordinate_mlp::{CoordinateMlp, Field, FieldQuery, Recorded};
+pub use coordinate_mlp::{CoordinateMlp, Recorded};
 pub use encoding::PositionalEncoding;
-pub use linear::{Linear, ReluMlp, SampleInputs};
+pub use kernel_choice::Kernels;
+pub use kernels::cpu::{KnownPass, KnownRows};
+pub use linear::{Linear, NetworkSizeError};
+pub use neat_backend::{
+    AdamNumbers, DistanceNetwork, Field, FieldQuery, NeatBackend, Plain, SampleInputs,
+};
+pub use relu_mlp::ReluMlp;

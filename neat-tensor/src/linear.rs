@@ -1,13 +1,15 @@
-//! Affine layers, plain or with weight normalisation, and the ReLU perceptron.
+//! Affine layers, plain or with weight normalisation.
 
-use crate::encoding::PositionalEncoding;
-use crate::fused;
-use crate::kernels::layers::LayerShape;
-use crate::kernels::relu_network::{PartShape, ReluShape};
+use crate::kernels::cpu::layers::LayerShape;
 use crate::random::standard_normal;
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor, TensorData, activation};
+use burn::tensor::{Device, Tensor, TensorData};
 use rand::{Rng, RngExt};
+
+/// A network cannot have the size that its configuration asks for.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct NetworkSizeError(pub &'static str);
 
 /// Initial weights of one layer, row-major `[out, in]`, before normalisation.
 #[derive(Clone, Debug, PartialEq)]
@@ -169,108 +171,4 @@ pub(crate) fn flat_parameters(layers: &[Linear]) -> Tensor<1> {
         [weight.reshape([count]), layer.bias.val()]
     });
     Tensor::cat(flat.collect(), 0)
-}
-
-/// Per row: what a perceptron over samples of a signed distance field sees.
-#[derive(Clone, Debug)]
-pub struct SampleInputs {
-    /// Columns that carry no gradient in training, `[N, C]`: points, directions.
-    pub rays: Tensor<2>,
-    /// How they are read, in order: first column, columns, octaves.
-    pub ray_parts: Vec<(usize, usize, PositionalEncoding)>,
-    /// Gradients of the distance `[N, 3]`.
-    pub gradients: Tensor<2>,
-    /// Features `[N, F]`.
-    pub features: Tensor<2>,
-}
-
-/// A perceptron with ReLU between its layers and a linear last layer.
-#[derive(Module, Debug)]
-pub struct ReluMlp {
-    /// The layers, first to last.
-    pub layers: Vec<Linear>,
-}
-
-impl ReluMlp {
-    /// `widths[0]` inputs, then each layer's outputs; PyTorch's default
-    /// initialisation.
-    pub fn new(widths: &[usize], weight_norm: bool, rng: &mut impl Rng, device: &Device) -> Self {
-        let layers = widths
-            .windows(2)
-            .map(|w| {
-                let init = LinearInit::uniform(w[0], w[1], rng);
-                Linear::new(&init, w[0], w[1], weight_norm, device)
-            })
-            .collect();
-        Self { layers }
-    }
-
-    /// `[N, in]` → `[N, out]`.
-    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
-        let (last, hidden) = self
-            .layers
-            .split_last()
-            .expect("ReluMlp: a perceptron has at least one layer");
-        let x = hidden
-            .iter()
-            .fold(x, |x, layer| activation::relu(layer.forward(x)));
-        last.forward(x)
-    }
-
-    /// [`Self::forward`] of encoded ray columns, gradients and features side by
-    /// side.
-    pub fn forward_samples(&self, inputs: SampleInputs) -> Tensor<2> {
-        if fused::takes_fused(&inputs.rays) {
-            self.fused_samples(inputs)
-        } else {
-            self.plain_samples(inputs)
-        }
-    }
-
-    /// [`Self::forward_samples`] in plain tensor operations, on any device: the
-    /// readable twin of the fused operation.
-    pub fn plain_samples(&self, inputs: SampleInputs) -> Tensor<2> {
-        let mut columns: Vec<Tensor<2>> = inputs
-            .ray_parts
-            .iter()
-            .map(|(first, width, encoding)| {
-                encoding.encode(inputs.rays.clone().narrow(1, *first, *width))
-            })
-            .collect();
-        columns.extend([inputs.gradients, inputs.features]);
-        self.forward(Tensor::cat(columns, 1))
-    }
-
-    fn fused_samples(&self, inputs: SampleInputs) -> Tensor<2> {
-        let sources = [&inputs.rays, &inputs.gradients, &inputs.features].map(|t| t.dims()[1]);
-        let whole = |source: usize| PartShape {
-            source,
-            column: 0,
-            width: sources[source],
-            octaves: 0,
-        };
-        let mut parts: Vec<PartShape> = inputs
-            .ray_parts
-            .iter()
-            .map(|(column, width, encoding)| PartShape {
-                source: 0,
-                column: *column,
-                width: *width,
-                octaves: encoding.octaves,
-            })
-            .collect();
-        parts.extend([whole(1), whole(2)]);
-        let shape = ReluShape {
-            layers: layer_shapes(&self.layers),
-            sources: sources.to_vec(),
-            parts,
-        };
-        fused::relu_network(
-            inputs.rays,
-            inputs.gradients,
-            inputs.features,
-            flat_parameters(&self.layers),
-            shape,
-        )
-    }
 }

@@ -1,6 +1,6 @@
 //! Parameters of a module by name: reading, writing, counting.
 
-use crate::fused::is_fused;
+use crate::backend::is_on_host;
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::{DType, Tensor, TensorData};
@@ -105,7 +105,7 @@ impl ModuleVisitor for FiniteGradients<'_> {
         let Some(gradient) = self.gradients.get::<D>(param.id) else {
             return;
         };
-        if !is_fused(&gradient.device()) {
+        if !is_on_host(&gradient.device()) {
             self.sums.push(gradient.sum());
             return;
         }

@@ -4,7 +4,7 @@
 //! measured where all else was right to 2·10⁻⁷. That would be the largest error
 //! of a whole network, so on a GPU the encoding sums a series instead.
 
-use crate::fused::is_on_host;
+use crate::backend::is_on_host;
 use burn::tensor::{DType, Tensor};
 use std::f64::consts::FRAC_1_PI;
 

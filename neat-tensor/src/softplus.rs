@@ -1,7 +1,5 @@
 //! Softplus, the activation of signed distance networks.
 
-#[cfg(feature = "wgpu")]
-use crate::device_kernels;
 use burn::tensor::{Tensor, activation};
 
 /// `ln(1 + exp(sharpness · z)) / sharpness`, without overflow for any `z`.
@@ -9,15 +7,6 @@ use burn::tensor::{Tensor, activation};
 /// With the sharpness of 100 that VolSDF uses it is a ReLU rounded within a few
 /// hundredths of zero.
 pub fn softplus<const D: usize>(z: Tensor<D>, sharpness: f64) -> Tensor<D> {
-    #[cfg(feature = "wgpu")]
-    if device_kernels::takes_kernels(&z.device(), z.dtype()) {
-        return device_kernels::activations::softplus(z, sharpness);
-    }
-    plain_softplus(z, sharpness)
-}
-
-/// [`softplus`] in tensor operations.
-pub fn plain_softplus<const D: usize>(z: Tensor<D>, sharpness: f64) -> Tensor<D> {
     // max(z, 0) + ln(1 + exp(-sharpness |z|)) / sharpness, where max(z, 0) is
     // written with the same |z|: reverse mode then gives ½ at zero, as it must.
     let magnitude = z.clone().abs();
@@ -32,19 +21,6 @@ pub fn plain_softplus<const D: usize>(z: Tensor<D>, sharpness: f64) -> Tensor<D>
 
 /// `g` times the derivative of [`softplus`] at `z`, which is `sigmoid(sharpness · z)`.
 pub fn times_softplus_slope<const D: usize>(
-    g: Tensor<D>,
-    z: Tensor<D>,
-    sharpness: f64,
-) -> Tensor<D> {
-    #[cfg(feature = "wgpu")]
-    if device_kernels::takes_kernels(&z.device(), z.dtype()) {
-        return device_kernels::activations::times_slope(g, z, sharpness);
-    }
-    plain_times_softplus_slope(g, z, sharpness)
-}
-
-/// [`times_softplus_slope`] in tensor operations.
-pub fn plain_times_softplus_slope<const D: usize>(
     g: Tensor<D>,
     z: Tensor<D>,
     sharpness: f64,

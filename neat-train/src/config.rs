@@ -2,14 +2,18 @@
 //!
 //! Unknown keys are errors.
 
-use neat_field::AttractionNetworkConfig;
-use neat_gjp::{CandidateConfig, MatchingConfig, PerceiverConfig};
-use neat_sdf::{DensityConfig, ImplicitNetworkConfig, RaySamplerConfig, RenderingNetworkConfig};
+use crate::flops::StepRows;
+pub use crate::losses::{EikonalConfig, LossConfig};
+pub use crate::model::ModelConfig;
+use neat_gjp::{CandidateConfig, MatchingConfig};
+use neat_sdf::RaySamplerConfig;
+use neat_sdf::ray_sampler::ErrorBoundConfig;
+use neat_tensor::Kernels;
 use neat_tensor::adam::AdamConfig;
 use serde::{Deserialize, Serialize};
 
 /// Everything that a trainer is made by, but for scene, seed and device.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct TrainingConfig {
     /// The networks.
     pub model: ModelConfig,
@@ -21,22 +25,8 @@ pub struct TrainingConfig {
     pub attraction_distance: f64,
     /// Radius of the modelled ball; `None` takes that of the scene sphere.
     pub scene_radius: Option<f64>,
-}
-
-/// The networks.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ModelConfig {
-    /// Signed distance and features.
-    pub implicit: ImplicitNetworkConfig,
-    /// Radiance.
-    pub rendering: RenderingNetworkConfig,
-    /// 3D segments.
-    pub attraction: AttractionNetworkConfig,
-    /// From signed distance to density.
-    pub density: DensityConfig,
-    /// Global junctions.
-    pub perceiver: PerceiverConfig,
+    /// Which operations networks and optimiser run, in how much memory.
+    pub kernels: Kernels,
 }
 
 /// Which views one batch of rays comes from.
@@ -118,46 +108,68 @@ fn default_kept_checkpoints() -> usize {
     2
 }
 
-/// Where the eikonal term samples the gradient.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct EikonalConfig {
-    /// Points drawn uniformly in the cube around the scene ball; `None` draws as
-    /// many as there are rays, as published.
-    pub uniform_points: Option<usize>,
-    /// One random sample of every ray is added, as published.
-    pub one_sample_per_ray: bool,
-    /// All samples that are rendered are added.
-    pub rendered_samples: bool,
+impl Default for TrainConfig {
+    /// As published for ABC.
+    fn default() -> Self {
+        Self {
+            steps: 200_000,
+            rays: 1024,
+            ray_chunk: None,
+            background_share: 0.0,
+            views: BatchViews::One,
+            with_replacement: true,
+            sampler: RaySamplerConfig::ErrorBound(ErrorBoundConfig::default()),
+            min_sample_weight: None,
+            eikonal: EikonalConfig::default(),
+            surface_points: 0,
+            loss: LossConfig::default(),
+            candidates: CandidateConfig::published(),
+            only_counted_ends: false,
+            matching: MatchingConfig::published(),
+            junction_interval: 1,
+            adam: AdamConfig::default(),
+            learning_rate: 5e-4,
+            junction_learning_rate: 5e-4,
+            learning_rate_decay: 0.1,
+            warm_up_steps: 0,
+            checkpoint_interval: 5000,
+            checkpoint_seconds: default_checkpoint_seconds(),
+            kept_checkpoints: default_kept_checkpoints(),
+        }
+    }
 }
 
-/// Weights of the loss terms.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LossConfig {
-    /// Colour, L1.
-    pub rgb: f64,
-    /// Eikonal term.
-    pub eikonal: f64,
-    /// Cross entropy of the accumulated weight against the silhouette of images
-    /// on a black background.
-    pub mask: f64,
-    /// 3D segments, calibrated L1.
-    pub segment: f64,
-    /// 3D distance of matched junctions.
-    pub junction_3d: f64,
-    /// Distance of their projections (calibrated).
-    pub junction_2d: f64,
-    /// Distance of the surface from sparse points of the scene, in the world.
-    #[serde(default)]
-    pub points: f64,
-    /// Rays whose segment misses its 2D segment by this many pixels or more do
-    /// not count.
-    pub segment_cutoff_in_pixels: f64,
-    /// Rays whose accumulated weight is not above this do not count in the
-    /// segment term; `None` counts all, as published.
-    pub segment_min_opacity: Option<f64>,
-    /// Divides the segment term by all rays, as published, instead of by those
-    /// that count.
-    pub segment_mean_over_all_rays: bool,
+impl Default for TrainingConfig {
+    /// As published for ABC.
+    fn default() -> Self {
+        Self {
+            model: ModelConfig::default(),
+            train: TrainConfig::default(),
+            min_segment_score: 0.05,
+            attraction_distance: 10.0,
+            scene_radius: Some(3.0),
+            kernels: Kernels::default(),
+        }
+    }
+}
+
+impl TrainConfig {
+    /// Gradients that the eikonal term is the mean over.
+    pub(crate) fn eikonal_rows(&self, rows: &StepRows) -> usize {
+        if self.eikonal.rendered_samples {
+            rows.eikonal + rows.full
+        } else {
+            rows.eikonal
+        }
+    }
+
+    /// Factor on the learning rates in iteration `iteration` (counted from 0), when
+    /// the share `schedule` of the run is done: warm-up times exponential decay.
+    pub fn learning_rate_factor(&self, iteration: u64, schedule: f64) -> f64 {
+        let warm_up = match self.warm_up_steps {
+            0 => 1.0,
+            steps => ((iteration + 1) as f64 / steps as f64).min(1.0),
+        };
+        warm_up * self.learning_rate_decay.powf(schedule)
+    }
 }

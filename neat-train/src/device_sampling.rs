@@ -1,13 +1,11 @@
 //! Placing the samples of training steps on a GPU, without waiting for it.
 
-use crate::config::TrainConfig;
-use crate::sample_placement::StepToSample;
 use burn::module::Module;
-use burn::tensor::Device;
-use neat_sdf::DeviceSamples;
+use burn::tensor::{DType, Device, Tensor};
 use neat_sdf::device_sampler::{DeviceGrid, DeviceRays, Progress};
 use neat_sdf::ray_sampler::{RaySampler, Seeded};
-use neat_tensor::device_kernels::has_kernels;
+use neat_sdf::{DeviceSamples, ImplicitNetwork, RayBundle};
+use neat_tensor::Kernels;
 use rand::Rng;
 
 /// After so many steps that needed fewer iterations than were launched, one less
@@ -36,15 +34,19 @@ pub(crate) struct SamplesOnDevice {
 }
 
 impl DeviceSampling {
-    /// Where `device` has kernels that can sample so.
-    pub fn new(train: &TrainConfig, sampler: &RaySampler, device: &Device) -> Option<Self> {
-        let in_passes = train.ray_chunk.is_some_and(|chunk| chunk < train.rays);
+    /// Where `device` has kernels that can sample `rays` rays so.
+    pub fn new(
+        rays: usize,
+        sampler: &RaySampler,
+        kernels: &Kernels,
+        device: &Device,
+    ) -> Option<Self> {
         let can = match sampler {
-            RaySampler::ErrorBound(config) => config.runs_on_device(train.rays),
-            RaySampler::GridCached(config, grid) => config.runs_on_device(grid, train.rays),
+            RaySampler::ErrorBound(config) => config.runs_on_device(rays),
+            RaySampler::GridCached(config, grid) => config.runs_on_device(grid, rays),
             RaySampler::Uniform(_) => false,
         };
-        (can && !in_passes && has_kernels(device)).then(|| {
+        (can && kernels.on(device, DType::F32).places_samples()).then(|| {
             let mut sampling = Self {
                 device: device.clone(),
                 grid: None,
@@ -68,19 +70,18 @@ impl DeviceSampling {
         self.grid.as_ref().map(DeviceGrid::values)
     }
 
-    /// The samples of `step`, with the parameters of its network as they are.
+    /// Samples along `rays` in iteration `iteration`, for a density of scale `beta`
+    /// `[1]` and the parameters of `network` as they are.
     pub fn sample(
         &mut self,
         sampler: &RaySampler,
-        step: &StepToSample<'_>,
+        rays: &RayBundle,
+        iteration: u64,
+        beta: Tensor<1>,
+        network: &ImplicitNetwork,
         mut noise: Seeded<impl Rng + Clone>,
     ) -> SamplesOnDevice {
-        let rays = step.rays;
-        let beta = step.beta_tensor.clone();
-        let beta = beta
-            .expect("a step placed on the device has β there")
-            .inner();
-        let network = &step.network.valid();
+        let (beta, network) = (beta.inner(), &network.valid());
         let on_device = DeviceRays::new(rays, &self.device);
         match (sampler, &mut self.grid) {
             (RaySampler::ErrorBound(config), _) => {
@@ -93,7 +94,7 @@ impl DeviceSampling {
                 }
             }
             (RaySampler::GridCached(config, like), Some(grid)) => {
-                let asked = config.refresh_on_device(like, grid, step.iteration, network);
+                let asked = config.refresh_on_device(like, grid, iteration, network);
                 SamplesOnDevice {
                     samples: config.sample_on_device(&on_device, beta, like, grid, &mut noise),
                     progress: None,
@@ -112,9 +113,10 @@ impl DeviceSampling {
             self.fewer = 0;
             return false;
         }
-        match (needed as usize) < self.launched {
-            true => self.fewer += 1,
-            false => self.fewer = 0,
+        if (needed as usize) < self.launched {
+            self.fewer += 1;
+        } else {
+            self.fewer = 0;
         }
         if self.fewer >= PATIENCE {
             self.launched -= 1;

@@ -2,6 +2,7 @@
 
 use neat_core::SceneError;
 use neat_core::assignment::AssignmentError;
+use neat_tensor::NetworkSizeError;
 use neat_tensor::parameters::ParameterError;
 
 /// Why training cannot start or go on.
@@ -10,6 +11,9 @@ pub enum TrainError {
     /// The configuration contradicts itself.
     #[error("the configuration cannot be used: {0}")]
     Config(String),
+    /// A network cannot have the size that the configuration asks for.
+    #[error("the configuration cannot be used: {0}")]
+    Network(#[from] NetworkSizeError),
     /// No pixel of the scene lies in an attraction region.
     #[error(
         "no pixel lies within {0} px of a 2D segment: look at the scene's 2D wireframes, or raise data.attraction_distance"

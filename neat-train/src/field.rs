@@ -76,7 +76,8 @@ impl TrainedField {
                 Some((name.strip_prefix("model.")?.to_owned(), data.clone()))
             })
             .collect();
-        let model = NeatModel::new(&config.model, scene_radius, 0, device);
+        let model = NeatModel::new(&config.model, scene_radius, 0, device)?;
+        let model = model.with_kernels(config.kernels.clone());
         let model = load_parameters(model, parameters, None)?;
         let initial_radius = config.model.implicit.initial_sphere * scene_radius;
         Ok(Self::new(

@@ -5,7 +5,7 @@
 //! backward pass, and distances that tell which samples matter, do not count
 //! twice.
 
-use crate::config::ModelConfig;
+use crate::model::ModelConfig;
 use neat_tensor::PositionalEncoding;
 use serde::Serialize;
 
@@ -136,7 +136,6 @@ impl StepFlops {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::preset::Preset;
 
     #[test]
     fn a_paper_size_sample_takes_what_the_design_says() {
@@ -147,7 +146,7 @@ mod tests {
             segment: 1,
             eikonal: 0,
         };
-        let flops = StepFlops::count(&Preset::PaperAbc.config().model, &rows);
+        let flops = StepFlops::count(&ModelConfig::default(), &rows);
         // About 1 MFLOP a distance, 9.5 MFLOP for everything else of a sample.
         assert!((flops.sampler - 0.92e6).abs() < 0.05e6, "{flops:?}");
         let sample = flops.forward + flops.backward;

@@ -2,21 +2,34 @@
 //! steps, and the trained field that they lead to.
 //!
 //! What a run is (folders, budgets, checkpoints on disk) is neat-pipeline's.
+//!
+//! ```
+//! use neat_train::LOSS_TERMS;
+//! use neat_train::config::TrainingConfig;
+//!
+//! // As published; the terms of the loss and their weights are one table.
+//! let config = TrainingConfig::default();
+//! config.validate()?;
+//! let weights = LOSS_TERMS.map(|term| (term.name, (term.weight)(&config.train.loss)));
+//! assert!(weights.contains(&("segment", 0.01)));
+//! # Ok::<(), neat_train::TrainError>(())
+//! ```
+//!
+//! `examples/train_step.rs` takes a step on what is made in memory.
 
 #![forbid(unsafe_code)]
 
 mod awake;
+mod batch;
 mod checkpoint_metadata;
-mod chunked_step;
 pub mod config;
-#[cfg(feature = "wgpu")]
 mod device_sampling;
 mod error;
 mod field;
 pub mod flops;
 pub mod losses;
 pub mod model;
-mod sample_placement;
+mod step;
 pub mod step_log;
 mod surface_points;
 pub mod trainer;
@@ -26,4 +39,6 @@ mod validation;
 pub use checkpoint_metadata::AVERAGE_LOSS;
 pub use error::TrainError;
 pub use field::{SurfaceGrid, TrainedField};
+pub use losses::{LOSS_TERMS, StepInput};
+pub use step::{StepLoss, StepTimings, step_loss};
 pub use trainer::Trainer;

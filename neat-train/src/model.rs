@@ -1,21 +1,40 @@
 //! All networks of NEAT together, and the rendering of rays with them.
 
-use crate::config::ModelConfig;
 use burn::module::Module;
-use burn::tensor::{Device, Int, Tensor, TensorData};
-use neat_field::AttractionNetwork;
-use neat_gjp::JunctionPerceiver;
+use burn::tensor::{Device, Tensor, TensorData};
+use neat_field::{AttractionNetwork, AttractionNetworkConfig};
+use neat_gjp::{JunctionPerceiver, PerceiverConfig};
 use neat_sdf::density::laplace_density;
 use neat_sdf::volume_rendering::{
     integrate, integrate_selected, rendering_weights, rendering_weights_on_host,
 };
 use neat_sdf::{
-    DeviceSamples, Distances, ImplicitNetwork, ImplicitOutput, LaplaceDensity, RayBundle,
-    RaySamples, RenderingNetwork,
+    DensityConfig, DeviceSamples, Distances, ImplicitNetwork, ImplicitNetworkConfig,
+    ImplicitOutput, LaplaceDensity, RayBundle, RaySamples, RenderingNetwork,
+    RenderingNetworkConfig,
 };
-use neat_tensor::fused::KnownRows;
+use neat_tensor::host::{constant_on, index_tensor};
+pub use neat_tensor::host::{host_points, host_vec, point_tensor};
 use neat_tensor::random::{Purpose, stream};
+use neat_tensor::{Kernels, KnownRows, NetworkSizeError};
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// The networks; by default as published for ABC.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelConfig {
+    /// Signed distance and features.
+    pub implicit: ImplicitNetworkConfig,
+    /// Radiance.
+    pub rendering: RenderingNetworkConfig,
+    /// 3D segments.
+    pub attraction: AttractionNetworkConfig,
+    /// From signed distance to density.
+    pub density: DensityConfig,
+    /// Global junctions.
+    pub perceiver: PerceiverConfig,
+}
 
 /// Signed distance, radiance, attraction field, density scale and junctions.
 #[derive(Module, Debug)]
@@ -34,16 +53,39 @@ pub struct NeatModel {
 
 impl NeatModel {
     /// Initial networks: the same for a seed on every device.
-    pub fn new(config: &ModelConfig, scene_radius: f64, seed: u64, device: &Device) -> Self {
+    ///
+    /// # Errors
+    /// If a network cannot have the size that is asked for.
+    pub fn new(
+        config: &ModelConfig,
+        scene_radius: f64,
+        seed: u64,
+        device: &Device,
+    ) -> Result<Self, NetworkSizeError> {
         let mut rng = stream(seed, Purpose::Weights, 0);
         let features = config.implicit.features;
-        Self {
-            implicit_network: config.implicit.init(scene_radius, &mut rng, device),
+        let model = Self {
+            implicit_network: config.implicit.init(scene_radius, &mut rng, device)?,
             rendering_network: config.rendering.init(features, &mut rng, device),
             attraction_network: config.attraction.init(features, &mut rng, device),
             density: config.density.init(device),
-            perceiver: config.perceiver.init(&mut rng, device),
-        }
+            perceiver: config.perceiver.init(&mut rng, device)?,
+        };
+        Ok(model.with_kernels(Kernels::default()))
+    }
+
+    /// The same with all networks running these operations.
+    pub fn with_kernels(mut self, kernels: Kernels) -> Self {
+        self.rendering_network.mlp.kernels = kernels.clone();
+        self.attraction_network.mlp.kernels = kernels.clone();
+        self.perceiver.decoder.kernels = kernels.clone();
+        self.implicit_network.mlp.kernels = kernels;
+        self
+    }
+
+    /// Which operations the networks run.
+    pub fn kernels(&self) -> &Kernels {
+        &self.implicit_network.mlp.kernels
     }
 }
 
@@ -109,32 +151,6 @@ pub struct Rendering {
     pub counts: Option<Tensor<2>>,
     /// How many samples the segments were rendered from.
     pub segment_samples: usize,
-}
-
-/// Points as a tensor `[N, 3]`.
-pub fn point_tensor(points: &[[f32; 3]], device: &Device) -> Tensor<2> {
-    Tensor::from_data(
-        TensorData::new(points.as_flattened().to_vec(), [points.len(), 3]),
-        device,
-    )
-}
-
-/// A constant without gradient, for the graph of `device` if that keeps one.
-pub(crate) fn constant_on(device: &Device, tensor: &Tensor<2>) -> Tensor<2> {
-    match device.is_autodiff() {
-        true => Tensor::from_inner(tensor.clone()),
-        false => tensor.clone(),
-    }
-}
-
-/// Indices as a tensor `[N]`.
-pub(crate) fn index_tensor(
-    indices: impl Iterator<Item = usize>,
-    device: &Device,
-) -> Tensor<1, Int> {
-    let indices: Vec<i64> = indices.map(|i| i as i64).collect();
-    let len = indices.len();
-    Tensor::from_data(TensorData::new(indices, [len]), device)
 }
 
 impl NeatModel {
@@ -388,22 +404,4 @@ fn ray_columns(
         columns.extend(rays.directions[i / per_ray]);
     }
     Tensor::from_data(TensorData::new(columns, [rows, 6]), device)
-}
-
-/// The values of a tensor on the host, row-major, as float32.
-pub fn host_vec<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
-    tensor
-        .detach()
-        .into_data()
-        .convert::<f32>()
-        .try_into_vec_as()
-        .expect("host_vec: just converted to float32")
-}
-
-/// The rows of a tensor `[N, 3]` on the host.
-pub fn host_points(tensor: Tensor<2>) -> Vec<[f32; 3]> {
-    host_vec(tensor)
-        .chunks_exact(3)
-        .map(|p| [p[0], p[1], p[2]])
-        .collect()
 }

@@ -2,33 +2,28 @@
 
 use crate::awake::with_awake_worker;
 use crate::checkpoint_metadata::{AVERAGE_LOSS, LEARNING_RATE_SCALE, metadata};
-use crate::chunked_step::{StepGradients, chunked_step};
-use crate::config::{TrainConfig, TrainingConfig};
+use crate::config::TrainingConfig;
 use crate::error::TrainError;
 use crate::field::TrainedField;
 use crate::flops::StepRows;
-use crate::losses::{Losses, StepInput, StepLoss, step_loss};
+use crate::losses::Losses;
 use crate::model::{NeatModel, host_points, host_vec};
-use crate::sample_placement::{SamplePlacement, StepSamples, StepToSample};
+pub use crate::step::StepTimings;
+use crate::step::{Step, StepExecutor, StepOutcome};
 use crate::surface_points::SurfacePoints;
-use crate::training_data::{Batch, TrainingData};
+use crate::training_data::TrainingData;
 use burn::module::Module;
-use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
 use neat_core::Scene;
-use neat_core::assignment::AssignmentError;
 use neat_gjp::candidates::JunctionView;
 use neat_sdf::ImplicitNetwork;
-use neat_sdf::density::BetaSchedule;
 use neat_tensor::adam::Adam;
+use neat_tensor::backend::is_on_host;
 use neat_tensor::checkpoint::Checkpoint;
-use neat_tensor::fused::is_fused;
-use neat_tensor::parameters::{GradientCheck, load_parameters, named_parameters};
-use neat_tensor::random::{Purpose, stream};
-use rand::RngExt;
+use neat_tensor::parameters::{load_parameters, named_gradients, named_parameters};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// A step counts in the average loss with one of so many parts.
 const AVERAGED_STEPS: f64 = 50.0;
@@ -52,42 +47,6 @@ pub struct StepReport {
     pub beta: f64,
 }
 
-/// Where the time of one iteration went, on the host's clock: a device that
-/// computes later shows it where its results are read.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StepTimings {
-    /// Rays and what was observed along them.
-    pub batch: Duration,
-    /// Where rays are sampled, with the network evaluations for it.
-    pub sampler: Duration,
-    /// Rendering and losses, without the assignment.
-    pub forward: Duration,
-    /// Local junctions and their assignment.
-    pub assignment: Duration,
-    /// Gradients.
-    pub backward: Duration,
-    /// The parameters' move.
-    pub optimiser: Duration,
-}
-
-impl StepTimings {
-    /// All parts together.
-    pub fn total(&self) -> Duration {
-        self.batch + self.sampler + self.forward + self.assignment + self.backward + self.optimiser
-    }
-}
-
-impl std::ops::AddAssign for StepTimings {
-    fn add_assign(&mut self, other: Self) {
-        self.batch += other.batch;
-        self.sampler += other.sampler;
-        self.forward += other.forward;
-        self.assignment += other.assignment;
-        self.backward += other.backward;
-        self.optimiser += other.optimiser;
-    }
-}
-
 /// The state of an optimisation.
 pub struct Trainer {
     data: TrainingData,
@@ -98,7 +57,7 @@ pub struct Trainer {
     scene_radius: f64,
     model: NeatModel,
     adam: Adam,
-    sampling: SamplePlacement,
+    executor: StepExecutor,
     iteration: u64,
     /// Factor on all learning rates: below 1 after a numerical failure.
     learning_rate_scale: f64,
@@ -108,31 +67,6 @@ pub struct Trainer {
     beta: f64,
     timings: StepTimings,
     rows: StepRows,
-}
-
-/// Everything random or observed of one iteration.
-struct Prepared {
-    batch: Batch,
-    samples: StepSamples,
-    eikonal_points: Vec<[f32; 3]>,
-    eikonal_samples: Option<Tensor<2>>,
-    surface_points: Vec<[f32; 3]>,
-    /// Distances that the sampler asked for.
-    asked: usize,
-}
-
-impl Prepared {
-    fn input<'a>(&'a self, views: &'a [JunctionView<'a>], junctions_due: bool) -> StepInput<'a> {
-        StepInput {
-            batch: &self.batch,
-            samples: self.samples.placed(),
-            eikonal_points: &self.eikonal_points,
-            eikonal_samples: self.eikonal_samples.as_ref(),
-            surface_points: &self.surface_points,
-            views,
-            junctions_due,
-        }
-    }
 }
 
 /// Loss and gradients of an iteration, before the parameters move.
@@ -164,14 +98,16 @@ impl Trainer {
         }
         let scene_radius = config.scene_radius.unwrap_or(scene.sphere_radius);
         let device = device.clone().autodiff();
-        let model = NeatModel::new(&config.model, scene_radius, seed, &device);
+        let kernels = &config.kernels;
+        let model = NeatModel::new(&config.model, scene_radius, seed, &device)?;
+        let model = model.with_kernels(kernels.clone());
         let initial_radius = config.model.implicit.initial_sphere * scene_radius;
         let sampler = config.train.sampler.init(scene_radius, initial_radius);
         Ok(Self {
-            sampling: SamplePlacement::new(&config.train, sampler, &device),
+            executor: StepExecutor::new(&config.train, sampler, kernels, &device),
             data,
             surface_points: SurfacePoints::of(scene, scene_radius),
-            adam: Adam::new(config.train.adam),
+            adam: Adam::new(config.train.adam).with_kernels(kernels.clone()),
             beta: config.model.density.initial_beta,
             config: config.clone(),
             seed,
@@ -214,7 +150,7 @@ impl Trainer {
                 moments.entry(name.to_owned()).or_default()[1] = Some(data);
             } else if name == "sampler.grid" {
                 let values = data.convert::<f32>().try_into_vec_as::<f32>();
-                if !values.is_ok_and(|values| trainer.sampling.restore(values)) {
+                if !values.is_ok_and(|values| trainer.executor.restore(values)) {
                     return Err(TrainError::Checkpoint(name));
                 }
             }
@@ -227,7 +163,8 @@ impl Trainer {
             };
         }
         trainer.model = load_parameters(trainer.model, parameters, None)?;
-        trainer.adam = Adam::restore(config.train.adam, trainer.iteration, state);
+        let adam = Adam::restore(config.train.adam, trainer.iteration, state);
+        trainer.adam = adam.with_kernels(config.kernels.clone());
         Ok(trainer)
     }
 
@@ -258,54 +195,58 @@ impl Trainer {
     /// If loss or gradient are no numbers; the parameters are then as before.
     pub fn step(&mut self, schedule: f64) -> Result<StepReport, TrainError> {
         // A device of its own has nothing to hand out.
-        if !is_fused(&self.device) {
+        if !is_on_host(&self.device) {
             return self.step_here(schedule);
         }
         with_awake_worker(|| self.step_here(schedule))
     }
 
     fn step_here(&mut self, schedule: f64) -> Result<StepReport, TrainError> {
-        let StepGradients {
-            losses,
-            segment_errors,
-            targets,
-            mut gradients,
-            finite,
-            ..
-        } = self.gradients(schedule)?;
+        let mut outcome = self.gradients(schedule)?;
+        let losses = outcome.losses;
         if !losses.total.is_finite() {
             return Err(TrainError::NonFiniteLoss {
                 iteration: self.iteration + 1,
                 value: losses.total,
             });
         }
-        if !finite {
+        if !outcome.finite {
             return Err(TrainError::NonFiniteGradient {
                 iteration: self.iteration + 1,
             });
         }
         let start = Instant::now();
         let train = &self.config.train;
-        let factor =
-            self.learning_rate_scale * learning_rate_factor(train, self.iteration, schedule);
+        let factor = train.learning_rate_factor(self.iteration, schedule);
+        let factor = self.learning_rate_scale * factor;
         let networks = train.learning_rate * factor;
         let junctions = train.junction_learning_rate * factor;
-        let rate = |name: &str| match name.starts_with("perceiver.") {
-            true => junctions,
-            false => networks,
+        let rate = |name: &str| {
+            if name.starts_with("perceiver.") {
+                junctions
+            } else {
+                networks
+            }
         };
         let model = self.model.clone();
-        self.model = self.adam.step(model, &mut gradients, rate);
+        self.model = self.adam.step(model, &mut outcome.gradients, rate);
         self.timings.optimiser = start.elapsed();
         self.iteration += 1;
         let average = self.average_loss.unwrap_or(losses.total);
         self.average_loss = Some(average + (losses.total - average) / AVERAGED_STEPS);
+        tracing::debug!(
+            iteration = self.iteration,
+            loss = losses.total,
+            targets = outcome.targets,
+            milliseconds = self.timings.total().as_millis() as u64,
+            "step"
+        );
         Ok(StepReport {
             iteration: self.iteration,
             losses,
-            segment_error_in_pixels: median(segment_errors),
+            segment_error_in_pixels: median(outcome.segment_errors),
             rendered_samples: self.rows.full,
-            targets,
+            targets: outcome.targets,
             learning_rate: networks,
             beta: self.beta,
         })
@@ -317,195 +258,55 @@ impl Trainer {
     /// # Errors
     /// As [`Self::step`].
     pub fn probe(&mut self, schedule: f64) -> Result<Probe, TrainError> {
-        let loss = loop {
-            let (loss, progress) = self.whole_loss(schedule)?;
-            let Some(progress) = progress else {
-                break loss;
-            };
-            let progress = host_vec(progress);
-            if self.sampling.sufficed([progress[0], progress[1]]) {
-                break loss;
-            }
-        };
-        let losses = loss.losses();
-        let color = host_vec(loss.color.clone());
-        let mut gradients = GradientsParams::from_grads(loss.total.backward(), &self.model);
+        let mut outcome = self.gradients(schedule)?;
         Ok(Probe {
-            losses,
-            color,
-            gradients: neat_tensor::parameters::named_gradients(&self.model, &mut gradients),
+            losses: outcome.losses,
+            color: host_vec(Tensor::cat(outcome.color, 0)),
+            gradients: named_gradients(&self.model, &mut outcome.gradients),
         })
     }
 
     /// Losses and gradients of the next iteration.
-    fn gradients(&mut self, schedule: f64) -> Result<StepGradients, TrainError> {
-        let chunk = self.config.train.ray_chunk;
-        let Some(chunk) = chunk.filter(|chunk| *chunk < self.config.train.rays) else {
-            return self.whole_gradients(schedule);
-        };
-        let (prepared, start) = (self.prepare(schedule)?, Instant::now());
-        let views = self.junction_views();
-        let input = prepared.input(&views, self.junctions_due());
-        let result = chunked_step(
-            &self.model,
-            &input,
-            || self.beta_tensor(schedule),
-            &self.config.train,
-            &self.device,
-            chunk,
-        );
-        let step = result.map_err(|source| self.unmatched(source))?;
-        self.rows = StepRows {
-            sampler: prepared.asked,
-            ..step.rows
-        };
-        self.timings.assignment = step.assignment;
-        self.timings.backward = step.backward;
-        self.timings.forward = start.elapsed() - step.assignment - step.backward;
-        Ok(step)
-    }
-
-    /// Losses and gradients of the next iteration, all rays at once.
-    fn whole_gradients(&mut self, schedule: f64) -> Result<StepGradients, TrainError> {
-        loop {
-            let (loss, progress) = self.whole_loss(schedule)?;
-            let start = Instant::now();
-            let gradients = GradientsParams::from_grads(loss.total.backward(), &self.model);
-            let check = GradientCheck::of(&self.model, &gradients);
-            // Of a device, everything is read at once when the step is over.
-            let beta = (self.is_beta_unknown()).then(|| self.beta_tensor(schedule).inner());
-            let parts = [Some(loss.terms.inner()), beta, progress, check.on_device];
-            let lengths = parts.each_ref().map(|part| match part {
-                Some(part) => part.dims()[0],
-                None => 0,
-            });
-            let report = host_vec(Tensor::cat(parts.into_iter().flatten().collect(), 0));
-            let mut rest = report.as_slice();
-            let [terms, beta, progress, sum] = lengths.map(|length| {
-                let (part, others) = rest.split_at(length);
-                rest = others;
-                part
-            });
-            if let [needed, more_wanted] = *progress
-                && !self.sampling.sufficed([needed, more_wanted])
-            {
-                continue;
-            }
-            if let [beta] = *beta {
-                self.beta = f64::from(beta);
-            }
-            self.timings.backward = start.elapsed();
-            return Ok(StepGradients {
-                losses: Losses::from_terms(terms),
-                segment_errors: loss.segment_errors,
-                rows: self.rows,
-                targets: loss.targets,
-                assignment: loss.assignment,
-                backward: self.timings.backward,
-                gradients,
-                finite: check.on_host && sum.iter().all(|sum| sum.is_finite()),
-            });
-        }
-    }
-
-    /// Whether β is learned and only the device knows it.
-    fn is_beta_unknown(&self) -> bool {
-        let learned = self.config.model.density.schedule == BetaSchedule::Learned;
-        learned && self.sampling.is_on_device()
-    }
-
-    /// The loss of the next iteration, all rays at once, and how far Algorithm 1
-    /// came if nobody knows yet whether that was enough.
-    fn whole_loss(&mut self, schedule: f64) -> Result<(StepLoss, Option<Tensor<1>>), TrainError> {
-        let (prepared, start) = (self.prepare(schedule)?, Instant::now());
-        let views = self.junction_views();
-        let input = prepared.input(&views, self.junctions_due());
-        let beta = self.beta_tensor(schedule);
-        let result = step_loss(&self.model, &input, beta, &self.config.train, &self.device);
-        let loss = result.map_err(|source| self.unmatched(source))?;
-        self.rows = StepRows {
-            sampler: prepared.asked,
-            ..loss.rows
-        };
-        self.timings.assignment = loss.assignment;
-        self.timings.forward = start.elapsed() - loss.assignment;
-        Ok((loss, prepared.samples.progress()))
-    }
-
-    fn unmatched(&self, source: AssignmentError) -> TrainError {
-        TrainError::Assignment {
-            iteration: self.iteration + 1,
-            source,
-        }
-    }
-
-    fn junctions_due(&self) -> bool {
-        let interval = self.config.train.junction_interval.max(1);
-        (self.iteration + 1).is_multiple_of(interval)
-    }
-
-    fn junction_views(&self) -> Vec<JunctionView<'_>> {
-        let views = self.data.views.iter();
-        views
-            .map(|view| JunctionView {
-                camera: &view.camera,
-                junctions_in_image: &view.junctions,
-            })
-            .collect()
-    }
-
-    /// Scale of the density in the next iteration.
-    fn beta_tensor(&self, schedule: f64) -> Tensor<1> {
-        let density = &self.config.model.density;
-        match density.schedule {
-            BetaSchedule::Learned => self.model.density.beta(),
-            BetaSchedule::Annealed => {
-                Tensor::from_data([density.annealed_beta(schedule) as f32], &self.device)
-            }
-        }
-    }
-
-    /// Draws and places everything random of the next iteration.
-    fn prepare(&mut self, schedule: f64) -> Result<Prepared, TrainError> {
-        let density = &self.config.model.density;
-        match density.schedule {
-            BetaSchedule::Annealed => {
-                self.beta = f64::from(density.annealed_beta(schedule) as f32);
-            }
-            BetaSchedule::Learned if self.sampling.is_on_device() => {}
-            BetaSchedule::Learned => {
-                self.beta = f64::from(host_vec(self.beta_tensor(schedule))[0]);
-            }
-        }
+    fn gradients(&mut self, schedule: f64) -> Result<StepOutcome, TrainError> {
         let start = Instant::now();
-        let batch = (self.data).batch(&self.config.train, self.seed, self.iteration)?;
-        self.timings.batch = start.elapsed();
-        let start = Instant::now();
-        let to_sample = StepToSample {
+        let (train, model) = (&self.config.train, &self.config.model);
+        let batch = self.data.batch(train, self.seed, self.iteration)?;
+        let batch_time = start.elapsed();
+        let views = self.data.views.iter().map(|view| JunctionView {
+            camera: &view.camera,
+            junctions_in_image: &view.junctions,
+        });
+        let views: Vec<JunctionView<'_>> = views.collect();
+        // Without a weight there is no such term.
+        let points = if train.loss.points > 0.0 {
+            train.surface_points
+        } else {
+            0
+        };
+        let step = Step {
+            model: &self.model,
+            train,
+            density: &model.density,
+            batch: &batch,
+            views: &views,
+            surface_points: &self.surface_points.draw(points, self.seed, self.iteration),
             seed: self.seed,
             iteration: self.iteration,
-            rays: &batch.rays,
-            beta: self.beta,
-            #[cfg(feature = "wgpu")]
-            beta_tensor: (self.sampling.is_on_device()).then(|| self.beta_tensor(schedule)),
-            network: &self.model.implicit_network,
+            schedule,
+            scene_radius: self.scene_radius,
         };
-        let (samples, asked) = self.sampling.place(&to_sample, &self.device);
-        self.timings.sampler = start.elapsed();
-        let (eikonal_points, eikonal_samples) = self.eikonal_points(&batch, &samples);
-        let train = &self.config.train;
-        let wanted = match train.loss.points > 0.0 {
-            true => train.surface_points,
-            false => 0,
+        let outcome = self.executor.run(&step);
+        let outcome = outcome.map_err(|source| TrainError::Assignment {
+            iteration: self.iteration + 1,
+            source,
+        })?;
+        self.beta = outcome.beta.map_or(self.beta, f64::from);
+        self.rows = outcome.rows;
+        self.timings = StepTimings {
+            batch: batch_time,
+            ..outcome.timings
         };
-        Ok(Prepared {
-            batch,
-            samples,
-            eikonal_points,
-            eikonal_samples,
-            surface_points: (self.surface_points).draw(wanted, self.seed, self.iteration),
-            asked,
-        })
+        Ok(outcome)
     }
 
     /// The signed distance network as it is now.
@@ -523,32 +324,6 @@ impl Trainer {
         self.rows
     }
 
-    /// The points of the eikonal term besides rendered samples: those that the host
-    /// knows, and those that only the device knows.
-    fn eikonal_points(
-        &self,
-        batch: &Batch,
-        samples: &StepSamples,
-    ) -> (Vec<[f32; 3]>, Option<Tensor<2>>) {
-        let config = &self.config.train.eikonal;
-        let mut rng = stream(self.seed, Purpose::Eikonal, self.iteration);
-        let radius = self.scene_radius as f32;
-        let count = config.uniform_points.unwrap_or(batch.rays.len());
-        let mut points: Vec<[f32; 3]> = (0..count)
-            .map(|_| std::array::from_fn(|_| (rng.random::<f32>() * 2.0 - 1.0) * radius))
-            .collect();
-        if !config.one_sample_per_ray {
-            return (points, None);
-        }
-        let per_ray = samples.placed().per_ray();
-        let picks: Vec<usize> = (0..batch.rays.len())
-            .map(|_| rng.random_range(0..per_ray))
-            .collect();
-        let (picked, on_device) = samples.pick(&batch.rays, &picks);
-        points.extend(picked);
-        (points, on_device)
-    }
-
     /// Everything that [`Self::resume`] needs.
     pub fn checkpoint(&self) -> Checkpoint {
         let mut checkpoint = Checkpoint::default();
@@ -563,7 +338,7 @@ impl Trainer {
                 .tensors
                 .insert(format!("adam.second.{name}"), second);
         }
-        if let Some(grid) = self.sampling.sampler().state() {
+        if let Some(grid) = self.executor.sampler().state() {
             let len = grid.len();
             checkpoint.tensors.insert(
                 "sampler.grid".to_owned(),
@@ -593,23 +368,13 @@ impl Trainer {
     pub fn field(&self) -> TrainedField {
         TrainedField::new(
             self.model.valid(),
-            self.sampling.sampler(),
+            self.executor.sampler(),
             self.beta as f32,
             self.scene_radius,
             self.config.train.min_sample_weight,
             self.device.clone().inner(),
         )
     }
-}
-
-/// Factor on the learning rates in iteration `iteration` (counted from 0), when
-/// the share `schedule` of the run is done: warm-up times exponential decay.
-pub fn learning_rate_factor(train: &TrainConfig, iteration: u64, schedule: f64) -> f64 {
-    let warm_up = match train.warm_up_steps {
-        0 => 1.0,
-        steps => ((iteration + 1) as f64 / steps as f64).min(1.0),
-    };
-    warm_up * train.learning_rate_decay.powf(schedule)
 }
 
 fn median(mut values: Vec<f32>) -> f64 {

@@ -1,11 +1,11 @@
 //! What training needs of a scene, prepared once: attraction regions, segments
 //! and the pixels to draw rays through.
 
+pub use crate::batch::{Batch, push_ray, push_ray_through};
 use crate::config::{BatchViews, TrainConfig, TrainingConfig};
 use nalgebra::Vector2;
 use neat_core::{Camera, Scene, SceneError, ScoredSegment2, ViewImage};
 use neat_field::region_pixels::RegionPixels;
-use neat_sdf::RayBundle;
 use neat_tensor::random::{Purpose, stream};
 use rand::{Rng, RngExt};
 
@@ -33,22 +33,6 @@ pub struct TrainingData {
     pub views: Vec<TrainingView>,
     pixel_center: f64,
     first_region_pixel: Vec<usize>,
-}
-
-/// Rays of one iteration with what was observed along them. Rays through
-/// attraction regions come first.
-#[derive(Clone, Debug, Default)]
-pub struct Batch {
-    /// The rays.
-    pub rays: RayBundle,
-    /// Colour of each pixel, in [0, 1].
-    pub colors: Vec<[f32; 3]>,
-    /// 1 where the pixel belongs to the object, else 0.
-    pub silhouette: Vec<f32>,
-    /// View of each ray through an attraction region.
-    pub view_of_ray: Vec<usize>,
-    /// The 2D segment of each such ray.
-    pub segment_of_ray: Vec<ScoredSegment2>,
 }
 
 impl TrainingData {
@@ -187,17 +171,4 @@ impl TrainingData {
         });
         Ok(())
     }
-}
-
-/// Appends the ray through the centre of pixel `(x, y)`.
-pub fn push_ray(rays: &mut RayBundle, camera: &Camera, pixel_center: f64, x: u32, y: u32) {
-    let point = Vector2::new(f64::from(x) + pixel_center, f64::from(y) + pixel_center);
-    push_ray_through(rays, camera, &point);
-}
-
-/// Appends the ray through a point in image coordinates.
-pub fn push_ray_through(rays: &mut RayBundle, camera: &Camera, point_in_image: &Vector2<f64>) {
-    let ray = camera.ray_through(point_in_image);
-    rays.origins.push(ray.origin.map(|c| c as f32).into());
-    rays.directions.push(ray.direction.map(|c| c as f32).into());
 }

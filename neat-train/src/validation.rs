@@ -150,3 +150,44 @@ fn sizes(config: &TrainingConfig) -> Vec<(&'static str, usize, usize)> {
         ),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use neat_gjp::JunctionCount;
+
+    fn refusal(change: impl Fn(&mut TrainingConfig)) -> String {
+        let mut config = TrainingConfig::default();
+        change(&mut config);
+        let result = config.validate();
+        result.map_or_else(|error| error.to_string(), |()| String::new())
+    }
+
+    #[test]
+    fn sizes_beyond_any_machine_are_refused_by_name() {
+        let huge = 100_000_000_000;
+        let rays = refusal(|config| config.train.rays = huge);
+        assert!(rays.contains("train.rays times the samples"), "{rays}");
+        let most = refusal(|config| config.train.rays = usize::MAX);
+        assert!(most.contains("67108864"), "{most}");
+        let width = refusal(|config| config.model.implicit.width = huge);
+        assert!(
+            width.contains("model.implicit.width is 100000000000"),
+            "{width}"
+        );
+        let layers = refusal(|config| config.model.attraction.hidden_layers = huge);
+        assert!(
+            layers.contains("model.attraction.hidden_layers"),
+            "{layers}"
+        );
+        let points = refusal(|config| config.train.eikonal.uniform_points = Some(huge));
+        assert!(points.contains("train.eikonal.uniform_points"), "{points}");
+        let junctions = refusal(|config| {
+            config.model.perceiver.junctions = JunctionCount::Fixed(huge);
+        });
+        assert!(
+            junctions.contains("model.perceiver.junctions"),
+            "{junctions}"
+        );
+    }
+}

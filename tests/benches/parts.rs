@@ -17,7 +17,7 @@ use neat_field::attraction_region::AttractionRegions;
 use neat_pipeline::preset::Preset;
 use neat_sdf::RayBundle;
 use neat_sdf::ray_sampler::Deterministic;
-use neat_tensor::{CoordinateMlp, Field, FieldQuery};
+use neat_tensor::{CoordinateMlp, Field, FieldQuery, Plain};
 use neat_tests::finite_differences::normal;
 use neat_train::flops::{StepFlops, StepRows};
 use neat_train::model::{NeatModel, host_vec};
@@ -70,6 +70,7 @@ mod network {
         };
         Setting {
             mlp: NeatModel::new(&config, 1.0, 0, &device)
+                .expect("a preset")
                 .implicit_network
                 .mlp,
             points: matrix(rows, 3, &device),
@@ -126,7 +127,7 @@ mod network {
         let Setting { mlp, points, flops } = setting(preset);
         bencher
             .counter(items(flops.forward))
-            .bench_local(|| mlp.plain_field(points.clone(), query()));
+            .bench_local(|| mlp.field_by(&Plain, points.clone(), query()));
     }
 
     #[divan::bench(args = PRESETS, sample_count = 10, sample_size = 1)]
@@ -142,7 +143,7 @@ mod network {
         let Setting { mlp, points, flops } = setting(preset);
         bencher
             .counter(items(flops.forward + flops.backward))
-            .bench_local(|| backward(mlp.plain_field(points.clone(), query())));
+            .bench_local(|| backward(mlp.field_by(&Plain, points.clone(), query())));
     }
 }
 

@@ -47,7 +47,7 @@ fn twenty_steps() {
     backends.insert(0, Backend::Flex);
 
     let quiet = &mut |_: &str, _: f64| {};
-    let comparison = compare_backends(&scene, &config(), 0, STEPS, &backends, quiet)
+    let comparison = compare_backends(&scene, &config(), 0, STEPS, &backends, false, quiet)
         .expect("every backend takes every step");
     let table = comparison.to_markdown();
     for result in &comparison.backends {

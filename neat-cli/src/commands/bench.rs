@@ -9,7 +9,6 @@ use neat_pipeline::benchmark::benchmark;
 use neat_pipeline::event::Event;
 use neat_pipeline::preset::Preset;
 use neat_pipeline::reconstruct::software_warning;
-use neat_tensor::fused;
 
 /// Time the parts of a training step against the machine's arithmetic
 ///
@@ -55,9 +54,6 @@ impl BenchArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         let backend = self.backend.backend.resolve();
         let device = backend.device()?;
-        if self.plain {
-            fused::set_enabled(false);
-        }
         let mut progress = Progress::new(quiet);
         if let Some(warning) = software_warning(&device) {
             progress.show(Event::Warning(warning));
@@ -67,6 +63,7 @@ impl BenchArgs {
             &device,
             &self.preset,
             self.seconds,
+            self.plain,
             &mut |part, fraction| progress.show_part(part, fraction),
         )?;
         drop(progress);

@@ -43,6 +43,9 @@ pub struct CompareBackendsArgs {
     /// Backends to run instead of all that there are
     #[arg(long, value_name = "NAME,NAME,...", value_delimiter = ',', value_parser = backend_parser())]
     backends: Vec<Backend>,
+    /// Run each backend once more in plain tensor operations, without kernels of its own
+    #[arg(long)]
+    plain: bool,
     #[command(flatten)]
     method: MethodArgs,
     /// Seed of all randomness
@@ -89,6 +92,7 @@ impl CompareBackendsArgs {
             self.seed,
             self.method.steps.unwrap_or(DEFAULT_STEPS),
             &backends,
+            self.plain,
             &mut |part, fraction| progress.show_part(part, fraction),
         )?;
         drop(progress);

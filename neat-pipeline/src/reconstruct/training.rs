@@ -10,9 +10,9 @@ use crate::event::{Event, Stage};
 use crate::manifest::Manifest;
 use crate::run_dir::{Existing, RunDir};
 use nalgebra::Vector3;
-use neat_tensor::Backend;
+use neat_tensor::backend::is_on_host;
 use neat_tensor::checkpoint::Checkpoint;
-use neat_tensor::fused::is_fused;
+use neat_tensor::{Backend, Kernels};
 use neat_train::TrainedField;
 use neat_train::Trainer;
 use neat_train::step_log::{JunctionsLine, StepLog};
@@ -65,7 +65,7 @@ impl Session<'_> {
         (self.on_event)(Event::StageStarted(Stage::Train));
         let field = loop {
             // Only a GPU fails by itself; a panic on the CPU is our mistake.
-            if is_fused(&self.device) {
+            if is_on_host(&self.device) {
                 break self.train_here(options, cancelled)?;
             }
             match device_failure::catch(|| self.train_here(options, cancelled)) {
@@ -190,6 +190,7 @@ impl Session<'_> {
     /// A trainer that continues from the last checkpoint, or a new one.
     fn trainer(&self, options: &RunOptions) -> Result<Trainer, PipelineError> {
         let mut config = self.config.training();
+        config.kernels = Kernels::within(options.memory_limit.bytes());
         if let Some(chunk) = self.ray_chunk {
             config.train.ray_chunk = Some(chunk);
         }

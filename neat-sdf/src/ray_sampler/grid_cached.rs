@@ -6,7 +6,8 @@
 
 use super::inverse_cdf::{cumulate, invert};
 use super::{DistanceQuery, RayBundle, RaySamples, SamplingNoise};
-use neat_tensor::kernels::density::passed_shares;
+use neat_tensor::kernels::cpu::density::passed_shares;
+use neat_tensor::sampling::{GRID_FLAT_STEP, MIN_HALF_CHORD_SQUARED, MIN_NEAR};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -172,14 +173,6 @@ fn mix(a: f32, b: f32, t: f32) -> f32 {
 /// Points per query while a grid is refreshed: bounds the memory of the network.
 const QUERY_CHUNK: usize = 16_384;
 
-/// Rays that miss the ball are treated as if they grazed it.
-pub(crate) const MIN_HALF_CHORD_SQUARED: f32 = 1e-4;
-/// Sampling starts at least this far from the camera.
-pub(crate) const MIN_NEAR: f32 = 0.01;
-
-/// Cumulative steps below this are flat.
-pub(crate) const FLAT_STEP: f32 = 1e-8;
-
 /// Working memory of one ray after the other.
 #[derive(Default)]
 struct Scratch {
@@ -269,7 +262,7 @@ impl GridCachedConfig {
                 positions.clear();
                 positions.extend((0..drawn).map(|i| {
                     let u = (i as f32 + jitter(lookups + i)) / drawn as f32;
-                    invert(edges, cdf, FLAT_STEP, u)
+                    invert(edges, cdf, GRID_FLAT_STEP, u)
                 }));
                 positions.extend(
                     (0..even).map(|i| at((i as f32 + jitter(lookups + drawn + i)) / even as f32)),

@@ -1,47 +1,12 @@
-//! Fused coordinate networks on the CPU, over plain slices.
+//! Kernels of our own: what burn's operations would take many passes for.
 //!
-//! Rows of the input are taken in blocks of [`BLOCK_ROWS`] that stay in the
-//! second-level cache while they pass through all layers, forwards and
-//! backwards; blocks are independent and run in parallel. Within a block a matrix
-//! is row-major, sample after sample, its rows padded to a multiple of
-//! [`PADDING`]: forward products, products with transposed weights and weight
-//! gradients then all read their operands as they lie, and no width is special.
-//!
-//! Instruction sets (AVX-512, AVX2, NEON, or none) are chosen at run time.
+//! [`crate::NeatBackend`] says which operations there are, and has the same in plain
+//! tensor operations.
 
-pub mod arena;
-pub mod block;
-pub mod density;
-pub mod gemm;
-pub mod layers;
-pub mod relu_network;
-pub mod simd_math;
-pub mod softplus_network;
-pub mod weight_gradient;
-
-pub use pulp::Arch;
-
-/// Rows of a block.
-pub const BLOCK_ROWS: usize = 48;
-
-/// Columns of matrices are padded to a multiple of this: the widest vector.
-pub const PADDING: usize = 16;
-
-/// `width` rounded up to a multiple of [`PADDING`].
-pub const fn padded(width: usize) -> usize {
-    width.div_ceil(PADDING) * PADDING
-}
-
-/// The instruction sets of this machine that kernels are compiled for, plain
-/// code first.
-pub fn instruction_sets() -> Vec<Arch> {
-    let mut sets = vec![Arch::Scalar];
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    {
-        sets.extend(pulp::x86::V3::try_new().map(Arch::V3));
-        sets.extend(pulp::x86::V4::try_new().map(Arch::V4));
-    }
-    #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-    sets.push(Arch::new());
-    sets
-}
+#[allow(
+    unsafe_code,
+    reason = "register tiles over raw pointers, each with its bounds checked"
+)]
+pub mod cpu;
+#[cfg(feature = "wgpu")]
+pub(crate) mod gpu;

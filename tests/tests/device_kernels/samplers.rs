@@ -31,7 +31,8 @@ fn network(device: &burn::tensor::Device) -> ImplicitNetwork {
         ..ImplicitNetworkConfig::default()
     };
     let mut rng = stream(5, Purpose::Weights, 0);
-    config.init(SCENE_RADIUS, &mut rng, &device.clone().inner())
+    let network = config.init(SCENE_RADIUS, &mut rng, &device.clone().inner());
+    network.expect("a small network")
 }
 
 /// Rays from around (0, 0, −2): some hit the surface, some pass.

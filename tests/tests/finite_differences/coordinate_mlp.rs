@@ -5,7 +5,7 @@ use burn::tensor::{DType, Tensor, TensorData};
 use neat_tensor::linear::LinearInit;
 use neat_tensor::parameters::{load_parameters, named_parameters};
 use neat_tensor::random::{Purpose, stream};
-use neat_tensor::{CoordinateMlp, FieldQuery, Linear, PositionalEncoding};
+use neat_tensor::{CoordinateMlp, FieldQuery, Kernels, Linear, PositionalEncoding};
 use neat_tests::backends::flex;
 use neat_tests::comparison::assert_relatively_close;
 use neat_tests::finite_differences::{STEP, constant, normal};
@@ -65,6 +65,7 @@ impl Settings {
             octaves: self.octaves,
             skip: self.skip,
             sharpness: SHARPNESS,
+            kernels: Kernels::default(),
         };
         let parameters = named_parameters(&network);
         load_parameters(network, parameters, Some(DType::F64)).expect("its own parameters")

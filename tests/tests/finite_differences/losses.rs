@@ -2,9 +2,9 @@
 
 use burn::tensor::Tensor;
 use neat_field::segment_loss::{SegmentLoss, SegmentLossConfig, segment_loss};
-use neat_field::segment_rendering::{RayCameras, project_calibrated};
 use neat_gjp::junction_loss::{MatchedJunctions, junction_loss};
 use neat_sdf::losses::{eikonal_loss, mask_loss, rgb_loss};
+use neat_tensor::cameras::{RayCameras, project_calibrated};
 use neat_tests::finite_differences::{assert_differentiates, constant, normal};
 use neat_tests::tensors::numbers;
 

@@ -1,12 +1,12 @@
 //! The kernels on every instruction set of this machine, and with any number of
 //! threads.
 
-use neat_tensor::kernels::layers::LayerShape;
-use neat_tensor::kernels::relu_network::{PartShape, ReluNetwork, ReluShape};
-use neat_tensor::kernels::softplus_network::{
+use neat_tensor::kernels::cpu::layers::LayerShape;
+use neat_tensor::kernels::cpu::relu_network::{PartShape, ReluNetwork, ReluShape};
+use neat_tensor::kernels::cpu::softplus_network::{
     Known, SoftplusAdjoint, SoftplusNetwork, SoftplusShape,
 };
-use neat_tensor::kernels::{Arch, instruction_sets};
+use neat_tensor::kernels::cpu::{Arch, instruction_sets};
 use neat_tests::comparison::assert_relatively_close;
 use neat_tests::finite_differences::normal;
 

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use neat_core::{Camera, Intrinsics};
 use neat_field::host_segment_loss::{ObservedSegment, host_segment_loss};
 use neat_field::segment_loss::{SegmentLossConfig, segment_loss};
-use neat_field::segment_rendering::{RayCameras, project_calibrated};
+use neat_tensor::cameras::{RayCameras, project_calibrated};
 use neat_tests::backends::flex;
 use neat_tests::comparison::{assert_close, assert_relatively_close};
 use neat_tests::finite_differences::normal;

@@ -3,18 +3,19 @@
 
 use burn::module::Module;
 use burn::tensor::{DType, Device, Tensor, TensorData};
-use neat_tensor::fused::KnownRows;
 use neat_tensor::linear::LinearInit;
 use neat_tensor::parameters::{load_parameters, named_parameters};
 use neat_tensor::random::{Purpose, stream};
 use neat_tensor::{
-    CoordinateMlp, Field, FieldQuery, Linear, PositionalEncoding, ReluMlp, SampleInputs,
+    CoordinateMlp, Field, FieldQuery, Kernels, KnownRows, Linear, Plain, PositionalEncoding,
+    ReluMlp, SampleInputs,
 };
 use neat_tests::backends::{flex, on_each_cpu_backend};
 use neat_tests::comparison::assert_relatively_close;
 use neat_tests::finite_differences::{constant, normal};
 use neat_tests::named_gradients::{assert_gradients_close, named_gradients};
 use neat_tests::tensors::numbers;
+use std::sync::Arc;
 
 const VALUE_TOLERANCE: f64 = 5e-6;
 const GRADIENT_TOLERANCE: f64 = 5e-5;
@@ -127,6 +128,7 @@ impl Case {
             octaves: self.octaves,
             skip: self.skip,
             sharpness: self.sharpness,
+            kernels: Kernels::default(),
         }
     }
 
@@ -193,7 +195,7 @@ fn softplus_networks_agree_with_tensor_operations() {
         let coarse = if case.octaves > 10 { 100.0 } else { 1.0 };
         let truth_network = in_float64(case.network(&flex()));
         let truth_points = constant(case.points(), [case.rows, 3]).require_grad();
-        let truth = truth_network.plain_field(truth_points.clone(), case.query(None));
+        let truth = truth_network.field_by(&Plain, truth_points.clone(), case.query(None));
         let truth_gradients = case.loss(&truth).backward();
         let of_points = numbers(truth_points.grad(&truth_gradients).expect("tracked"));
         let of_parameters = named_gradients(&truth_network, truth_gradients);
@@ -240,8 +242,11 @@ fn known_rows_change_nothing() {
                 .flat_map(|p| [p[0] as f32, p[1] as f32, p[2] as f32])
                 .collect();
             let on_host = network.on_host().expect("a CPU backend in float32");
-            let known = KnownRows::new(&on_host, &backwards, (0..case.rows as u32).rev().collect())
-                .expect("room for a few rows");
+            let pass = network.known_pass(&on_host, &backwards);
+            let known = KnownRows {
+                pass: Arc::new(pass.expect("room for a few rows")),
+                rows: (0..case.rows as u32).rev().collect(),
+            };
             let ask = |known: Option<KnownRows>| {
                 let points = float32(&points, [case.rows, 3], &device);
                 let field = network.field(points, case.query(known));
@@ -310,7 +315,7 @@ fn relu_networks_agree_with_tensor_operations() {
                 .zip(columns)
                 .map(|(values, columns)| constant(values.clone(), [rows, columns]).require_grad())
                 .collect();
-            let truth = truth_network.plain_samples(inputs(&truth_inputs));
+            let truth = truth_network.forward_samples_by(&Plain, inputs(&truth_inputs));
             let loss = (truth.clone() * constant(weights.clone(), [rows, 6])).sum();
             let truth_gradients = loss.backward();
             let of_inputs: Vec<Vec<f64>> = truth_inputs

@@ -28,6 +28,7 @@ struct Statistics {
 fn statistics(radii: &[f64], seed: u64) -> Statistics {
     let mut rng = stream(seed, Purpose::Weights, 0);
     let network = ImplicitNetworkConfig::default().init(SCENE_RADIUS, &mut rng, &flex());
+    let network = network.expect("the published size");
     let directions: Vec<[f64; 3]> = (0..DIRECTIONS)
         .map(|_| {
             let v = [0; 3].map(|_| standard_normal(&mut rng));

@@ -29,6 +29,7 @@ pub fn network(golden: &Golden, device: &Device, dtype: Option<DType>) -> Implic
         ..ImplicitNetworkConfig::default()
     };
     let untrained = config.init(3.0, &mut stream(0, Purpose::Weights, 0), device);
+    let untrained = untrained.expect("the published size");
     load_parameters(untrained, parameters(golden, "param/"), dtype)
         .expect("the golden network has the published architecture")
 }

@@ -3,9 +3,9 @@
 use crate::segment_projection::{camera, same_camera};
 use burn::tensor::{Device, Tensor};
 use neat_core::Camera;
-use neat_field::segment_rendering::project_calibrated;
 use neat_gjp::junction_loss::{MatchedJunctions, junction_loss};
 use neat_gjp::{JunctionCount, PerceiverConfig};
+use neat_tensor::cameras::project_calibrated;
 use neat_tensor::parameters::load_parameters;
 use neat_tensor::random::{Purpose, stream};
 use neat_tests::backends::on_each_backend;
@@ -30,6 +30,7 @@ fn check(golden: &Golden, camera: &Camera, problem: &str, device: &Device) {
         width: 32,
     };
     let untrained = config.init(&mut stream(0, Purpose::Weights, 0), device);
+    let untrained = untrained.expect("some junctions");
     let values = parameters(golden, &format!("{problem}/param/"));
     let perceiver = load_parameters(untrained, values, None).expect("published architecture");
 

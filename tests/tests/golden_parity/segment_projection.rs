@@ -3,9 +3,7 @@
 use burn::tensor::{Device, Tensor, TensorData};
 use nalgebra::{Matrix3, Matrix4, Vector2, Vector3};
 use neat_core::{Camera, Intrinsics};
-use neat_field::segment_rendering::{
-    RayCameras, calibrated_difference_in_pixels, project_calibrated,
-};
+use neat_tensor::cameras::{RayCameras, calibrated_difference_in_pixels, project_calibrated};
 use neat_tests::backends::on_each_backend;
 use neat_tests::comparison::{assert_close, assert_relatively_close};
 use neat_tests::golden::Golden;

@@ -21,10 +21,9 @@ use neat_tests::golden::Golden;
 use neat_tests::named_gradients::{assert_gradients_close, named_gradients};
 use neat_tests::published_names::{model_gradients, model_parameters};
 use neat_tests::tensors::numbers;
-use neat_train::losses::{StepInput, StepLoss, step_loss};
 use neat_train::model::{NeatModel, PlacedSamples, RenderRequest};
-use neat_train::trainer::learning_rate_factor;
 use neat_train::training_data::{Batch, push_ray_through};
+use neat_train::{StepInput, StepLoss, step_loss};
 
 /// How local junctions are found, by the names of the golden tensors.
 const MODES: [&str; 2] = ["dbscan", "median"];
@@ -48,6 +47,7 @@ fn config(mode: &str) -> Config {
 
 fn model(golden: &Golden, prefix: &str, config: &Config, device: &Device) -> NeatModel {
     let untrained = NeatModel::new(&config.model, SCENE_RADIUS, 0, device);
+    let untrained = untrained.expect("the published sizes");
     load_parameters(untrained, model_parameters(golden, prefix), None)
         .expect("the golden networks have the published architecture")
 }
@@ -331,7 +331,7 @@ fn the_learning_rate_falls_as_published() {
     let train = Preset::PaperAbc.config().train;
     // The recorded schedule spans 100 iterations.
     let rates: Vec<f64> = (0..5)
-        .map(|i| train.learning_rate * learning_rate_factor(&train, i, i as f64 / 100.0))
+        .map(|i| train.learning_rate * train.learning_rate_factor(i, i as f64 / 100.0))
         .collect();
     assert_close(
         "learning rate",

@@ -5,11 +5,8 @@
 //! would, to the bit, and leaves out those that cannot change the answer.
 
 use crate::density::laplace_density_scalar;
+use neat_tensor::sampling::{MAX_ERROR_FACTOR, SATURATED};
 
-/// Largest value of the exponential inside the bound, as published.
-pub(crate) const MAX_ERROR_FACTOR: f32 = 1e6;
-/// Error integrals from here on reach [`MAX_ERROR_FACTOR`]: e¹⁴ = 1.2 · 10⁶.
-pub(crate) const SATURATED: f32 = 14.0;
 /// The exponential of anything below rounds to 0 in float32.
 const NOTHING_PASSES: f32 = -104.5;
 

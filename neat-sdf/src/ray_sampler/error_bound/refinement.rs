@@ -6,12 +6,8 @@
 use super::opacity_error::{Sections, nearest_distance};
 use crate::RayBundle;
 use crate::ray_sampler::inverse_cdf::{cumulate, invert, linspace};
+use neat_tensor::sampling::{FINAL_MASS_FLOOR, FLAT_STEP};
 use rayon::prelude::*;
-
-/// Added to every interval's mass before the last draw, as published.
-pub(crate) const FINAL_MASS_FLOOR: f32 = 1e-5;
-/// Cumulative steps below this are flat, as published.
-pub(crate) const FLAT_STEP: f32 = 1e-5;
 
 /// The rays of a call. Buffers are `[R · capacity]`, `new_z` is `[R · step]`.
 #[derive(Default)]

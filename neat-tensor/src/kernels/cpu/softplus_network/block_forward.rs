@@ -1,10 +1,10 @@
 //! One block forwards: activations of all layers, and the reverse sweep.
 
 use super::{Known, POINT, SoftplusNetwork, SoftplusShape};
-use crate::kernels::arena::Arena;
-use crate::kernels::gemm::multiply;
-use crate::kernels::layers::{cut_block, widest};
-use crate::kernels::{BLOCK_ROWS, PADDING, block, padded};
+use crate::kernels::cpu::arena::Arena;
+use crate::kernels::cpu::gemm::multiply;
+use crate::kernels::cpu::layers::{cut_block, widest};
+use crate::kernels::cpu::{BLOCK_ROWS, PADDING, block, padded};
 use std::f32::consts::FRAC_1_SQRT_2;
 
 /// Matrices of one block that the backward pass reads.

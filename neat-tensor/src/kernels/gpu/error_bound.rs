@@ -1,17 +1,18 @@
 //! VolSDF's Algorithm 1 as kernels: one iteration, and the final draw. The host's
-//! version is [`crate::ray_sampler::ErrorBoundConfig`]; running sums are float32
+//! version is `neat_sdf::ray_sampler::ErrorBoundConfig`; running sums are float32
 //! here and float64 there.
 
 use super::columns::{
     between, count_up_to, cumulate, laplace_density, linspace, sort_almost_sorted,
 };
-use super::{DrawNumbers, RefineNumbers};
-use crate::ray_sampler::error_bound::opacity_error::{MAX_ERROR_FACTOR, SATURATED, opaque_energy};
-use crate::ray_sampler::error_bound::refinement::{FINAL_MASS_FLOOR, FLAT_STEP};
+use super::empty_of;
+use super::sampling::launch_size;
+use crate::sampling::{
+    DrawNumbers, FINAL_MASS_FLOOR, FLAT_STEP, MAX_ERROR_FACTOR, RefineNumbers, SATURATED,
+};
 use burn_cubecl::cubecl::{self, prelude::*};
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
-use neat_tensor::device_kernels::empty_of;
 
 /// Lower bound of the distance to the surface within a section (VolSDF Theorem 1).
 #[cube]
@@ -83,6 +84,107 @@ fn holds(
     holds
 }
 
+/// Merges a ray's `old` samples and `step` fresh ones, positions with their distances.
+#[cube]
+#[expect(clippy::too_many_arguments, reason = "one column of three matrices")]
+fn merge(
+    samples: &Tensor<f32>,
+    fresh: &Tensor<f32>,
+    merged: &mut Tensor<f32>,
+    old: usize,
+    len: usize,
+    step: usize,
+    ray: usize,
+    rays: usize,
+) {
+    let room = len + step;
+    let mut from_old = 0usize;
+    let mut from_new = 0usize;
+    for i in 0..old + step {
+        let mut takes_old = from_old < old;
+        if takes_old && from_new < step {
+            takes_old = samples[from_old * rays + ray] <= fresh[from_new * rays + ray];
+        }
+        if takes_old {
+            merged[i * rays + ray] = samples[from_old * rays + ray];
+            merged[(room + i) * rays + ray] = samples[(len + from_old) * rays + ray];
+            from_old += 1;
+        } else {
+            merged[i * rays + ray] = fresh[from_new * rays + ray];
+            merged[(room + i) * rays + ray] = fresh[(step + from_new) * rays + ray];
+            from_new += 1;
+        }
+    }
+}
+
+/// The smallest β between `beta0` and `beta` that bisections find the bound to hold with.
+#[cube]
+#[expect(clippy::too_many_arguments, reason = "one column of two matrices")]
+fn search_beta(
+    merged: &mut Tensor<f32>,
+    nearest: &mut Tensor<f32>,
+    room: usize,
+    count: usize,
+    beta0: f32,
+    beta: f32,
+    bisections: usize,
+    epsilon: f32,
+    opaque: f32,
+    ray: usize,
+    rays: usize,
+) -> f32 {
+    let mut found = beta;
+    if holds(
+        merged, nearest, room, count, beta0, epsilon, opaque, ray, rays,
+    ) {
+        found = beta0;
+    } else {
+        let mut low = beta0;
+        for _ in 0..bisections {
+            let middle = (low + found) / 2.0;
+            if holds(
+                merged, nearest, room, count, middle, epsilon, opaque, ray, rays,
+            ) {
+                found = middle;
+            } else {
+                low = middle;
+            }
+        }
+    }
+    found
+}
+
+/// The next `step` positions, at even shares of the cumulative bound, which `scratch`
+/// holds from row `room` on.
+#[cube]
+#[expect(clippy::too_many_arguments, reason = "one column of three matrices")]
+fn place_evenly(
+    merged: &mut Tensor<f32>,
+    scratch: &mut Tensor<f32>,
+    next_z: &mut Tensor<f32>,
+    room: usize,
+    count: usize,
+    step: usize,
+    ray: usize,
+    rays: usize,
+) {
+    let mut above = 0usize;
+    for i in 0..step {
+        let u = linspace(i, step);
+        above = count_up_to(scratch, room, count, above, u, ray, rays);
+        let below = if above > 0 { above - 1 } else { 0usize };
+        let upper = if above < count { above } else { count - 1 };
+        next_z[i * rays + ray] = between(
+            merged[below * rays + ray],
+            merged[upper * rays + ray],
+            scratch[(room + below) * rays + ray],
+            scratch[(room + upper) * rays + ray],
+            FLAT_STEP,
+            u,
+        );
+    }
+}
+
 /// One iteration: new samples are merged in, β is searched, and the next samples
 /// are placed where the bound is large.
 ///
@@ -129,23 +231,7 @@ fn refine_kernel(
             }
         } else {
             let count = old + step;
-            let mut from_old = 0usize;
-            let mut from_new = 0usize;
-            for i in 0..count {
-                let mut takes_old = from_old < old;
-                if takes_old && from_new < step {
-                    takes_old = samples[from_old * rays + ray] <= fresh[from_new * rays + ray];
-                }
-                if takes_old {
-                    merged[i * rays + ray] = samples[from_old * rays + ray];
-                    merged[(room + i) * rays + ray] = samples[(len + from_old) * rays + ray];
-                    from_old += 1;
-                } else {
-                    merged[i * rays + ray] = fresh[from_new * rays + ray];
-                    merged[(room + i) * rays + ray] = fresh[(step + from_new) * rays + ray];
-                    from_new += 1;
-                }
-            }
+            merge(samples, fresh, merged, old, len, step, ray, rays);
             for i in 0..count - 1 {
                 scratch[i * rays + ray] = nearest_distance(
                     merged[(i + 1) * rays + ray] - merged[i * rays + ray],
@@ -156,23 +242,10 @@ fn refine_kernel(
 
             // Once reached, β stays.
             if beta != beta0 {
-                if holds(
-                    merged, scratch, room, count, beta0, epsilon, opaque, ray, rays,
-                ) {
-                    beta = beta0;
-                } else {
-                    let mut low = beta0;
-                    for _ in 0..bisections {
-                        let middle = (low + beta) / 2.0;
-                        if holds(
-                            merged, scratch, room, count, middle, epsilon, opaque, ray, rays,
-                        ) {
-                            beta = middle;
-                        } else {
-                            low = middle;
-                        }
-                    }
-                }
+                beta = search_beta(
+                    merged, scratch, room, count, beta0, beta, bisections, epsilon, opaque, ray,
+                    rays,
+                );
             }
 
             let mut error = 0.0f32;
@@ -184,21 +257,7 @@ fn refine_kernel(
                 energy += length * laplace_density(merged[(room + i) * rays + ray], beta);
             }
             cumulate(scratch, room, count - 1, ray, rays);
-            let mut above = 0usize;
-            for i in 0..step {
-                let u = linspace(i, step);
-                above = count_up_to(scratch, room, count, above, u, ray, rays);
-                let below = if above > 0 { above - 1 } else { 0usize };
-                let upper = if above < count { above } else { count - 1 };
-                next_z[i * rays + ray] = between(
-                    merged[below * rays + ray],
-                    merged[upper * rays + ray],
-                    scratch[(room + below) * rays + ray],
-                    scratch[(room + upper) * rays + ray],
-                    FLAT_STEP,
-                    u,
-                );
-            }
+            place_evenly(merged, scratch, next_z, room, count, step, ray, rays);
             sort_almost_sorted(next_z, ray, rays, step);
         }
         state[ray] = beta;
@@ -286,14 +345,6 @@ fn draw_kernel(
     }
 }
 
-/// Units of a group; the rays of a batch are many groups.
-pub(super) const UNITS: u32 = 32;
-
-pub(super) fn launch_size(rays: usize) -> (CubeCount, CubeDim) {
-    let groups = (rays as u32).div_ceil(UNITS);
-    (CubeCount::Static(groups, 1, 1), CubeDim::new_1d(UNITS))
-}
-
 pub(super) fn refine(
     [samples, fresh, betas, control]: [CubeTensor; 4],
     numbers: RefineNumbers,
@@ -305,6 +356,7 @@ pub(super) fn refine(
         rays,
         bisections,
         epsilon,
+        opaque,
     } = numbers;
     let empty = |rows| empty_of(&fresh, [rows, rays]);
     let room = 2 * (len + step);
@@ -327,7 +379,7 @@ pub(super) fn refine(
         rays,
         bisections,
         epsilon,
-        opaque_energy(epsilon) as f32,
+        opaque,
     );
     (merged, next_z, state)
 }

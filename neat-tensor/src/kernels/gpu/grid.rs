@@ -1,14 +1,13 @@
 //! Importance sampling of a cached grid as one kernel. The host's version is
-//! [`crate::ray_sampler::GridCachedConfig`].
+//! `neat_sdf::ray_sampler::GridCachedConfig`.
 
-use super::GridNumbers;
 use super::columns::{between, count_up_to, cumulate, laplace_density, sort_almost_sorted};
-use super::error_bound_kernels::launch_size;
-use crate::ray_sampler::grid_cached::{FLAT_STEP, MIN_HALF_CHORD_SQUARED, MIN_NEAR};
+use super::empty_of;
+use super::sampling::launch_size;
+use crate::sampling::{GRID_FLAT_STEP, GridNumbers, MIN_HALF_CHORD_SQUARED, MIN_NEAR};
 use burn_cubecl::cubecl::{self, prelude::*};
 use burn_cubecl::kernel::into_contiguous;
 use burn_cubecl::tensor::CubeTensor;
-use neat_tensor::device_kernels::empty_of;
 
 #[cube]
 fn mix(a: f32, b: f32, t: f32) -> f32 {
@@ -49,6 +48,20 @@ fn lookup(grid: &Tensor<f32>, nodes: usize, radius: f32, x: f32, y: f32, z: f32)
         fy,
     );
     mix(left_face, right_face, fx)
+}
+
+/// The intervals `deltas` that begin at `count` sorted positions from `start` on; the
+/// last one ends at `end`.
+#[cube]
+fn measure(z: &mut Tensor<f32>, deltas: &mut Tensor<f32>, start: usize, count: usize, end: f32) {
+    for i in 0..count {
+        let next = if i + 1 < count {
+            z[start + i + 1]
+        } else {
+            f32::max(end, z[start + i])
+        };
+        deltas[start + i] = next - z[start + i];
+    }
 }
 
 /// Samples `out` `[R, drawn + even]` of rays `[R, 6]` (origin and direction), and
@@ -125,7 +138,7 @@ fn grid_kernel(
                 edges[upper * rays + ray],
                 edges[(first + below) * rays + ray],
                 edges[(first + upper) * rays + ray],
-                FLAT_STEP,
+                GRID_FLAT_STEP,
                 u,
             );
         }
@@ -135,14 +148,7 @@ fn grid_kernel(
             out[start + drawn + i] = near + chord * t;
         }
         sort_almost_sorted(out, start, 1, drawn + even);
-        for i in 0..drawn + even {
-            let next = if i + 1 < drawn + even {
-                out[start + i + 1]
-            } else {
-                f32::max(end, out[start + i])
-            };
-            deltas[start + i] = next - out[start + i];
-        }
+        measure(out, deltas, start, drawn + even, end);
     }
 }
 

@@ -5,27 +5,23 @@
 //! is known, those that are not needed change nothing, and [`Progress`] tells
 //! afterwards whether more would have been.
 
-mod columns;
-mod error_bound_kernels;
-mod grid_kernel;
-
 use crate::ImplicitNetwork;
+use crate::ray_sampler::error_bound::opacity_error::opaque_energy;
 use crate::ray_sampler::error_bound::refinement::initial_beta;
 use crate::ray_sampler::inverse_cdf::linspace;
 use crate::ray_sampler::{
     DeviceSamples, DistanceGrid, ErrorBoundConfig, GridCachedConfig, RayBundle, SamplingNoise,
     StopRule,
 };
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, Dispatch, backend_extension};
 use burn::tensor::{Device, Tensor, TensorData, s};
-use burn_cubecl::CubeBackend;
+use neat_tensor::Kernels;
+use neat_tensor::sampling::{DrawNumbers, GridNumbers, RefineNumbers};
 
 /// Points per pass of the network: bounds the memory of a query.
 const POINT_CHUNK: usize = 65_536;
 
-/// Most rays of a call: groups of units along one axis are at most 65 535.
-const MAX_RAYS: usize = error_bound_kernels::UNITS as usize * 65_535;
+/// Most rays of a call: a kernel takes 32 in a group, and of groups at most 65 535.
+const MAX_RAYS: usize = 32 * 65_535;
 
 /// Rays on a device, without gradients.
 #[derive(Clone, Debug)]
@@ -38,107 +34,8 @@ pub struct DeviceRays {
 /// those that were launched, and 1 if that was not enough.
 pub type Progress = Tensor<1>;
 
-/// Numbers of an iteration.
-#[derive(Clone, Copy, Debug)]
-pub struct RefineNumbers {
-    len: usize,
-    step: usize,
-    rays: usize,
-    bisections: usize,
-    epsilon: f32,
-}
-
-/// Numbers of the final draw.
-#[derive(Clone, Copy, Debug)]
-pub struct DrawNumbers {
-    len: usize,
-    step: usize,
-    rays: usize,
-    drawn: usize,
-    extras: usize,
-    near: f32,
-    far: f32,
-}
-
-/// Numbers of sampling with a grid.
-#[derive(Clone, Copy, Debug)]
-pub struct GridNumbers {
-    rays: usize,
-    nodes: usize,
-    lookups: usize,
-    drawn: usize,
-    even: usize,
-    radius: f32,
-    min_beta: f32,
-    weight_floor: f32,
-}
-
-/// Steps of the samplers as operations of a backend; see the kernels for the
-/// tensors, which are float32.
-#[backend_extension(Cube)]
-pub trait DeviceSampling: Backend {
-    /// One iteration of Algorithm 1: all samples, the next positions, and the rays'
-    /// state.
-    fn refine(
-        samples: FloatTensor<Self>,
-        fresh: FloatTensor<Self>,
-        betas: FloatTensor<Self>,
-        control: FloatTensor<Self>,
-        numbers: RefineNumbers,
-    ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>);
-
-    /// The final samples of Algorithm 1.
-    fn draw(
-        samples: FloatTensor<Self>,
-        betas: FloatTensor<Self>,
-        control: FloatTensor<Self>,
-        u: FloatTensor<Self>,
-        kept: FloatTensor<Self>,
-        numbers: DrawNumbers,
-    ) -> FloatTensor<Self>;
-
-    /// Samples and their intervals by a grid of distances.
-    fn sample_grid(
-        ray_columns: FloatTensor<Self>,
-        grid: FloatTensor<Self>,
-        beta: FloatTensor<Self>,
-        noise: FloatTensor<Self>,
-        numbers: GridNumbers,
-    ) -> (FloatTensor<Self>, FloatTensor<Self>);
-}
-
-impl DeviceSampling for CubeBackend {
-    fn refine(
-        samples: FloatTensor<Self>,
-        fresh: FloatTensor<Self>,
-        betas: FloatTensor<Self>,
-        control: FloatTensor<Self>,
-        numbers: RefineNumbers,
-    ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>) {
-        error_bound_kernels::refine([samples, fresh, betas, control], numbers)
-    }
-
-    fn draw(
-        samples: FloatTensor<Self>,
-        betas: FloatTensor<Self>,
-        control: FloatTensor<Self>,
-        u: FloatTensor<Self>,
-        kept: FloatTensor<Self>,
-        numbers: DrawNumbers,
-    ) -> FloatTensor<Self> {
-        error_bound_kernels::draw([samples, betas, control, u, kept], numbers)
-    }
-
-    fn sample_grid(
-        ray_columns: FloatTensor<Self>,
-        grid: FloatTensor<Self>,
-        beta: FloatTensor<Self>,
-        noise: FloatTensor<Self>,
-        numbers: GridNumbers,
-    ) -> (FloatTensor<Self>, FloatTensor<Self>) {
-        grid_kernel::sample([ray_columns, grid, beta, noise], numbers)
-    }
-}
+/// What callers ask before.
+const PLACES_SAMPLES: &str = "the backend has kernels that place samples";
 
 fn matrix(values: Vec<f32>, shape: [usize; 2], device: &Device) -> Tensor<2> {
     Tensor::from_data(TensorData::new(values, shape), device)
@@ -222,6 +119,7 @@ impl ErrorBoundConfig {
         noise: &mut (impl SamplingNoise + Clone),
     ) -> (DeviceSamples, Progress) {
         let device = &rays.columns.device();
+        let kernels = network.mlp.kernels.of(&rays.columns);
         let (count, step) = (rays.len(), self.samples_per_iteration);
         let (near, far) = (self.near as f32, self.far as f32);
         let epsilon = self.epsilon as f32;
@@ -242,21 +140,17 @@ impl ErrorBoundConfig {
             let fresh = Tensor::cat(vec![new_z, sdf.reshape([step, count])], 0);
             let [iterations, wanted] = [0, 1].map(|i| progress.clone().narrow(0, i, 1));
             let control = Tensor::cat(vec![beta0.clone(), wanted.clone(), iterations.clone()], 0);
-            let (merged, next_z, state) = <Dispatch as DeviceSampling>::refine(
-                samples.into_dispatch(),
-                fresh.into_dispatch(),
-                betas.into_dispatch(),
-                control.into_dispatch(),
-                RefineNumbers {
-                    len: iteration * step,
-                    step,
-                    rays: count,
-                    bisections: self.bisections,
-                    epsilon,
-                },
-            );
-            (samples, new_z) = (Tensor::from_dispatch(merged), Tensor::from_dispatch(next_z));
-            let state = Tensor::<2>::from_dispatch(state);
+            let numbers = RefineNumbers {
+                len: iteration * step,
+                step,
+                rays: count,
+                bisections: self.bisections,
+                epsilon,
+                opaque: opaque_energy(epsilon) as f32,
+            };
+            let refined = kernels.refine_samples(samples, fresh, betas, control, numbers);
+            let state;
+            (samples, new_z, state) = refined.expect(PLACES_SAMPLES);
             betas = state.clone().narrow(0, 0, 1);
             let all_hold = state.narrow(0, 1, 1).min();
             let still = wanted.clone() * all_hold.neg().add_scalar(1.0);
@@ -265,33 +159,28 @@ impl ErrorBoundConfig {
 
         let (u, kept) = self.final_noise(count, launched, noise, device);
         let iterations = progress.clone().narrow(0, 0, 1);
-        let z = <Dispatch as DeviceSampling>::draw(
-            samples.into_dispatch(),
-            betas.into_dispatch(),
-            Tensor::cat(vec![beta0, progress.clone().narrow(0, 1, 1), iterations], 0)
-                .into_dispatch(),
-            u.into_dispatch(),
-            kept.into_dispatch(),
-            DrawNumbers {
-                len: launched * step,
-                step,
-                rays: count,
-                drawn: self.samples,
-                extras: self.extra_samples,
-                near,
-                far,
-            },
-        );
-        let z = Tensor::<2>::from_dispatch(z);
+        let control = Tensor::cat(vec![beta0, progress.clone().narrow(0, 1, 1), iterations], 0);
+        let numbers = DrawNumbers {
+            len: launched * step,
+            step,
+            rays: count,
+            drawn: self.samples,
+            extras: self.extra_samples,
+            near,
+            far,
+        };
+        let drawn = kernels.draw_samples(samples, betas, control, u, kept, numbers);
+        let z = drawn.expect(PLACES_SAMPLES);
         let last = self.samples + self.extra_samples + 1;
         let steps = z.clone().narrow(1, 1, last) - z.clone().narrow(1, 0, last);
         // Infinitely far, for float32: whatever passes the last sample stops there.
         let infinite = Tensor::<2>::full([count, 1], 1e10, device);
         // After all iterations the published code stops too.
         let most = self.max_iterations.max(1);
-        let progress = match launched == most {
-            true => progress * Tensor::from_data([1.0f32, 0.0], device),
-            false => progress,
+        let progress = if launched == most {
+            progress * Tensor::from_data([1.0f32, 0.0], device)
+        } else {
+            progress
         };
         (
             rays.place(z, Tensor::cat(vec![steps, infinite], 1)),
@@ -400,23 +289,22 @@ impl GridCachedConfig {
         let noise = noise.uniform(count * stratum);
         let noise = noise.unwrap_or_else(|| vec![0.5; count * stratum]);
         let noise = matrix(noise, [count, stratum], &grid.values.device()).transpose();
-        let (z, deltas) = <Dispatch as DeviceSampling>::sample_grid(
-            rays.columns.clone().into_dispatch(),
-            grid.values.clone().into_dispatch(),
-            beta.into_dispatch(),
-            noise.into_dispatch(),
-            GridNumbers {
-                rays: count,
-                nodes: like.resolution(),
-                lookups: self.lookups,
-                drawn: self.importance_samples,
-                even: self.uniform_samples,
-                radius: like.radius(),
-                // A density sharper than the grid resolves would miss the surface.
-                min_beta: 0.5 * like.cell(),
-                weight_floor: self.weight_floor as f32,
-            },
-        );
-        rays.place(Tensor::from_dispatch(z), Tensor::from_dispatch(deltas))
+        let numbers = GridNumbers {
+            rays: count,
+            nodes: like.resolution(),
+            lookups: self.lookups,
+            drawn: self.importance_samples,
+            even: self.uniform_samples,
+            radius: like.radius(),
+            // A density sharper than the grid resolves would miss the surface.
+            min_beta: 0.5 * like.cell(),
+            weight_floor: self.weight_floor as f32,
+        };
+        let kernels = Kernels::default();
+        let (rays_there, values) = (rays.columns.clone(), grid.values.clone());
+        let backend = kernels.of(&values);
+        let placed = backend.sample_grid(rays_there, values, beta, noise, numbers);
+        let (z, deltas) = placed.expect(PLACES_SAMPLES);
+        rays.place(z, deltas)
     }
 }

@@ -3,12 +3,12 @@
 
 use super::block_forward::BlockTape;
 use super::{Known, POINT, SoftplusNetwork};
-use crate::kernels::arena::Arena;
-use crate::kernels::block::{self, SweepAdjoint};
-use crate::kernels::gemm::{add_outer_products, multiply};
-use crate::kernels::layers::widest;
-use crate::kernels::weight_gradient::WeightGradient;
-use crate::kernels::{BLOCK_ROWS, padded};
+use crate::kernels::cpu::arena::Arena;
+use crate::kernels::cpu::block::{self, SweepAdjoint};
+use crate::kernels::cpu::gemm::{add_outer_products, multiply};
+use crate::kernels::cpu::layers::widest;
+use crate::kernels::cpu::weight_gradient::WeightGradient;
+use crate::kernels::cpu::{BLOCK_ROWS, padded};
 
 /// One block of a backward pass.
 pub(super) struct BlockJob<'a> {

@@ -1,8 +1,9 @@
-//! What rendered segments look like in the image.
+//! Pinhole cameras as tensors: what points and segments look like in images.
 
-use burn::tensor::Tensor;
+use burn::tensor::{Device, Tensor, TensorData};
+use neat_core::Camera;
 
-/// Cameras of a batch of rays, one per ray.
+/// Cameras of a batch of rays or points, one per row.
 #[derive(Clone, Debug)]
 pub struct RayCameras {
     /// Rotations from the world to the camera, `[R, 9]`, row-major.
@@ -11,6 +12,30 @@ pub struct RayCameras {
     pub center: Tensor<2>,
     /// `fx, fy, skew` of the intrinsics, `[R, 3]`.
     pub focal: Tensor<2>,
+}
+
+impl RayCameras {
+    /// One camera per row, in float32.
+    pub fn new<'a>(cameras: impl Iterator<Item = &'a Camera>, device: &Device) -> Self {
+        let (mut rotation, mut center, mut focal) = (Vec::new(), Vec::new(), Vec::new());
+        let mut rows = 0;
+        for camera in cameras {
+            rows += 1;
+            // Columns of world_from_camera are rows of camera_from_world.
+            rotation.extend(camera.world_from_camera.iter().map(|c| *c as f32));
+            center.extend(camera.center_in_world.iter().map(|c| *c as f32));
+            let k = camera.intrinsics;
+            focal.extend([k.fx, k.fy, k.skew].map(|f| f as f32));
+        }
+        let tensor = |values: Vec<f32>, columns: usize| {
+            Tensor::from_data(TensorData::new(values, [rows, columns]), device)
+        };
+        Self {
+            camera_from_world: tensor(rotation, 9),
+            center: tensor(center, 3),
+            focal: tensor(focal, 3),
+        }
+    }
 }
 
 /// Depths nearer to zero than this are moved to it before dividing.
