@@ -2,9 +2,11 @@
 
 use crate::encoding::PositionalEncoding;
 use crate::kernels::gpu::adam::StepNumbers;
-use crate::kernels::gpu::{activations, adam, encoding, sampling};
+use crate::kernels::gpu::operations::GpuOperations;
+use crate::kernels::gpu::{adam, error_bound, grid, primitive, tensor};
 use crate::neat_backend::{AdamNumbers, NeatBackend};
 use crate::sampling::{DrawNumbers, GridNumbers, RefineNumbers};
+use burn::backend::Dispatch;
 use burn::tensor::{Device, Tensor};
 
 /// GPUs in float32: activations, encoding, optimiser and samplers as kernels in CubeCL;
@@ -33,18 +35,20 @@ impl NeatBackend for Gpu {
     }
 
     fn softplus(&self, z: Tensor<2>, sharpness: f64) -> Tensor<2> {
-        activations::softplus(z, sharpness)
+        let value = Dispatch::gpu_softplus(z.into_dispatch(), sharpness as f32);
+        Tensor::from_dispatch(value)
     }
 
     fn times_softplus_slope(&self, g: Tensor<2>, z: Tensor<2>, sharpness: f64) -> Tensor<2> {
-        activations::times_slope(g, z, sharpness)
+        let (g, z) = (g.into_dispatch(), z.into_dispatch());
+        Tensor::from_dispatch(Dispatch::gpu_slope(g, z, sharpness as f32))
     }
 
     fn encode(&self, encoding: PositionalEncoding, x: Tensor<2>) -> Tensor<2> {
         if encoding.octaves == 0 {
             return x;
         }
-        encoding::encode(x, encoding.octaves)
+        Tensor::from_dispatch(Dispatch::gpu_encode(x.into_dispatch(), encoding.octaves))
     }
 
     fn pull_back(
@@ -56,7 +60,8 @@ impl NeatBackend for Gpu {
         if encoding.octaves == 0 {
             return gradient;
         }
-        encoding::pull_back(x, gradient, encoding.octaves)
+        let (x, gradient) = (x.into_dispatch(), gradient.into_dispatch());
+        Tensor::from_dispatch(Dispatch::gpu_pull_back(x, gradient, encoding.octaves))
     }
 
     fn adam(
@@ -66,7 +71,8 @@ impl NeatBackend for Gpu {
         moments: Option<[Tensor<1>; 2]>,
         numbers: AdamNumbers,
     ) -> (Tensor<1>, [Tensor<1>; 2]) {
-        let moments = moments.unwrap_or_else(|| [gradient.zeros_like(), gradient.zeros_like()]);
+        let [first, second] =
+            moments.unwrap_or_else(|| [gradient.zeros_like(), gradient.zeros_like()]);
         let numbers = StepNumbers {
             beta1: numbers.beta1 as f32,
             beta2: numbers.beta2 as f32,
@@ -75,7 +81,9 @@ impl NeatBackend for Gpu {
             rate: numbers.rate as f32,
             epsilon: numbers.epsilon as f32,
         };
-        adam::step(value, gradient, moments, numbers)
+        let tensors = [value, gradient, first, second].map(primitive);
+        let [value, first, second] = adam::step(tensors, numbers).map(tensor);
+        (value, [first, second])
     }
 
     fn refine_samples(
@@ -86,7 +94,10 @@ impl NeatBackend for Gpu {
         control: Tensor<1>,
         numbers: RefineNumbers,
     ) -> Option<(Tensor<2>, Tensor<2>, Tensor<2>)> {
-        Some(sampling::refine(samples, fresh, betas, control, numbers))
+        let [samples, fresh, betas] = [samples, fresh, betas].map(primitive);
+        let tensors = [samples, fresh, betas, primitive(control)];
+        let (merged, next_z, state) = error_bound::refine(tensors, numbers);
+        Some((tensor(merged), tensor(next_z), tensor(state)))
     }
 
     fn draw_samples(
@@ -98,17 +109,22 @@ impl NeatBackend for Gpu {
         kept: Tensor<2>,
         numbers: DrawNumbers,
     ) -> Option<Tensor<2>> {
-        Some(sampling::draw(samples, betas, control, u, kept, numbers))
+        let [samples, betas, u, kept] = [samples, betas, u, kept].map(primitive);
+        let tensors = [samples, betas, primitive(control), u, kept];
+        Some(tensor(error_bound::draw(tensors, numbers)))
     }
 
     fn sample_grid(
         &self,
         rays: Tensor<2>,
-        grid: Tensor<1>,
+        distances: Tensor<1>,
         beta: Tensor<1>,
         noise: Tensor<2>,
         numbers: GridNumbers,
     ) -> Option<(Tensor<2>, Tensor<2>)> {
-        Some(sampling::sample_grid(rays, grid, beta, noise, numbers))
+        let (distances, beta) = (primitive(distances), primitive(beta));
+        let tensors = [primitive(rays), distances, beta, primitive(noise)];
+        let (z, deltas) = grid::sample(tensors, numbers);
+        Some((tensor(z), tensor(deltas)))
     }
 }

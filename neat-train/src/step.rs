@@ -226,7 +226,10 @@ fn with_samples_on_device(
         if let Some(progress) = progress
             && !sampling.sufficed(progress)
         {
-            tracing::debug!(iteration = step.iteration, "samples not refined enough: again");
+            tracing::debug!(
+                iteration = step.iteration,
+                "samples not refined enough: again"
+            );
             continue;
         }
         outcome.rows.sampler = placed.asked;

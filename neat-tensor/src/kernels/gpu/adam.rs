@@ -1,11 +1,10 @@
 //! Adam's step of one parameter as one kernel.
 
-use super::{elementwise, empty_like};
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, Dispatch, backend_extension};
-use burn_cubecl::CubeBackend;
+use super::{elementwise, empty_of};
+use burn::backend::TensorMetadata;
 use burn_cubecl::cubecl::{self, prelude::*};
 use burn_cubecl::kernel::into_contiguous;
+use burn_cubecl::tensor::CubeTensor;
 
 /// The numbers of a step, bias corrections included.
 #[derive(Clone, Copy, Debug)]
@@ -22,20 +21,6 @@ pub struct StepNumbers {
     pub rate: f32,
     /// Added to the root of the mean square.
     pub epsilon: f32,
-}
-
-/// The optimiser as an operation of a backend; tensors are float32, all of the same
-/// shape.
-#[backend_extension(Cube)]
-pub trait DeviceAdam: Backend {
-    /// Parameter, mean gradient and mean square after a step.
-    fn device_adam(
-        value: FloatTensor<Self>,
-        gradient: FloatTensor<Self>,
-        first: FloatTensor<Self>,
-        second: FloatTensor<Self>,
-        numbers: StepNumbers,
-    ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>);
 }
 
 #[cube(launch)]
@@ -68,57 +53,33 @@ fn adam_kernel(
     }
 }
 
-impl DeviceAdam for CubeBackend {
-    fn device_adam(
-        value: FloatTensor<Self>,
-        gradient: FloatTensor<Self>,
-        first: FloatTensor<Self>,
-        second: FloatTensor<Self>,
-        numbers: StepNumbers,
-    ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>) {
-        let [value, gradient, first, second] =
-            [value, gradient, first, second].map(into_contiguous);
-        let [new_value, new_first, new_second] = std::array::from_fn(|_| empty_like(&value));
-        let (count, dim) = elementwise(&new_value);
-        adam_kernel::launch(
-            &new_value.client,
-            count,
-            dim,
-            value.into_tensor_arg(),
-            gradient.into_tensor_arg(),
-            first.into_tensor_arg(),
-            second.into_tensor_arg(),
-            new_value.clone().into_tensor_arg(),
-            new_first.clone().into_tensor_arg(),
-            new_second.clone().into_tensor_arg(),
-            numbers.beta1,
-            numbers.beta2,
-            numbers.rest1,
-            numbers.rest2,
-            numbers.rate,
-            numbers.epsilon,
-        );
-        (new_value, new_first, new_second)
-    }
-}
-
-/// [`DeviceAdam::device_adam`] for tensors of a GPU.
-pub(crate) fn step<const D: usize>(
-    value: burn::Tensor<D>,
-    gradient: burn::Tensor<D>,
-    [first, second]: [burn::Tensor<D>; 2],
+/// Parameter, mean gradient and mean square after a step; tensors are float32, all of the
+/// same shape.
+pub(crate) fn step(
+    [value, gradient, first, second]: [CubeTensor; 4],
     numbers: StepNumbers,
-) -> (burn::Tensor<D>, [burn::Tensor<D>; 2]) {
-    let (value, first, second) = <Dispatch as DeviceAdam>::device_adam(
-        value.into_dispatch(),
-        gradient.into_dispatch(),
-        first.into_dispatch(),
-        second.into_dispatch(),
-        numbers,
+) -> [CubeTensor; 3] {
+    let [value, gradient, first, second] = [value, gradient, first, second].map(into_contiguous);
+    let [new_value, new_first, new_second] =
+        std::array::from_fn(|_| empty_of(&value, value.shape()));
+    let (count, dim) = elementwise(&new_value);
+    adam_kernel::launch(
+        &new_value.client,
+        count,
+        dim,
+        value.into_tensor_arg(),
+        gradient.into_tensor_arg(),
+        first.into_tensor_arg(),
+        second.into_tensor_arg(),
+        new_value.clone().into_tensor_arg(),
+        new_first.clone().into_tensor_arg(),
+        new_second.clone().into_tensor_arg(),
+        numbers.beta1,
+        numbers.beta2,
+        numbers.rest1,
+        numbers.rest2,
+        numbers.rate,
+        numbers.epsilon,
     );
-    let moments = [
-        burn::Tensor::from_dispatch(first),
-        burn::Tensor::from_dispatch(second),
-    ];
-    (burn::Tensor::from_dispatch(value), moments)
+    [new_value, new_first, new_second]
 }

@@ -1,52 +1,14 @@
 //! The positional encoding and its Jacobian, one kernel each.
 //!
 //! Of a row `x` with `W` numbers the encoding has the columns `x`, `sin x`,
-//! `cos x`, `sin 2x`, `cos 2x`, …, `W` numbers each.
+//! `cos x`, `sin 2x`, `cos 2x`, …, `W` numbers each. Tensors are float32 matrices of the
+//! same number of rows.
 
-use super::{elementwise, empty_of};
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, TensorMetadata, backend_extension};
-use burn_autodiff::Autodiff;
-use burn_autodiff::checkpoint::base::Checkpointer;
-use burn_autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn_autodiff::grads::Gradients;
-use burn_autodiff::ops::{Backward, Ops, OpsKind};
-use burn_cubecl::CubeBackend;
+use super::{elementwise, empty_of, launch_elementwise};
+use burn::backend::TensorMetadata;
 use burn_cubecl::cubecl::{self, prelude::*};
 use burn_cubecl::kernel::into_contiguous;
-
-/// The encoding as operations of a backend; tensors are float32 matrices of the
-/// same number of rows.
-#[backend_extension(Cube, Autodiff)]
-pub trait DeviceEncoding: Backend {
-    /// The encoding `[N, W (1 + 2 octaves)]` of `x` `[N, W]`.
-    fn device_encode(x: FloatTensor<Self>, octaves: usize) -> FloatTensor<Self>;
-
-    /// `gradient`, with respect to the encoding of `x`, times its Jacobian.
-    fn device_pull_back(
-        x: FloatTensor<Self>,
-        gradient: FloatTensor<Self>,
-        octaves: usize,
-    ) -> FloatTensor<Self>;
-}
-
-/// What the derivatives of [`DeviceEncoding::device_pull_back`] need besides.
-pub trait DeviceEncodingSlopes: DeviceEncoding {
-    /// The Jacobian of the encoding at `x` times `a` `[N, W]`.
-    fn device_push_forward(
-        x: FloatTensor<Self>,
-        a: FloatTensor<Self>,
-        octaves: usize,
-    ) -> FloatTensor<Self>;
-
-    /// `a` times the derivative of the pulled back `gradient` with respect to `x`.
-    fn device_bend(
-        x: FloatTensor<Self>,
-        a: FloatTensor<Self>,
-        gradient: FloatTensor<Self>,
-        octaves: usize,
-    ) -> FloatTensor<Self>;
-}
+use burn_cubecl::tensor::CubeTensor;
 
 /// `sin(x + half_turns · π)`, by the series of [`crate::sine`]: what drivers offer
 /// may be off by 10⁻⁴.
@@ -150,7 +112,7 @@ fn push_forward_kernel(
 }
 
 #[cube(launch)]
-fn bend_kernel(
+fn pull_back_slope_kernel(
     x: &Tensor<f32>,
     a: &Tensor<f32>,
     gradient: &Tensor<f32>,
@@ -176,191 +138,42 @@ fn bend_kernel(
     }
 }
 
-impl DeviceEncoding for CubeBackend {
-    fn device_encode(x: FloatTensor<Self>, octaves: usize) -> FloatTensor<Self> {
-        let x = into_contiguous(x);
-        let [rows, width] = x.shape().dims();
-        let columns = width * (1 + 2 * octaves);
-        let out = empty_of(&x, [rows, columns]);
-        let (count, dim) = elementwise(&out);
-        encode_kernel::launch(
-            &out.client,
-            count,
-            dim,
-            x.into_tensor_arg(),
-            out.clone().into_tensor_arg(),
-            width,
-            columns,
-        );
-        out
-    }
-
-    fn device_pull_back(
-        x: FloatTensor<Self>,
-        gradient: FloatTensor<Self>,
-        octaves: usize,
-    ) -> FloatTensor<Self> {
-        let (x, gradient) = (into_contiguous(x), into_contiguous(gradient));
-        let [rows, width] = x.shape().dims();
-        let out = empty_of(&x, [rows, width]);
-        let (count, dim) = elementwise(&out);
-        pull_back_kernel::launch(
-            &out.client,
-            count,
-            dim,
-            x.into_tensor_arg(),
-            gradient.into_tensor_arg(),
-            out.clone().into_tensor_arg(),
-            width,
-            octaves,
-        );
-        out
-    }
+/// The encoding `[N, W (1 + 2 octaves)]` of `x` `[N, W]`.
+pub(super) fn encode(inputs: [CubeTensor; 1], octaves: usize) -> CubeTensor {
+    let [x] = inputs.map(into_contiguous);
+    let [rows, width] = x.shape().dims();
+    let columns = width * (1 + 2 * octaves);
+    let out = empty_of(&x, [rows, columns]);
+    launch_elementwise!(encode_kernel, out, [x], width, columns)
 }
 
-impl DeviceEncodingSlopes for CubeBackend {
-    fn device_push_forward(
-        x: FloatTensor<Self>,
-        a: FloatTensor<Self>,
-        octaves: usize,
-    ) -> FloatTensor<Self> {
-        let (x, a) = (into_contiguous(x), into_contiguous(a));
-        let [rows, width] = x.shape().dims();
-        let columns = width * (1 + 2 * octaves);
-        let out = empty_of(&x, [rows, columns]);
-        let (count, dim) = elementwise(&out);
-        push_forward_kernel::launch(
-            &out.client,
-            count,
-            dim,
-            x.into_tensor_arg(),
-            a.into_tensor_arg(),
-            out.clone().into_tensor_arg(),
-            width,
-            columns,
-        );
-        out
-    }
-
-    fn device_bend(
-        x: FloatTensor<Self>,
-        a: FloatTensor<Self>,
-        gradient: FloatTensor<Self>,
-        octaves: usize,
-    ) -> FloatTensor<Self> {
-        let (x, a) = (into_contiguous(x), into_contiguous(a));
-        let gradient = into_contiguous(gradient);
-        let [rows, width] = x.shape().dims();
-        let out = empty_of(&x, [rows, width]);
-        let (count, dim) = elementwise(&out);
-        bend_kernel::launch(
-            &out.client,
-            count,
-            dim,
-            x.into_tensor_arg(),
-            a.into_tensor_arg(),
-            gradient.into_tensor_arg(),
-            out.clone().into_tensor_arg(),
-            width,
-            octaves,
-        );
-        out
-    }
+/// `gradient`, with respect to the encoding of `x`, times its Jacobian.
+pub(super) fn pull_back(inputs: [CubeTensor; 2], octaves: usize) -> CubeTensor {
+    let [x, gradient] = inputs.map(into_contiguous);
+    let [rows, width] = x.shape().dims();
+    let out = empty_of(&x, [rows, width]);
+    launch_elementwise!(pull_back_kernel, out, [x, gradient], width, octaves)
 }
 
-#[derive(Debug)]
-struct EncodeOp;
-
-impl<B: DeviceEncoding> Backward<B, 1> for EncodeOp {
-    type State = (FloatTensor<B>, usize);
-
-    fn backward(
-        self,
-        ops: Ops<Self::State, 1>,
-        gradients: &mut Gradients,
-        _checkpointer: &mut Checkpointer,
-    ) {
-        let adjoint = gradients.consume::<B>(&ops.node);
-        let (x, octaves) = ops.state;
-        if let [Some(node)] = ops.parents {
-            gradients.register::<B>(node.id, B::device_pull_back(x, adjoint, octaves));
-        }
-    }
+/// The Jacobian of the encoding at `x` times `a` `[N, W]`.
+pub(super) fn push_forward(inputs: [CubeTensor; 2], octaves: usize) -> CubeTensor {
+    let [x, a] = inputs.map(into_contiguous);
+    let [rows, width] = x.shape().dims();
+    let columns = width * (1 + 2 * octaves);
+    let out = empty_of(&x, [rows, columns]);
+    launch_elementwise!(push_forward_kernel, out, [x, a], width, columns)
 }
 
-#[derive(Debug)]
-struct PullBackOp;
-
-impl<B: DeviceEncodingSlopes> Backward<B, 2> for PullBackOp {
-    type State = (FloatTensor<B>, FloatTensor<B>, usize);
-
-    fn backward(
-        self,
-        ops: Ops<Self::State, 2>,
-        gradients: &mut Gradients,
-        _checkpointer: &mut Checkpointer,
-    ) {
-        let adjoint = gradients.consume::<B>(&ops.node);
-        let (x, gradient, octaves) = ops.state;
-        let [of_x, of_gradient] = ops.parents;
-        if let Some(node) = of_x {
-            let to_x = B::device_bend(x.clone(), adjoint.clone(), gradient, octaves);
-            gradients.register::<B>(node.id, to_x);
-        }
-        if let Some(node) = of_gradient {
-            gradients.register::<B>(node.id, B::device_push_forward(x, adjoint, octaves));
-        }
-    }
-}
-
-impl<B: DeviceEncodingSlopes, C: CheckpointStrategy> DeviceEncoding for Autodiff<B, C> {
-    fn device_encode(x: FloatTensor<Self>, octaves: usize) -> FloatTensor<Self> {
-        let nodes = [x.node()];
-        let x = x.into_primitive();
-        match EncodeOp.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prepared) => {
-                let value = B::device_encode(x.clone(), octaves);
-                prepared.finish((x, octaves), value)
-            }
-            OpsKind::UnTracked(prepared) => prepared.finish(B::device_encode(x, octaves)),
-        }
-    }
-
-    fn device_pull_back(
-        x: FloatTensor<Self>,
-        gradient: FloatTensor<Self>,
-        octaves: usize,
-    ) -> FloatTensor<Self> {
-        let nodes = [x.node(), gradient.node()];
-        let (x, gradient) = (x.into_primitive(), gradient.into_primitive());
-        match PullBackOp.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prepared) => {
-                let value = B::device_pull_back(x.clone(), gradient.clone(), octaves);
-                prepared.finish((x, gradient, octaves), value)
-            }
-            OpsKind::UnTracked(prepared) => {
-                prepared.finish(B::device_pull_back(x, gradient, octaves))
-            }
-        }
-    }
-}
-
-/// [`DeviceEncoding::device_encode`] for tensors of a GPU.
-pub(crate) fn encode(x: burn::Tensor<2>, octaves: usize) -> burn::Tensor<2> {
-    use burn::backend::Dispatch;
-    let x = x.into_dispatch();
-    burn::Tensor::from_dispatch(<Dispatch as DeviceEncoding>::device_encode(x, octaves))
-}
-
-/// [`DeviceEncoding::device_pull_back`] for tensors of a GPU.
-pub(crate) fn pull_back(
-    x: burn::Tensor<2>,
-    gradient: burn::Tensor<2>,
-    octaves: usize,
-) -> burn::Tensor<2> {
-    use burn::backend::Dispatch;
-    let (x, gradient) = (x.into_dispatch(), gradient.into_dispatch());
-    burn::Tensor::from_dispatch(<Dispatch as DeviceEncoding>::device_pull_back(
-        x, gradient, octaves,
-    ))
+/// `a` times the derivative of the pulled back `gradient` with respect to `x`.
+pub(super) fn pull_back_slope(inputs: [CubeTensor; 3], octaves: usize) -> CubeTensor {
+    let [x, a, gradient] = inputs.map(into_contiguous);
+    let [rows, width] = x.shape().dims();
+    let out = empty_of(&x, [rows, width]);
+    launch_elementwise!(
+        pull_back_slope_kernel,
+        out,
+        [x, a, gradient],
+        width,
+        octaves
+    )
 }

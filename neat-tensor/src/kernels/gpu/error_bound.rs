@@ -5,8 +5,7 @@
 use super::columns::{
     between, count_up_to, cumulate, laplace_density, linspace, sort_almost_sorted,
 };
-use super::empty_of;
-use super::sampling::launch_size;
+use super::{empty_of, launch_size};
 use crate::sampling::{
     DrawNumbers, FINAL_MASS_FLOOR, FLAT_STEP, MAX_ERROR_FACTOR, RefineNumbers, SATURATED,
 };
@@ -345,7 +344,7 @@ fn draw_kernel(
     }
 }
 
-pub(super) fn refine(
+pub(crate) fn refine(
     [samples, fresh, betas, control]: [CubeTensor; 4],
     numbers: RefineNumbers,
 ) -> (CubeTensor, CubeTensor, CubeTensor) {
@@ -384,7 +383,7 @@ pub(super) fn refine(
     (merged, next_z, state)
 }
 
-pub(super) fn draw(
+pub(crate) fn draw(
     [samples, betas, control, u, kept]: [CubeTensor; 5],
     numbers: DrawNumbers,
 ) -> CubeTensor {

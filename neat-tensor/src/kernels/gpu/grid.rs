@@ -2,8 +2,7 @@
 //! `neat_sdf::ray_sampler::GridCachedConfig`.
 
 use super::columns::{between, count_up_to, cumulate, laplace_density, sort_almost_sorted};
-use super::empty_of;
-use super::sampling::launch_size;
+use super::{empty_of, launch_size};
 use crate::sampling::{GRID_FLAT_STEP, GridNumbers, MIN_HALF_CHORD_SQUARED, MIN_NEAR};
 use burn_cubecl::cubecl::{self, prelude::*};
 use burn_cubecl::kernel::into_contiguous;
@@ -152,7 +151,7 @@ fn grid_kernel(
     }
 }
 
-pub(super) fn sample(
+pub(crate) fn sample(
     [ray_columns, grid, beta, noise]: [CubeTensor; 4],
     numbers: GridNumbers,
 ) -> (CubeTensor, CubeTensor) {
