@@ -1,11 +1,10 @@
-//! The command line: what all commands share.
+//! Arguments that several commands share.
 
-use crate::commands::Command;
+use crate::duration;
 use crate::error::CliError;
 use crate::memory::MemoryArgs;
-use crate::{duration, output};
+use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Parser};
 use neat_pipeline::config::Config;
 use neat_pipeline::overrides::apply_overrides;
 use neat_pipeline::preset::Preset;
@@ -13,51 +12,6 @@ use neat_pipeline::run_dir::parse_config;
 use neat_tensor::Backend;
 use std::path::PathBuf;
 use std::time::Duration;
-
-/// Turns posed photographs and their 2D wireframes into one 3D wireframe.
-#[derive(Debug, Parser)]
-#[command(
-    name = "neat",
-    version,
-    arg_required_else_help = true,
-    after_help = "\
-Start here:
-  neat demo --out demo                   make a scene, reconstruct it, and measure the result
-  neat info SCENE                        what is in a folder of photographs
-  neat reconstruct SCENE --out RUN       from the photographs to RUN/wireframe.json
-  neat view RUN                          the result in your browser
-  neat eval --pred RUN/wireframe.json --gt SCENE/gt_wireframe.json
-
-Exit codes:
-  0    done
-  1    the run failed
-  2    the arguments or the input cannot be used
-  130  interrupted: Ctrl-C (or SIGTERM) ends a run after the current step and leaves a
-       checkpoint; the same command with --resume goes on; a second Ctrl-C ends at once"
-)]
-pub struct Cli {
-    #[command(subcommand)]
-    command: Command,
-    /// Say nothing but results, warnings and errors
-    #[arg(long, short, global = true)]
-    quiet: bool,
-    /// Use so many CPU threads instead of all; results do not depend on it
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
-}
-
-impl Cli {
-    /// Does what was asked for.
-    pub fn run(self) -> Result<(), CliError> {
-        output::init_log();
-        if let Some(threads) = self.threads {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(threads.into())
-                .build_global()?;
-        }
-        self.command.run(self.quiet)
-    }
-}
 
 /// The method, its numbers and its seed.
 #[derive(Debug, Args)]

@@ -1,6 +1,5 @@
 //! What ends a command early, and the exit code that tells scripts.
 
-use crate::output;
 use neat_batch::BatchError;
 use neat_core::synthetic::SyntheticError;
 use neat_core::{SceneError, with_causes};
@@ -11,7 +10,6 @@ use neat_pipeline::overrides::OverrideError;
 use neat_pipeline::run_dir::RunDirError;
 use neat_tensor::BackendError;
 use neat_train::TrainError;
-use std::process::ExitCode;
 
 /// Exit code of a run that failed.
 const FAILED: u8 = 1;
@@ -127,20 +125,8 @@ impl CliError {
         }
     }
 
-    /// Prints the error with its causes, once, and returns the exit code.
-    pub fn report(&self) -> ExitCode {
-        let code = self.exit_code();
-        if !self.is_closed_pipe() {
-            output::error(&with_causes(self));
-        }
-        if let Some(hint) = self.hint() {
-            output::error_hint(hint);
-        }
-        code.into()
-    }
-
     /// How to go on.
-    fn hint(&self) -> Option<&'static str> {
+    pub fn hint(&self) -> Option<&'static str> {
         match self {
             Self::Resumable(_) => Some("give the same command with --resume to continue"),
             Self::Pipeline(PipelineError::AblationInterrupted { .. })
@@ -149,7 +135,8 @@ impl CliError {
         }
     }
 
-    fn exit_code(&self) -> u8 {
+    /// The exit code that tells scripts.
+    pub fn exit_code(&self) -> u8 {
         match self {
             Self::Resumable(_)
             | Self::BatchInterrupted { .. }
@@ -172,7 +159,8 @@ impl CliError {
         }
     }
 
-    fn is_closed_pipe(&self) -> bool {
+    /// Whether nobody takes the output any more.
+    pub fn is_closed_pipe(&self) -> bool {
         matches!(self, Self::Output(error) if error.kind() == std::io::ErrorKind::BrokenPipe)
     }
 }

@@ -14,14 +14,26 @@ mod output;
 mod progress;
 mod scene_arguments;
 
-use arguments::Cli;
 use clap::Parser;
+use commands::Cli;
+use error::CliError;
+use neat_pipeline::error::with_causes;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
-    match cli.run() {
+    match Cli::parse().run() {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => error.report(),
+        Err(error) => report(&error),
     }
+}
+
+/// Prints an error with its causes, once, and how to go on.
+fn report(error: &CliError) -> ExitCode {
+    if !error.is_closed_pipe() {
+        output::error(&with_causes(error));
+    }
+    if let Some(hint) = error.hint() {
+        output::error_hint(hint);
+    }
+    error.exit_code().into()
 }

@@ -1,6 +1,6 @@
 //! `neat batch`.
 
-use crate::arguments::Cli;
+use super::Cli;
 use crate::batch_progress::BatchProgress;
 use crate::error::CliError;
 use crate::{duration, interrupt, output};
