@@ -52,9 +52,6 @@ LEFT = "was left behind"
 # A file that is being written: `.NAME.PROCESS.COUNT.tmp`.
 TEMPORARY = re.compile(r"\..+\.\d+\.\d+\.tmp")
 CHECKPOINT = re.compile(r"step-(\d{8})\.safetensors")
-CONTINUED = re.compile(r"^training goes on after step (\d+) of", re.MULTILINE)
-# What `NEAT_LOG` prints when a stage begins and when it ends.
-MARK = re.compile(r"^(\S+)Z +INFO neat::progress: (\w+) (begins|ends)$")
 # Quick, with checkpoints often enough that most kills have one to go on from.
 SETTINGS = ("train.checkpoint_interval=10", "train.warm_up_steps=10", "train.rays=128")
 # A reconstruction of the toy scene takes a second or two; this one is stuck.
@@ -149,7 +146,7 @@ def differences(reference, found):
 
 @dataclasses.dataclass
 class Mark:
-    """A line of the log: a stage begins, or ends."""
+    """A stage begins, or ends."""
 
     time: float
     stage: str
@@ -161,37 +158,43 @@ class Session:
     def __init__(self, subject, folder, number):
         self.log = folder / f"log-{number}"
         self.begin = time.time()
-        environment = os.environ | {
-            "NEAT_CACHE": str(folder / "cache"),
-            "NEAT_LOG": "neat=info",
-            "NO_COLOR": "1",
-        }
+        environment = os.environ | {"NEAT_CACHE": str(folder / "cache")}
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(
-                [*subject.command, "--out", folder / "run", "--resume"],
+                [*subject.command, "--out", folder / "run", "--resume", "--progress", "json"],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=log,
                 env=environment,
             )
 
+    def events(self):
+        """What it has told; a kill may have cut the last line off."""
+        for line in self.log.read_text(errors="replace").splitlines():
+            try:
+                event = json.loads(line)
+            except ValueError:
+                continue
+            if isinstance(event, dict):
+                yield event
+
     def marks(self):
         """The parts of the work that have begun, in order."""
         result = [Mark(self.begin, START)]
-        for line in self.log.read_text(errors="replace").splitlines():
-            if match := MARK.match(line):
-                moment = datetime.datetime.fromisoformat(match[1])
-                moment = moment.replace(tzinfo=datetime.timezone.utc).timestamp()
-                ends = match[3] == "ends"
-                stage = AFTERWARDS.get(match[2]) if ends else match[2]
-                if stage:
-                    result.append(Mark(moment, stage))
+        for event in self.events():
+            stage = None
+            if event["event"] == "stage_started":
+                stage = event["stage"]
+            elif event["event"] == "stage_finished":
+                stage = AFTERWARDS.get(event["stage"])
+            if stage:
+                result.append(Mark(event["time"], stage))
         return result
 
     def continued_after(self):
         """The step of the checkpoint that it went on from; None if it did not (yet)."""
-        match = CONTINUED.search(self.log.read_text(errors="replace"))
-        return match and int(match[1])
+        steps = (event["step"] for event in self.events() if event["event"] == "resumed")
+        return next(steps, None)
 
     def ended(self):
         return self.process.poll() is not None

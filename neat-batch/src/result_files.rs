@@ -60,11 +60,27 @@ struct Agreement {
 struct RunManifest {
     backend: String,
     steps: u64,
-    warnings: Vec<String>,
+    warnings: Vec<RunWarning>,
     /// In its words, which are those of jobs.
     status: JobState,
     /// Of each stage.
     seconds: BTreeMap<String, f64>,
+}
+
+/// Earlier versions of neat stored the message alone.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum RunWarning {
+    Message(String),
+    Warning { message: String },
+}
+
+impl RunWarning {
+    fn message(self) -> String {
+        match self {
+            Self::Message(message) | Self::Warning { message } => message,
+        }
+    }
 }
 
 /// The state and the seconds of a run that no batch has made, but `neat reconstruct`
@@ -120,7 +136,9 @@ pub fn read_result(run: &Path, truth: Option<&Path>) -> Result<ResultFigures, Ba
             .and_then(|a| a.mean_reprojection_error_in_pixels),
         steps: manifest.steps,
         backend: manifest.backend,
-        warnings: manifest.warnings,
+        warnings: (manifest.warnings.into_iter())
+            .map(RunWarning::message)
+            .collect(),
         evaluation,
     })
 }

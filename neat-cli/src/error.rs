@@ -4,9 +4,11 @@ use neat_batch::BatchError;
 use neat_core::synthetic::SyntheticError;
 use neat_core::{SceneError, with_causes};
 use neat_eval::EvalError;
-use neat_pipeline::compare_backends::CompareError;
+use neat_lab::LabError;
+use neat_lab::compare_backends::CompareError;
+use neat_pipeline::config::OverrideError;
 use neat_pipeline::error::PipelineError;
-use neat_pipeline::overrides::OverrideError;
+use neat_pipeline::plan::PlanError;
 use neat_pipeline::run_dir::RunDirError;
 use neat_tensor::BackendError;
 use neat_train::TrainError;
@@ -55,6 +57,9 @@ pub enum CliError {
     /// A `--set` that does not apply.
     #[error(transparent)]
     Override(#[from] OverrideError),
+    /// A measurement did not finish.
+    #[error(transparent)]
+    Lab(LabError),
     /// Backends could not be compared.
     #[error(transparent)]
     Compare(#[from] CompareError),
@@ -110,9 +115,23 @@ through_pipeline!(
     RunDirError,
     BackendError,
     TrainError,
-    SyntheticError,
-    EvalError
+    PlanError
 );
+
+impl From<LabError> for CliError {
+    fn from(error: LabError) -> Self {
+        match error {
+            LabError::Pipeline(error) => Self::Pipeline(error),
+            error => Self::Lab(error),
+        }
+    }
+}
+
+impl From<EvalError> for CliError {
+    fn from(error: EvalError) -> Self {
+        Self::Lab(error.into())
+    }
+}
 
 impl CliError {
     /// The error of a command that has `--resume`.
@@ -129,8 +148,9 @@ impl CliError {
     pub fn hint(&self) -> Option<&'static str> {
         match self {
             Self::Resumable(_) => Some("give the same command with --resume to continue"),
-            Self::Pipeline(PipelineError::AblationInterrupted { .. })
-            | Self::BatchInterrupted { .. } => Some("give the same command again to continue"),
+            Self::Lab(LabError::AblationInterrupted { .. }) | Self::BatchInterrupted { .. } => {
+                Some("give the same command again to continue")
+            }
             _ => None,
         }
     }
@@ -140,12 +160,12 @@ impl CliError {
         match self {
             Self::Resumable(_)
             | Self::BatchInterrupted { .. }
-            | Self::Pipeline(
-                PipelineError::Interrupted { .. }
-                | PipelineError::InterruptedIn(_)
-                | PipelineError::AblationInterrupted { .. },
-            ) => INTERRUPTED,
+            | Self::Lab(LabError::AblationInterrupted { .. })
+            | Self::Pipeline(PipelineError::Interrupted { .. } | PipelineError::InterruptedIn(_)) => {
+                INTERRUPTED
+            }
             Self::Pipeline(error) if error.is_bad_input() => BAD_INPUT,
+            Self::Lab(error) if error.is_bad_input() => BAD_INPUT,
             Self::Override(_)
             | Self::UnknownView { .. }
             | Self::Usage(_)
@@ -177,7 +197,7 @@ mod tests {
             step: 7,
             checkpoint: "step-00000007.safetensors".into(),
         };
-        let ablation = PipelineError::AblationInterrupted { done: 3, all: 20 };
+        let ablation = LabError::AblationInterrupted { done: 3, all: 20 };
         for (error, hint) in [
             (CliError::of_resumable(interrupted()), Some("--resume")),
             (

@@ -3,7 +3,7 @@
 use bytesize::ByteSize;
 use clap::Args;
 use neat_core::MemoryLimit;
-use neat_pipeline::machine_memory::default_limit;
+use neat_pipeline::resources::default_limit;
 
 /// How much memory may be used.
 #[derive(Clone, Copy, Debug, Args)]

@@ -2,20 +2,35 @@
 //! elsewhere.
 
 use crate::{duration, output};
+use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use neat_pipeline::event::{Event, Stage};
 use neat_train::trainer::StepReport;
+use serde_json::{Value, json};
 use std::io::{IsTerminal, stderr};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Without a terminal there is one line per so much time.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
+/// For programs, steps and shares of a stage come at most so often.
+const JSON_INTERVAL: Duration = Duration::from_millis(100);
 /// Parts of the bar.
 const TICKS: u64 = 1000;
+
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ProgressFormat {
+    /// For people
+    #[default]
+    Text,
+    /// For programs: one JSON object per line
+    Json,
+}
 
 /// Shows the events of a run.
 pub struct Progress {
     quiet: bool,
+    format: ProgressFormat,
     bar: Option<ProgressBar>,
     stage_start: Instant,
     /// How much was done when this session of a resumed run began.
@@ -26,9 +41,15 @@ pub struct Progress {
 impl Progress {
     /// Shows everything, or only warnings.
     pub fn new(quiet: bool) -> Self {
-        let on_terminal = !quiet && stderr().is_terminal();
+        Self::with_format(quiet, ProgressFormat::Text)
+    }
+
+    /// The same, for people or for programs.
+    pub fn with_format(quiet: bool, format: ProgressFormat) -> Self {
+        let on_terminal = !quiet && format == ProgressFormat::Text && stderr().is_terminal();
         Self {
             quiet,
+            format,
             bar: on_terminal.then(bar),
             stage_start: Instant::now(),
             first_fraction: None,
@@ -38,17 +59,39 @@ impl Progress {
 
     /// Shows one event.
     pub fn show(&mut self, event: Event<'_>) {
+        if self.format == ProgressFormat::Json {
+            return self.show_json(&event);
+        }
         match event {
             Event::StageStarted(stage) => self.start(stage),
             Event::StageProgress { fraction, .. } => self.update(fraction, ""),
             Event::Step { report, fraction } => self.update(fraction, &describe(report)),
             Event::StageFinished { stage, seconds } => {
-                tracing::info!("{stage} ends");
                 self.line(&format!("{stage:<10} {}", duration::display(seconds)));
             }
             Event::Note(note) => self.line(&note),
+            Event::Decided(decision) => self.line(&decision.to_string()),
+            Event::Resumed { step, steps } => {
+                self.line(&format!("training goes on after step {step} of {steps}"));
+            }
             Event::Warning(warning) => self.print(&format!("warning: {warning}")),
-            Event::FileWritten(path) => tracing::info!("wrote {}", path.display()),
+            Event::FileWritten(_) => {}
+        }
+    }
+
+    fn show_json(&mut self, event: &Event<'_>) {
+        let often = match event {
+            Event::Step { fraction, .. } | Event::StageProgress { fraction, .. } => *fraction < 1.0,
+            _ => false,
+        };
+        if often {
+            if self.last_line.elapsed() < JSON_INTERVAL {
+                return;
+            }
+            self.last_line = Instant::now();
+        }
+        if !self.quiet || matches!(event, Event::Warning(_)) {
+            output::note(&to_json(event).to_string());
         }
     }
 
@@ -58,7 +101,6 @@ impl Progress {
     }
 
     fn start(&mut self, stage: Stage) {
-        tracing::info!("{stage} begins");
         self.stage_start = Instant::now();
         self.last_line = Instant::now();
         self.first_fraction = None;
@@ -141,4 +183,57 @@ fn describe(report: &StepReport) -> String {
         losses.junction_3d,
         report.segment_error_in_pixels,
     )
+}
+
+/// An event for programs: `event` says which, `time` when, in seconds since 1970.
+fn to_json(event: &Event<'_>) -> Value {
+    let mut value = match event {
+        Event::StageStarted(stage) => json!({ "event": "stage_started", "stage": stage }),
+        Event::StageProgress { stage, fraction } => {
+            json!({ "event": "stage_progress", "stage": stage, "fraction": fraction })
+        }
+        Event::StageFinished { stage, seconds } => {
+            json!({ "event": "stage_finished", "stage": stage, "seconds": seconds })
+        }
+        Event::Step { report, fraction } => {
+            json!({ "event": "step", "fraction": fraction, "report": report })
+        }
+        Event::Note(message) => json!({ "event": "note", "message": message }),
+        Event::Decided(decision) => json!({
+            "event": "decision",
+            "setting": decision.setting,
+            "value": decision.value,
+            "reason": decision.reason,
+        }),
+        Event::Resumed { step, steps } => {
+            json!({ "event": "resumed", "step": step, "steps": steps })
+        }
+        Event::Warning(warning) => {
+            json!({ "event": "warning", "kind": warning.kind, "message": warning.message })
+        }
+        Event::FileWritten(path) => {
+            json!({ "event": "file_written", "path": path.display().to_string() })
+        }
+    };
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+    value["time"] = json!(since_1970.map_or(0.0, |time| time.as_secs_f64()));
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use neat_pipeline::event::{Warning, WarningKind};
+
+    #[test]
+    fn programs_read_an_event_by_its_name() {
+        let warning = Warning::new(WarningKind::NoEdges, "no edges");
+        let value = to_json(&Event::Warning(warning));
+        assert_eq!(value["event"], "warning");
+        assert_eq!(value["kind"], "no_edges");
+        assert!(value["time"].as_f64().unwrap() > 1e9);
+        let value = to_json(&Event::StageStarted(Stage::Train));
+        assert_eq!(value["stage"], "train");
+        assert!(!value.to_string().contains('\n'));
+    }
 }

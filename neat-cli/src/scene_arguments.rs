@@ -6,7 +6,7 @@ use neat_core::file_cache::FileCache;
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
 use neat_core::{LoadOptions, MemoryLimit, SphereChoice};
 use neat_pipeline::config::DataConfig;
-use neat_pipeline::preset::Preset;
+use neat_pipeline::config::Preset;
 use neat_pipeline::scene::load_options;
 use std::fmt;
 

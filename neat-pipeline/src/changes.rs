@@ -1,11 +1,10 @@
 //! What has changed since a run began: only the same inputs and the same
 //! configuration continue to the same result.
 
-use crate::config::Config;
+use crate::config::{Config, Difference, differences as differing};
 use crate::error::PipelineError;
 use crate::manifest::Manifest;
 use crate::run_dir::RunDirError;
-use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -75,7 +74,10 @@ impl Belonging {
             let (then, now) = (self.seed, now.seed);
             differences.push(format!("seed: {then} then, {now} now"));
         }
-        differences.extend(changed_values(&self.config, &now.config));
+        let changed = differing(&self.config, &now.config).into_iter();
+        differences.extend(
+            changed.map(|Difference { key, then, now }| format!("{key}: {then} then, {now} now")),
+        );
         match (&self.inputs, &now.inputs) {
             (Some(then), Some(now)) => differences.extend(changed_files(then, now)),
             _ if self.inputs_digest != now.inputs_digest => {
@@ -109,44 +111,6 @@ fn digest(inputs: &BTreeMap<String, String>) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// `key: VALUE then, VALUE now` for every value of the configuration that differs.
-fn changed_values(then: &Config, now: &Config) -> Vec<String> {
-    let leaves = |config: &Config| {
-        let mut leaves = BTreeMap::new();
-        let tree = serde_json::to_value(config).expect("changes: a configuration is a tree");
-        collect_leaves("", &tree, &mut leaves);
-        leaves
-    };
-    let (then, now) = (leaves(then), leaves(now));
-    let keys: BTreeSet<&String> = then.keys().chain(now.keys()).collect();
-    let told = |value: Option<&Value>| match value {
-        None | Some(Value::Null) => "none".to_owned(),
-        Some(value) => value.to_string(),
-    };
-    keys.into_iter()
-        .map(|key| (key, told(then.get(key)), told(now.get(key))))
-        .filter(|(_, then, now)| then != now)
-        .map(|(key, then, now)| format!("{key}: {then} then, {now} now"))
-        .collect()
-}
-
-fn collect_leaves(key: &str, value: &Value, leaves: &mut BTreeMap<String, Value>) {
-    match value {
-        Value::Object(table) => {
-            for (name, value) in table {
-                let key = match key {
-                    "" => name.clone(),
-                    above => format!("{above}.{name}"),
-                };
-                collect_leaves(&key, value, leaves);
-            }
-        }
-        value => {
-            leaves.insert(key.to_owned(), value.clone());
-        }
-    }
-}
-
 fn changed_files(then: &BTreeMap<String, String>, now: &BTreeMap<String, String>) -> Vec<String> {
     let names: BTreeSet<&String> = then.keys().chain(now.keys()).collect();
     names
@@ -166,7 +130,6 @@ fn changed_files(then: &BTreeMap<String, String>, now: &BTreeMap<String, String>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::preset::Preset;
 
     fn files(list: &[(&str, &str)]) -> BTreeMap<String, String> {
         let owned = |(name, hash): &(&str, &str)| ((*name).to_owned(), (*hash).to_owned());
@@ -174,24 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_difference_is_told() {
-        let then = Preset::Fast.config();
-        assert!(changed_values(&then, &then).is_empty());
-        let mut now = then.clone();
-        now.train.steps = 5;
-        now.data.max_views = Some(7);
-        assert_eq!(
-            changed_values(&then, &now),
-            [
-                "data.max_views: none then, 7 now".to_owned(),
-                format!("train.steps: {} then, 5 now", then.train.steps),
-            ]
-        );
-        // Another kind of sampler has other keys.
-        let paper = changed_values(&then, &Preset::PaperAbc.config()).join("\n");
-        assert!(paper.contains("train.sampler.kind: \"grid_cached\" then"));
-        assert!(paper.contains("train.sampler.resolution: 48 then, none now"));
-
+    fn every_kind_of_changed_file_is_told() {
         let before = files(&[("a.png", "1"), ("b.png", "2"), ("c.png", "3")]);
         let after = files(&[("a.png", "1"), ("b.png", "9"), ("d.png", "4")]);
         assert!(changed_files(&before, &before).is_empty());

@@ -1,9 +1,28 @@
 //! Everything about a run that a person may choose, as one tree of plain structs.
 //!
 //! The tree is TOML on disk (`config.toml` of every run), starts from a preset,
-//! and takes `--set key.path=value` on top. Unknown keys are errors.
+//! and takes `--set key.path=value` on top. Unknown keys are errors. What it leaves to
+//! the scene and the machine is settled by [`crate::plan::settle`].
+//!
+//! ```
+//! use neat_pipeline::config::{Preset, apply_overrides};
+//!
+//! let config = apply_overrides(&Preset::Fast.config(), &["train.rays=512".to_owned()])?;
+//! assert_eq!(config.train.rays, 512);
+//! # Ok::<(), neat_pipeline::config::OverrideError>(())
+//! ```
 
-use crate::background::Background;
+mod choice;
+mod differences;
+mod overrides;
+mod preset;
+
+pub use choice::Choice;
+pub use overrides::{OverrideError, apply_overrides};
+pub use preset::{Preset, UnknownPreset};
+
+pub(crate) use differences::{Difference, differences};
+
 use neat_core::SphereChoice;
 use neat_core::layout::PoseConvention;
 use neat_detect::DetectorConfig;
@@ -14,6 +33,7 @@ use neat_wireframe::fast::FastBackEndConfig;
 use neat_wireframe::line_tracks::LineTracksConfig;
 use neat_wireframe::paper::PaperBackEndConfig;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// All choices of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,18 +97,39 @@ pub struct DataConfig {
     /// Images with a longer side than this, in pixels, are scaled down.
     #[serde(default)]
     pub max_image_size: Option<u32>,
-    /// What lies behind the object; `None` changes nothing.
+    /// What lies behind the object; `None` changes nothing, `auto` is told by the
+    /// borders of the images.
     #[serde(default)]
-    pub background: Option<Background>,
+    pub background: Option<Choice<Background>>,
     /// Radius of the modelled ball, in the unit of the poses. `None` takes that of
     /// the scene sphere and scales the world so that it is 1.
     pub scene_radius: Option<f64>,
 }
 
-/// Which back end turns the field into a wireframe.
+/// What lies behind the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum BackEnd {
+pub enum Background {
+    /// Black: empty space has no colour, and silhouettes are known.
+    Black,
+    /// Anything: a photograph. The border of the scene sphere stands for all that
+    /// is behind it, as in VolSDF, and there are no silhouettes.
+    Photo,
+}
+
+impl fmt::Display for Background {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Black => "black",
+            Self::Photo => "photo",
+        })
+    }
+}
+
+/// What assembles the wireframe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Assembler {
     /// Section 4.3 of the paper.
     Paper,
     /// Junctions from modes of the segment ends, re-triangulated and adjusted: for
@@ -97,8 +138,16 @@ pub enum BackEnd {
     /// Tracks of 2D segments over the views, with the field's segments as priors:
     /// for photographs with thousands of segments.
     Tracks,
-    /// `Tracks` where `data.background` is a photograph, else `Fast`.
-    Auto,
+}
+
+impl fmt::Display for Assembler {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Paper => "paper",
+            Self::Fast => "fast",
+            Self::Tracks => "tracks",
+        })
+    }
 }
 
 /// What a wireframe is drawn on.
@@ -116,8 +165,9 @@ pub enum OverlayGround {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DistillConfig {
-    /// Which of the two back ends runs.
-    pub back_end: BackEnd,
+    /// What assembles the wireframe; `auto` is line tracks for photographs, else the
+    /// fast back end.
+    pub back_end: Choice<Assembler>,
     /// What the wireframe is drawn on in `overlays/`.
     #[serde(default)]
     pub overlay: OverlayGround,

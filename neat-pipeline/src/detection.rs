@@ -5,7 +5,7 @@ mod folder;
 pub use folder::{DetectOptions, Detected, SegmentSource, detect_folder};
 
 use crate::error::PipelineError;
-use crate::event::{Event, OnEvent, Stage};
+use crate::event::{Event, OnEvent, Stage, Warning, WarningKind};
 use crate::resources::Resources;
 use image::RgbImage;
 use neat_core::file_cache::{CacheKey, FileCache};
@@ -39,10 +39,11 @@ pub fn detect_wireframes(
     min_segment_score: f64,
     resources: Resources<'_>,
     on_event: OnEvent<'_>,
-) -> Result<Vec<String>, PipelineError> {
+) -> Result<(), PipelineError> {
     config.validate()?;
     let memory_limit = resources.memory_limit;
-    let mut warnings = Vec::new();
+    let warn = |text: String| Event::Warning(Warning::new(WarningKind::Detection, text));
+    let mut cache_works = true;
     let views = scene.views.len();
     let mut done = 0;
     let sizes = scene.views.iter().map(|view| view.image.dimensions());
@@ -61,8 +62,9 @@ pub fn detect_wireframes(
             }
             view.wireframe = wireframe;
             // One is enough: all of them go into one folder.
-            if warnings.is_empty() {
-                warnings.extend(warning);
+            if let (true, Some(warning)) = (cache_works, warning) {
+                cache_works = false;
+                on_event(warn(warning));
             }
         }
         done += chunk.len();
@@ -73,10 +75,10 @@ pub fn detect_wireframes(
     }
     let has_segments = |view: &View| !view.wireframe.segments(min_segment_score).is_empty();
     let empty = scene.views.iter().filter(|view| !has_segments(view));
-    warnings.extend(empty.map(|view| {
-        let name = &view.name;
-        format!("view `{name}` is left out: no segment was detected in it")
-    }));
+    for View { name, .. } in empty {
+        let text = format!("view `{name}` is left out: no segment was detected in it");
+        on_event(warn(text));
+    }
     scene.retain_views(has_segments);
     if scene.views.is_empty() {
         return Err(PipelineError::Scene(SceneError::NoUsableView {
@@ -85,7 +87,7 @@ pub fn detect_wireframes(
             min_segment_score,
         }));
     }
-    Ok(warnings)
+    Ok(())
 }
 
 /// The wireframe of one image, with pixel centres at integers, and a warning if
@@ -162,14 +164,20 @@ mod tests {
         scene: &mut Scene,
         cache: Option<&FileCache>,
     ) -> Result<Vec<String>, PipelineError> {
+        let mut warnings = Vec::new();
         detect_wireframes(
             scene,
             Path::new("scene"),
             &DetectorConfig::default(),
             0.05,
             with(cache),
-            &mut |_| {},
-        )
+            &mut |event| {
+                if let Event::Warning(warning) = event {
+                    warnings.push(warning.message);
+                }
+            },
+        )?;
+        Ok(warnings)
     }
 
     #[test]

@@ -2,7 +2,8 @@
 
 mod thin_regions;
 
-use crate::config::{BackEnd, Config};
+use crate::config::{Assembler, Config};
+use crate::plan::Plan;
 use nalgebra::Vector3;
 use neat_core::{LineSegment3, Scene, Wireframe3d};
 use neat_sdf::RayBundle;
@@ -86,13 +87,14 @@ impl Distilled {
 pub fn distill(
     scene: &Scene,
     field: &TrainedField,
-    config: &Config,
+    plan: &Plan,
     progress: OnProgress<'_>,
 ) -> Result<Distilled, DistillError> {
-    match config.distill.back_end {
-        BackEnd::Paper => paper(scene, field, config, progress),
-        BackEnd::Fast | BackEnd::Auto => fast(scene, field, config, progress),
-        BackEnd::Tracks => tracks(scene, field, config, progress),
+    let config = plan.config();
+    match plan.assembler() {
+        Assembler::Paper => paper(scene, field, config, progress),
+        Assembler::Fast => fast(scene, field, config, progress),
+        Assembler::Tracks => tracks(scene, field, config, progress),
     }
 }
 

@@ -2,11 +2,9 @@
 
 use crate::distill::DistillError;
 use crate::event::Stage;
-use crate::overrides::OverrideError;
+use crate::plan::PlanError;
 use crate::run_dir::RunDirError;
 use neat_core::SceneError;
-use neat_core::synthetic::SyntheticError;
-use neat_eval::EvalError;
 use neat_report::ReportError;
 use neat_tensor::BackendError;
 use neat_tensor::checkpoint::CheckpointError;
@@ -27,12 +25,6 @@ pub enum PipelineError {
     /// The backend cannot be used.
     #[error(transparent)]
     Backend(#[from] BackendError),
-    /// A synthetic scene would mix with what is there.
-    #[error("{0} is not empty: choose another folder for the synthetic scene")]
-    SceneDirNotEmpty(PathBuf),
-    /// A synthetic scene cannot be made as asked for.
-    #[error(transparent)]
-    Synthetic(#[from] SyntheticError),
     /// The settings of the detector are out of range.
     #[error("the section `detect` of the configuration: {0}")]
     Detector(#[from] neat_detect::DetectorConfigError),
@@ -51,9 +43,6 @@ pub enum PipelineError {
         /// One per line.
         differences: String,
     },
-    /// A change of the configuration does not apply.
-    #[error(transparent)]
-    Override(OverrideError),
     /// The optimisation failed.
     #[error(transparent)]
     Train(#[from] TrainError),
@@ -66,9 +55,6 @@ pub enum PipelineError {
     /// The report could not be made.
     #[error(transparent)]
     Report(#[from] ReportError),
-    /// A result could not be measured.
-    #[error(transparent)]
-    Evaluation(#[from] EvalError),
     /// A person, or the system, stopped the run during its training.
     #[error("interrupted after step {step}: {checkpoint} holds the state")]
     Interrupted {
@@ -101,22 +87,16 @@ pub enum PipelineError {
         /// What the backend said.
         reason: String,
     },
-    /// A person stopped an ablation.
-    #[error("interrupted: {done} of {all} variants are done")]
-    AblationInterrupted {
-        /// So many variants have a row in the table …
-        done: usize,
-        /// … of so many.
-        all: usize,
-    },
-    /// The folder of an ablation holds something else.
-    #[error("{out} holds {what}: choose another folder, or remove it")]
-    OtherAblation {
-        /// The folder.
-        out: PathBuf,
-        /// What is in it.
-        what: String,
-    },
+}
+
+impl From<PlanError> for PipelineError {
+    fn from(error: PlanError) -> Self {
+        match error {
+            PlanError::Scene(error) => Self::Scene(error),
+            PlanError::Config(error) => Self::Train(error),
+            PlanError::Open(_) => Self::Train(TrainError::Config(error.to_string())),
+        }
+    }
 }
 
 impl From<DistillError> for PipelineError {
@@ -143,12 +123,7 @@ impl PipelineError {
             }
             Self::RunDir(_)
             | Self::Backend(_)
-            | Self::SceneDirNotEmpty(_)
-            | Self::Synthetic(_)
-            | Self::Evaluation(_)
             | Self::Detector(_)
-            | Self::Override(_)
-            | Self::OtherAblation { .. }
             | Self::Changed { .. }
             | Self::NotReady(_) => true,
             Self::Train(error) => matches!(
@@ -165,8 +140,7 @@ impl PipelineError {
             | Self::Interrupted { .. }
             | Self::InterruptedIn(_)
             | Self::Diverged { .. }
-            | Self::DeviceFailed { .. }
-            | Self::AblationInterrupted { .. } => false,
+            | Self::DeviceFailed { .. } => false,
         }
     }
 }

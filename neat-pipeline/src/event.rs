@@ -1,7 +1,6 @@
 //! What a run tells while it works. Libraries report; only a user interface
 //! draws.
 
-use crate::error::PipelineError;
 use neat_train::trainer::StepReport;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -45,6 +44,97 @@ impl fmt::Display for Stage {
     }
 }
 
+/// What the scene or the machine decided, where the configuration leaves it open.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Decision {
+    /// What was decided: a key of the configuration, or words.
+    pub setting: String,
+    /// The value.
+    pub value: String,
+    /// Why, to follow the value after a comma.
+    pub reason: String,
+}
+
+impl fmt::Display for Decision {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}, {}", self.setting, self.value, self.reason)
+    }
+}
+
+/// What a warning is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WarningKind {
+    /// A GPU that is a program.
+    SoftwareDriver,
+    /// Files of the scene.
+    Scene,
+    /// The detection of 2D wireframes.
+    Detection,
+    /// What an examination found.
+    Examination,
+    /// A setting that does nothing.
+    NoEffect,
+    /// A checkpoint that cannot be read.
+    DamagedCheckpoint,
+    /// Another program or backend than the run began with.
+    OtherProgram,
+    /// Numbers that grew beyond all bounds.
+    Divergence,
+    /// A device that failed.
+    DeviceFailure,
+    /// A wireframe without edges.
+    NoEdges,
+    /// No `report.html`.
+    NoReport,
+    /// A part of a larger work that failed.
+    Part,
+    /// Anything, by another version.
+    #[serde(other)]
+    Other,
+}
+
+/// Something that a person should know and that does not stop the run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "StoredWarning")]
+pub struct Warning {
+    /// What it is about.
+    pub kind: WarningKind,
+    /// The whole of it, in words.
+    pub message: String,
+}
+
+impl Warning {
+    /// A warning.
+    pub fn new(kind: WarningKind, message: impl Into<String>) -> Self {
+        let message = message.into();
+        Self { kind, message }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+/// Earlier versions stored the message alone.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum StoredWarning {
+    Message(String),
+    Warning { kind: WarningKind, message: String },
+}
+
+impl From<StoredWarning> for Warning {
+    fn from(stored: StoredWarning) -> Self {
+        match stored {
+            StoredWarning::Message(message) => Self::new(WarningKind::Other, message),
+            StoredWarning::Warning { kind, message } => Self { kind, message },
+        }
+    }
+}
+
 /// One message of a run.
 #[derive(Clone, Debug)]
 pub enum Event<'a> {
@@ -74,8 +164,17 @@ pub enum Event<'a> {
     /// A fact about the scene that a person should check, such as where its sphere
     /// is.
     Note(String),
+    /// The scene or the machine has decided something.
+    Decided(Decision),
+    /// The training goes on from a checkpoint.
+    Resumed {
+        /// Steps that are done.
+        step: u64,
+        /// All steps.
+        steps: u64,
+    },
     /// Something that a person should know and that does not stop the run.
-    Warning(String),
+    Warning(Warning),
     /// A result that a person may want to open is on disk.
     FileWritten(PathBuf),
 }
@@ -83,16 +182,39 @@ pub enum Event<'a> {
 /// Who listens to the events of a run.
 pub type OnEvent<'a> = &'a mut dyn FnMut(Event<'_>);
 
-/// Does a stage, tells when it begins and ends, and returns its time too.
-pub(crate) fn timed<T>(
+/// Does a stage and tells when it begins and ends.
+///
+/// # Errors
+/// Those of the work.
+pub fn timed<T, E>(
     on_event: OnEvent<'_>,
     stage: Stage,
-    work: impl FnOnce(OnEvent<'_>) -> Result<T, PipelineError>,
-) -> Result<(T, f64), PipelineError> {
+    work: impl FnOnce(OnEvent<'_>) -> Result<T, E>,
+) -> Result<T, E> {
+    let _span = tracing::info_span!("stage", %stage).entered();
     on_event(Event::StageStarted(stage));
     let start = Instant::now();
     let value = work(on_event)?;
     let seconds = start.elapsed().as_secs_f64();
+    tracing::info!(seconds, "done");
     on_event(Event::StageFinished { stage, seconds });
-    Ok((value, seconds))
+    Ok(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn warnings_of_all_versions_are_read() {
+        let read = |text: &str| serde_json::from_str::<Warning>(text).unwrap();
+        let warning = Warning::new(WarningKind::NoEdges, "no edges");
+        let text = serde_json::to_string(&warning).unwrap();
+        assert_eq!(text, r#"{"kind":"no_edges","message":"no edges"}"#);
+        assert_eq!(read(&text), warning);
+        let other = Warning::new(WarningKind::Other, "no edges");
+        assert_eq!(read("\"no edges\""), other);
+        let newer = r#"{"kind":"of_tomorrow","message":"no edges"}"#;
+        assert_eq!(read(newer), other);
+    }
 }

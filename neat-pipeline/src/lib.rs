@@ -1,28 +1,50 @@
-//! From a scene to its wireframe: training, distillation, run folders.
+//! From a scene to its wireframe: what a run is, in a folder of its own.
 //!
-//! Everything here reports through events and results; nothing draws.
+//! A run reads a scene ([`scene`]), detects 2D wireframes where there are none
+//! ([`detection`]), settles what its configuration leaves open ([`config`], [`plan`]),
+//! trains (the crate `neat-train`), takes the wireframe out of the field ([`distill`]) and
+//! writes all results ([`reconstruct`], [`run_dir`]). It reports through events ([`event`])
+//! and results; nothing here draws on a terminal.
+//!
+//! ```no_run
+//! use neat_core::MemoryLimit;
+//! use neat_pipeline::config::Preset;
+//! use neat_pipeline::reconstruct::{RunOptions, reconstruct};
+//! use neat_pipeline::run_dir::Existing;
+//! use neat_tensor::Backend;
+//! use std::sync::atomic::AtomicBool;
+//!
+//! let options = RunOptions {
+//!     scene: "SCENE".into(),
+//!     out: "RUN".into(),
+//!     existing: Existing::Refuse,
+//!     config: Preset::Fast.config(),
+//!     preset: "fast".to_owned(),
+//!     backend: Backend::Auto,
+//!     seed: 0,
+//!     time_budget: None,
+//!     examine: true,
+//!     cache: None,
+//!     memory_limit: MemoryLimit::NONE,
+//!     command_line: Vec::new(),
+//! };
+//! let cancelled = AtomicBool::new(false);
+//! let result = reconstruct(&options, &cancelled, &mut |event| println!("{event:?}"))?;
+//! println!("{} edges", result.wireframe.edges.len());
+//! # Ok::<(), neat_pipeline::error::PipelineError>(())
+//! ```
 
 #![forbid(unsafe_code)]
 
-pub mod ablate;
-pub mod background;
-pub mod benchmark;
-pub mod changes;
-pub mod compare_backends;
+mod changes;
 pub mod config;
-pub mod demo;
 pub mod detection;
 pub mod distill;
 pub mod error;
-pub mod estimate;
 pub mod event;
-pub mod image_io;
-mod latents;
-pub mod machine_memory;
 pub mod manifest;
-pub mod overlay;
-pub mod overrides;
-pub mod preset;
+mod overlay;
+pub mod plan;
 pub mod reconstruct;
 pub mod render;
 pub mod resources;

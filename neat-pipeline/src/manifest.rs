@@ -1,6 +1,6 @@
 //! `manifest.json`: what ran, on which inputs, where, and how long it took.
 
-use crate::event::Stage;
+use crate::event::{Decision, Event, Stage, Warning};
 use neat_core::{SceneError, SceneSphere};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -54,8 +54,11 @@ pub struct Manifest {
     pub sphere: Option<SceneSphere>,
     /// SHA-256 of every input file, in hexadecimal, by its path in that folder.
     pub inputs: BTreeMap<String, String>,
+    /// What the scene and the machine decided when the run began.
+    #[serde(default)]
+    pub decisions: Vec<Decision>,
     /// What was noticed on the way.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// How the run ended.
     pub status: Status,
     /// Optimisation steps that are done.
@@ -66,6 +69,38 @@ pub struct Manifest {
     pub updated: String,
     /// Seconds that each stage took, over all sessions of the run.
     pub seconds: BTreeMap<Stage, f64>,
+}
+
+impl Manifest {
+    /// Keeps what an event tells that has to last: warnings, decisions, and the time of
+    /// a stage.
+    pub fn record(&mut self, event: &Event<'_>) {
+        match event {
+            Event::Warning(warning) => self.warnings.push(warning.clone()),
+            Event::Decided(decision) => self.decisions.push(decision.clone()),
+            Event::StageFinished { stage, seconds } => {
+                *self.seconds.entry(*stage).or_default() += seconds;
+            }
+            _ => {}
+        }
+    }
+
+    /// Takes over what earlier sessions of the run have left.
+    pub(crate) fn continue_from(&mut self, before: Self) {
+        self.steps = before.steps;
+        self.started = before.started;
+        if !before.decisions.is_empty() {
+            self.decisions = before.decisions;
+        }
+        for (stage, seconds) in before.seconds {
+            *self.seconds.entry(stage).or_default() += seconds;
+        }
+        for warning in before.warnings {
+            if !self.warnings.contains(&warning) {
+                self.warnings.push(warning);
+            }
+        }
+    }
 }
 
 /// Now, as RFC 3339 in UTC with whole seconds.

@@ -157,30 +157,6 @@ fn visible_part(
     Some(clipped.map(|point| camera.project(point).pixel - center))
 }
 
-/// Indices of at most `count` views whose cameras stand far from each other, in
-/// ascending order: the first view, then always the one that is farthest from
-/// those already chosen.
-pub fn spread_views(views: &[View], count: usize) -> Vec<usize> {
-    let mut distances = vec![f64::INFINITY; views.len()];
-    let mut chosen = Vec::new();
-    while chosen.len() < count.min(views.len()) {
-        // Of equal distances the first wins.
-        let next = (0..views.len())
-            .rev()
-            .max_by(|a, b| distances[*a].total_cmp(&distances[*b]))
-            .unwrap_or(0);
-        chosen.push(next);
-        let center = views[next].camera.center_in_world;
-        for (view, distance) in views.iter().zip(&mut distances) {
-            *distance = distance.min((view.camera.center_in_world - center).norm());
-        }
-        // Views at one place must not be chosen twice.
-        distances[next] = f64::NEG_INFINITY;
-    }
-    chosen.sort_unstable();
-    chosen
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -243,19 +219,5 @@ mod tests {
         assert!(part.start.iter().all(|x| x.is_finite()));
         let wholly = LineSegment3::new(behind, behind * 1.5);
         assert_eq!(visible_part(&wholly, camera, 0.0), None);
-    }
-
-    #[test]
-    fn spread_views_are_distinct_and_far_apart() {
-        let mut views = scene().scene.views;
-        let chosen = spread_views(&views, 6);
-        assert_eq!(chosen.len(), 6);
-        assert!(chosen.contains(&0) && chosen.windows(2).all(|w| w[0] < w[1]));
-        assert_eq!(spread_views(&views, 99), (0..12).collect::<Vec<_>>());
-        assert!(spread_views(&[], 6).is_empty());
-        // Two of the places are the same: one of them is enough.
-        views.truncate(3);
-        views[1].camera = views[0].camera;
-        assert_eq!(spread_views(&views, 2), [0, 2]);
     }
 }

@@ -1,12 +1,13 @@
 //! From a scene on disk to a run folder: training, distillation, and both.
 
 mod device_failure;
+mod opened;
 mod report;
 mod results;
 mod session;
 mod training;
 
-pub use session::{OpenedRun, open_run, software_warning};
+pub use opened::{OpenedRun, open_run, software_warning};
 
 use crate::config::Config;
 use crate::error::PipelineError;
@@ -30,7 +31,7 @@ pub struct RunOptions {
     pub out: PathBuf,
     /// What to do about a folder that already holds something.
     pub existing: Existing,
-    /// Every choice of method.
+    /// What is asked for; the scene and the machine settle what it leaves open.
     pub config: Config,
     /// What the configuration started from, for the manifest.
     pub preset: String,
@@ -124,21 +125,14 @@ pub fn distill_run(
     opened: OpenedRun,
     on_event: OnEvent<'_>,
 ) -> Result<Reconstruction, PipelineError> {
-    let OpenedRun {
-        dir,
-        config,
-        manifest,
-        scene,
-        device,
-        field,
-    } = opened;
-    let lock = dir.lock()?;
+    let lock = opened.dir.lock()?;
+    let field = opened.field;
     let mut session = Session {
-        dir,
-        config,
-        manifest,
-        scene,
-        device,
+        dir: opened.dir,
+        plan: opened.plan,
+        manifest: opened.manifest,
+        scene: opened.scene,
+        device: opened.device,
         ray_chunk: None,
         finished: false,
         on_event,
@@ -149,6 +143,11 @@ pub fn distill_run(
         session.manifest.seconds.remove(&stage);
     }
     session.forget_distillation_warnings();
+    // Another back end than the scene's choice may have been asked for.
+    let assembler = session.plan.assembler().to_string();
+    let decisions = &mut session.manifest.decisions;
+    decisions
+        .retain(|decision| decision.setting != "distill.back_end" || decision.value == assembler);
     // How the training ended stays as it is.
     let result = session.distill(&field, &AtomicBool::new(false));
     let recorded = session.write_manifest();

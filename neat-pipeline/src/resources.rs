@@ -1,5 +1,9 @@
 //! What preparing a scene may use, and until when.
 
+mod machine_memory;
+
+pub use machine_memory::default_limit;
+
 use neat_core::MemoryLimit;
 use neat_core::file_cache::FileCache;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,7 +1,8 @@
 //! The folder that a run leaves behind.
 //!
 //! ```text
-//! config.toml         every choice of the run
+//! config.toml         what was asked for
+//! plan.toml           what was settled: the same with every choice made
 //! manifest.json       what ran, where, on which inputs, and how long
 //! metrics.jsonl       one line of losses every few steps
 //! junctions.jsonl     where the global junctions were, fifty times over the training
@@ -23,6 +24,7 @@
 
 use crate::config::Config;
 use crate::manifest::Manifest;
+use crate::plan::{Plan, PlanError};
 use neat_core::{SceneError, file};
 use neat_tensor::checkpoint::{Checkpoint, CheckpointError};
 use neat_train::AVERAGE_LOSS;
@@ -31,6 +33,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 const CONFIG: &str = "config.toml";
+const PLAN: &str = "plan.toml";
 const MANIFEST: &str = "manifest.json";
 const METRICS: &str = "metrics.jsonl";
 const JUNCTIONS: &str = "junctions.jsonl";
@@ -75,7 +78,7 @@ pub enum RunDirError {
     /// No run has been here.
     #[error("{0} is not the folder of a run: it has no config.toml")]
     NotARun(PathBuf),
-    /// A run that has lost the file that says what it is.
+    /// A run that has lost a file that says what it is.
     #[error(
         "{path} has checkpoints but no {missing}: put it back, or begin again with --overwrite"
     )]
@@ -194,7 +197,7 @@ impl RunDir {
         }
         let beginning = |path: &PathBuf| {
             let name = path.file_name().unwrap_or_default();
-            [CONFIG, CHECKPOINTS, DETECTIONS, LOCK]
+            [CONFIG, PLAN, CHECKPOINTS, DETECTIONS, LOCK]
                 .iter()
                 .any(|known| name == *known)
                 || file::is_temporary(path)
@@ -276,7 +279,7 @@ impl RunDir {
     }
 
     fn remove_earlier_run(&self) -> Result<(), SceneError> {
-        let files = [CONFIG, MANIFEST, METRICS, JUNCTIONS, REPORT, MESH]
+        let files = [CONFIG, PLAN, MANIFEST, METRICS, JUNCTIONS, REPORT, MESH]
             .iter()
             .chain(&RESULT_FILES);
         for name in files {
@@ -333,6 +336,37 @@ impl RunDir {
     pub fn config(&self) -> Result<Config, RunDirError> {
         let path = self.root.join(CONFIG);
         parse_config(&path)
+    }
+
+    /// Writes `plan.toml`.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write_plan(&self, plan: &Plan) -> Result<(), RunDirError> {
+        let text = toml::to_string_pretty(plan.config())?;
+        Ok(file::write_atomically(
+            &self.root.join(PLAN),
+            text.as_bytes(),
+        )?)
+    }
+
+    /// Reads `plan.toml`. Runs of earlier versions have none: their `config.toml` leaves
+    /// nothing open.
+    ///
+    /// # Errors
+    /// If the file is missing where it is needed, or not a plan of this version.
+    pub fn plan(&self) -> Result<Plan, RunDirError> {
+        let mut path = self.root.join(PLAN);
+        if !path.is_file() {
+            path = self.root.join(CONFIG);
+        }
+        Plan::new(parse_config(&path)?).map_err(|error| match error {
+            PlanError::Open(_) => RunDirError::Incomplete {
+                path: self.root.clone(),
+                missing: PLAN,
+            },
+            error => malformed(&path, &error),
+        })
     }
 
     /// Writes `manifest.json`.
@@ -593,7 +627,7 @@ mod tests {
             RunDir::create(&root, Existing::Resume),
             Err(RunDirError::NotARun(_))
         ));
-        let ours = [CONFIG, MANIFEST, METRICS, JUNCTIONS, REPORT, MESH];
+        let ours = [CONFIG, PLAN, MANIFEST, METRICS, JUNCTIONS, REPORT, MESH];
         for name in ours.iter().chain(&RESULT_FILES) {
             fs::write(root.join(name), "old").unwrap();
         }

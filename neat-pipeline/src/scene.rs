@@ -1,17 +1,14 @@
 //! Reading a scene as a configuration wants it.
 
-use crate::background::fit_background;
 use crate::config::{Config, DataConfig};
 use crate::detection::detect_wireframes;
 use crate::error::PipelineError;
-use crate::event::{Event, OnEvent, Stage, timed};
-use crate::latents::fit_latents;
+use crate::event::{Decision, Event, OnEvent, Stage, Warning, WarningKind, timed};
 use crate::resources::Resources;
 use neat_core::file_cache::FileCache;
 use neat_core::layout::HAWP_DIR;
-use neat_core::{LoadOptions, MemoryLimit, Scene, SceneSphere, SphereChoice, load_scene};
+use neat_core::{LoadOptions, MemoryLimit, Scene, SceneSphere, SphereChoice, View, load_scene};
 use neat_doctor::{Depth, ExamineOptions, Finding, Level, Repair, Verdict};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A scene as a run needs it.
@@ -25,16 +22,11 @@ pub struct PreparedScene {
     pub files: Vec<PathBuf>,
     /// Whether its 2D wireframes were detected, for want of files.
     pub detected: bool,
-    /// What a person should know; told as events already.
-    pub warnings: Vec<String>,
-    /// Seconds of each stage.
-    pub seconds: BTreeMap<Stage, f64>,
 }
 
 /// Reads the scene in the folder `dir`, and detects its 2D wireframes if it has
-/// none. What `config` leaves to the background of the images is decided. `placed`
-/// is the sphere of an earlier part of the run, which stays. Cancellation ends the
-/// detection.
+/// none. `placed` is the sphere of an earlier part of the run, which stays. Cancellation
+/// ends the detection.
 ///
 /// Without a configured radius the world is scaled so that the scene sphere has
 /// radius 1: every length of a configuration (β, grid, encoding) then means the
@@ -45,7 +37,7 @@ pub struct PreparedScene {
 /// [`PipelineError::InterruptedIn`] after cancellation.
 pub fn prepare_scene(
     dir: &Path,
-    config: &mut Config,
+    config: &Config,
     placed: Option<&SceneSphere>,
     resources: Resources<'_>,
     on_event: OnEvent<'_>,
@@ -55,20 +47,19 @@ pub fn prepare_scene(
         require_wireframes: !detected,
         ..load_options(&config.data, resources.cache, resources.memory_limit)
     };
-    let mut seconds = BTreeMap::new();
-    let (loaded, time) = timed(on_event, Stage::Load, |_| Ok(load_scene(dir, &options)?))?;
-    seconds.insert(Stage::Load, time);
-    let mut warnings: Vec<String> = loaded.warnings.iter().map(ToString::to_string).collect();
+    let loaded = timed(on_event, Stage::Load, |_| load_scene(dir, &options))?;
+    let warn = |text: String| Event::Warning(Warning::new(WarningKind::Scene, text));
+    for warning in &loaded.warnings {
+        on_event(warn(warning.to_string()));
+    }
     let mut scene = loaded.scene;
     tell_of_images(&scene, on_event);
     if detected {
-        let (more, time) = timed(on_event, Stage::Detect, |on_event| {
+        timed(on_event, Stage::Detect, |on_event| {
             let min_score = config.data.min_segment_score;
             let detector = &config.detect;
             detect_wireframes(&mut scene, dir, detector, min_score, resources, on_event)
         })?;
-        seconds.insert(Stage::Detect, time);
-        warnings.extend(more);
     }
     if let Some(sphere) = placed {
         scene = placed_at(scene, sphere, &config.data);
@@ -80,27 +71,33 @@ pub fn prepare_scene(
         radius: scene.original_from_world.scale * scene.sphere_radius,
         source: placed.map_or(loaded.sphere.source, |sphere| sphere.source),
     };
-    fit_background(config, &scene, resources.memory_limit)?;
-    fit_latents(config, &scene);
-    on_event(Event::Note(format!("scene sphere: {sphere}")));
+    on_event(Event::Decided(place(&sphere)));
     if let (SphereChoice::Given { .. }, Some(radius)) =
         (config.data.scene_sphere, config.data.scene_radius)
     {
-        warnings.push(format!(
+        on_event(warn(format!(
             "data.scene_radius = {radius} takes the place of the radius of the given scene sphere: --set data.scene_radius=none uses that one"
-        ));
-    }
-    for warning in &warnings {
-        on_event(Event::Warning(warning.clone()));
+        )));
     }
     Ok(PreparedScene {
         scene,
         sphere,
         files: loaded.files,
         detected,
-        warnings,
-        seconds,
     })
+}
+
+/// Where the sphere lies, and by what.
+fn place(sphere: &SceneSphere) -> Decision {
+    let [x, y, z] = sphere.center.into();
+    Decision {
+        setting: "scene sphere".to_owned(),
+        value: format!(
+            "centre ({x:.4}, {y:.4}, {z:.4}), radius {:.4}",
+            sphere.radius
+        ),
+        reason: format!("from {}", sphere.source),
+    }
 }
 
 /// Tells where the images are, if they are not in memory.
@@ -136,7 +133,7 @@ fn placed_at(scene: Scene, sphere: &SceneSphere, config: &DataConfig) -> Scene {
     }
 }
 
-/// Examines a scene for a second or two: warnings are told and returned.
+/// Examines a scene for a second or two, and tells warnings.
 ///
 /// # Errors
 /// If a run would be lost time.
@@ -145,7 +142,7 @@ pub fn examine_quickly(
     config: &DataConfig,
     memory_limit: MemoryLimit,
     on_event: OnEvent<'_>,
-) -> Result<Vec<String>, PipelineError> {
+) -> Result<(), PipelineError> {
     let examination = neat_doctor::examine(
         scene,
         &ExamineOptions {
@@ -161,13 +158,15 @@ pub fn examine_quickly(
         };
         examination.at(level).map(sentence).collect()
     };
-    let warnings = lines(Level::Warning);
-    for warning in &warnings {
-        on_event(Event::Warning(warning.clone()));
+    for warning in lines(Level::Warning) {
+        on_event(Event::Warning(Warning::new(
+            WarningKind::Examination,
+            warning,
+        )));
     }
     match examination.verdict {
         Verdict::NotReady => Err(PipelineError::NotReady(lines(Level::Problem).join("\n"))),
-        Verdict::Ready | Verdict::ReadyWithWarnings => Ok(warnings),
+        Verdict::Ready | Verdict::ReadyWithWarnings => Ok(()),
     }
 }
 
@@ -193,7 +192,7 @@ pub fn load_options(
 }
 
 /// `scene` in the unit that the configuration wants.
-pub(crate) fn scaled_for(config: &DataConfig, scene: Scene) -> Scene {
+pub fn scaled_for(config: &DataConfig, scene: Scene) -> Scene {
     match config.scene_radius {
         None => {
             let radius = scene.sphere_radius;
@@ -206,10 +205,34 @@ pub(crate) fn scaled_for(config: &DataConfig, scene: Scene) -> Scene {
     }
 }
 
+/// Indices of at most `count` views whose cameras stand far from each other, in
+/// ascending order: the first view, then always the one that is farthest from
+/// those already chosen.
+pub fn spread_views(views: &[View], count: usize) -> Vec<usize> {
+    let mut distances = vec![f64::INFINITY; views.len()];
+    let mut chosen = Vec::new();
+    while chosen.len() < count.min(views.len()) {
+        // Of equal distances the first wins.
+        let next = (0..views.len())
+            .rev()
+            .max_by(|a, b| distances[*a].total_cmp(&distances[*b]))
+            .unwrap_or(0);
+        chosen.push(next);
+        let center = views[next].camera.center_in_world;
+        for (view, distance) in views.iter().zip(&mut distances) {
+            *distance = distance.min((view.camera.center_in_world - center).norm());
+        }
+        // Views at one place must not be chosen twice.
+        distances[next] = f64::NEG_INFINITY;
+    }
+    chosen.sort_unstable();
+    chosen
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::preset::Preset;
+    use crate::config::Preset;
     use neat_core::layout::abc::write_scene;
     use neat_core::synthetic::{SyntheticScene, generate};
 
@@ -232,13 +255,8 @@ mod tests {
 
         let mut config = Preset::Fast.config();
         let read = |config: &Config| {
-            let prepared = prepare_scene(
-                dir.path(),
-                &mut config.clone(),
-                None,
-                Resources::default(),
-                &mut |_| {},
-            );
+            let resources = Resources::default();
+            let prepared = prepare_scene(dir.path(), config, None, resources, &mut |_| {});
             prepared.unwrap().scene
         };
         let scaled = read(&config);
@@ -266,13 +284,18 @@ mod tests {
         write_scene(&scene, dir.path()).unwrap();
         let config = Preset::Fast.config();
         let read = |config: &Config, placed: Option<&SceneSphere>| {
-            let config = &mut config.clone();
             let resources = Resources::default();
-            prepare_scene(dir.path(), config, placed, resources, &mut |_| {}).unwrap()
+            let mut warnings = Vec::new();
+            let prepared = prepare_scene(dir.path(), config, placed, resources, &mut |event| {
+                if let Event::Warning(warning) = event {
+                    warnings.push(warning.message);
+                }
+            });
+            (prepared.unwrap(), warnings)
         };
-        let first = read(&config, None);
+        let (first, _) = read(&config, None);
         // The same sphere changes nothing, to the bit.
-        let again = read(&config, Some(&first.sphere));
+        let (again, _) = read(&config, Some(&first.sphere));
         assert_eq!(again.sphere, first.sphere);
         let cameras =
             |scene: &Scene| -> Vec<_> { scene.views.iter().map(|view| view.camera).collect() };
@@ -281,18 +304,37 @@ mod tests {
         // Another choice does not move a run that has begun.
         let mut other = config.clone();
         other.data.scene_sphere = "0.3,0.1,-0.2,2.5".parse().unwrap();
-        let kept = read(&other, Some(&first.sphere));
+        let (kept, _) = read(&other, Some(&first.sphere));
         for (a, b) in cameras(&kept.scene).iter().zip(cameras(&first.scene)) {
             assert!((a.center_in_world - b.center_in_world).norm() < 1e-9);
         }
-        let moved = read(&other, None);
+        let (moved, _) = read(&other, None);
         assert!((moved.sphere.center - nalgebra::Vector3::new(0.3, 0.1, -0.2)).norm() < 1e-12);
         assert!((moved.sphere.radius - 2.5).abs() < 1e-12);
 
         // What is told is what is modelled.
         other.data.scene_radius = Some(3.0);
-        let radius = read(&other, None);
+        let (radius, warnings) = read(&other, None);
         assert!((radius.sphere.radius - 3.0).abs() < 1e-12);
-        assert!(radius.warnings[0].contains("scene_radius"));
+        assert!(warnings[0].contains("scene_radius"));
+    }
+
+    #[test]
+    fn spread_views_are_distinct_and_far_apart() {
+        let twelve = SyntheticScene {
+            views: 12,
+            image_size: 64,
+            ..SyntheticScene::default()
+        };
+        let mut views = generate(&twelve).unwrap().scene.views;
+        let chosen = spread_views(&views, 6);
+        assert_eq!(chosen.len(), 6);
+        assert!(chosen.contains(&0) && chosen.windows(2).all(|w| w[0] < w[1]));
+        assert_eq!(spread_views(&views, 99), (0..12).collect::<Vec<_>>());
+        assert!(spread_views(&[], 6).is_empty());
+        // Two of the places are the same: one of them is enough.
+        views.truncate(3);
+        views[1].camera = views[0].camera;
+        assert_eq!(spread_views(&views, 2), [0, 2]);
     }
 }

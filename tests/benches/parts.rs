@@ -14,7 +14,7 @@ use nalgebra::Vector2;
 use neat_core::LineSegment2;
 use neat_core::assignment::assign;
 use neat_field::attraction_region::AttractionRegions;
-use neat_pipeline::preset::Preset;
+use neat_pipeline::config::Preset;
 use neat_sdf::RayBundle;
 use neat_sdf::ray_sampler::Deterministic;
 use neat_tensor::{CoordinateMlp, Field, FieldQuery, Plain};

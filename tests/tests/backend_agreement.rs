@@ -2,10 +2,10 @@
 //! each.
 
 use neat_core::synthetic::{SyntheticScene, generate};
-use neat_pipeline::compare_backends::compare_backends;
+use neat_lab::compare_backends::compare_backends;
 use neat_pipeline::config::Config;
-use neat_pipeline::overrides::apply_overrides;
-use neat_pipeline::preset::Preset;
+use neat_pipeline::config::Preset;
+use neat_pipeline::config::apply_overrides;
 use neat_tensor::Backend;
 use neat_tests::backends::tested;
 
@@ -47,7 +47,8 @@ fn twenty_steps() {
     backends.insert(0, Backend::Flex);
 
     let quiet = &mut |_: &str, _: f64| {};
-    let comparison = compare_backends(&scene, &config(), 0, STEPS, &backends, false, quiet)
+    let training = config().training();
+    let comparison = compare_backends(&scene, &training, 0, STEPS, &backends, false, quiet)
         .expect("every backend takes every step");
     let table = comparison.to_markdown();
     for result in &comparison.backends {

@@ -6,8 +6,8 @@ mod mutation;
 
 use burn::tensor::TensorData;
 use mutation::{CASES, damaged};
+use neat_pipeline::config::Preset;
 use neat_pipeline::manifest::{Manifest, Status, utc_now};
-use neat_pipeline::preset::Preset;
 use neat_pipeline::run_dir::{Existing, RunDir, RunDirError};
 use neat_tensor::checkpoint::{Checkpoint, CheckpointError};
 use neat_train::step_log::{JunctionsLine, read_log};
@@ -45,6 +45,7 @@ fn run() -> (TempDir, RunDir) {
         scene: "scene".into(),
         sphere: None,
         inputs: [("cameras.npz".to_owned(), "ab12".to_owned())].into(),
+        decisions: Vec::new(),
         warnings: Vec::new(),
         status: Status::Interrupted,
         steps: 12,

@@ -3,7 +3,7 @@
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
 use neat_core::synthetic::{SyntheticScene, generate};
-use neat_pipeline::preset::Preset;
+use neat_pipeline::config::Preset;
 use neat_tensor::linear::{Linear, LinearInit};
 use neat_tensor::parameters::GradientCheck;
 use neat_tests::backends::{on_each_backend, on_each_cpu_backend};

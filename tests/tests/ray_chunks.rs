@@ -4,7 +4,7 @@ use neat_core::SparsePoint;
 use neat_core::synthetic::{SyntheticScene, generate};
 use neat_gjp::JunctionCount;
 use neat_pipeline::config::Config;
-use neat_pipeline::preset::Preset;
+use neat_pipeline::config::Preset;
 use neat_tests::backends::on_each_cpu_backend;
 use neat_tests::comparison::{assert_close_in_l2, assert_relatively_close};
 use neat_train::Trainer;

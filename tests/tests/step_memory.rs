@@ -6,8 +6,8 @@
 #[test]
 fn the_estimate_is_of_the_right_order() {
     use neat_core::synthetic::{SyntheticScene, generate};
-    use neat_pipeline::estimate::estimate;
-    use neat_pipeline::preset::Preset;
+    use neat_lab::estimate::estimate;
+    use neat_pipeline::config::Preset;
     use neat_tensor::Backend;
     use neat_train::Trainer;
 

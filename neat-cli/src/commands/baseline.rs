@@ -8,16 +8,10 @@ use crate::output;
 use crate::progress::Progress;
 use crate::scene_arguments::SceneArgs;
 use clap::{Args, Subcommand};
-use neat_core::file;
-use neat_pipeline::distill::agreement;
-use neat_pipeline::machine_memory::default_limit;
-use neat_pipeline::resources::Resources;
-use neat_pipeline::scene::prepare_scene;
-use neat_wireframe::ViewObservation;
-use neat_wireframe::export::{ExportError, WireframeDocument, write_json, write_obj, write_ply};
-use neat_wireframe::line_tracks::{Line3dConfig, line3d, wireframe_of_segments};
+use neat_lab::line3d::reconstruct_line3d;
+use neat_pipeline::resources::{Resources, default_limit};
+use neat_wireframe::line_tracks::Line3dConfig;
 use std::path::PathBuf;
-use std::time::Instant;
 
 /// Reconstruct with the method of somebody else, on the same 2D wireframes
 #[derive(Debug, Args)]
@@ -74,58 +68,31 @@ impl Line3dArgs {
     fn run(self, quiet: bool) -> Result<(), CliError> {
         let mut config = self.method.config()?;
         config.data = self.scene_args.apply(config.data);
-        let mut progress = Progress::new(quiet);
-        let cache = self.cache.open();
-        let prepared = prepare_scene(
-            &self.scene,
-            &mut config,
-            None,
-            Resources {
-                cache: cache.as_ref(),
-                memory_limit: default_limit(),
-                ..Resources::default()
-            },
-            &mut |event| {
-                progress.show(event);
-            },
-        )?;
-        drop(progress);
-        let scene = &prepared.scene;
-        let observations = ViewObservation::from_scene(scene, config.data.min_segment_score);
         let line3d_config = Line3dConfig {
             min_views: usize::try_from(self.min_views).unwrap_or(usize::MAX),
             clustering_scale: self.clustering_scale,
             ..Line3dConfig::default()
         };
-        let start = Instant::now();
-        let segments = line3d(&observations, scene.sphere_radius, &line3d_config);
-        let seconds = start.elapsed().as_secs_f64();
-
-        let in_world = wireframe_of_segments(&segments);
-        let wireframe = in_world.map(|point| scene.original_from_world.apply(point));
-        let mut document = WireframeDocument::from(&wireframe);
-        document.metadata.insert("method".into(), "line3d".into());
-        document
-            .metadata
-            .insert("scene".into(), scene.name.clone().into());
-        document.views = scene.views.iter().map(|view| view.name.clone()).collect();
-        let views = segments.iter().map(|segment| segment.views as f64);
-        document
-            .edge_fields
-            .insert("supporting_views".into(), views.collect());
-        file::create_dir(&self.out)?;
-        let path = |extension: &str| self.out.join("wireframe").with_extension(extension);
-        write_json(&path("json"), &document).map_err(failed)?;
-        write_obj(&path("obj"), &wireframe).map_err(failed)?;
-        write_ply(&path("ply"), &wireframe).map_err(failed)?;
-        let mut text = format!("line3d: {} segments in {seconds:.1} s", segments.len());
-        if let Some(agreement) = agreement(scene, &config, &in_world) {
-            text += &in_words(&agreement);
-        }
-        output::print(&format!("{text}: {}", path("json").display()))
+        let mut progress = Progress::new(quiet);
+        let result = reconstruct_line3d(
+            &self.scene,
+            &self.out,
+            &config,
+            &line3d_config,
+            Resources {
+                cache: self.cache.open().as_ref(),
+                memory_limit: default_limit(),
+                ..Resources::default()
+            },
+            &mut |event| progress.show(event),
+        )?;
+        drop(progress);
+        let agreement = result.agreement.as_ref().map_or_else(String::new, in_words);
+        output::print(&format!(
+            "line3d: {} segments in {:.1} s{agreement}: {}",
+            result.segments,
+            result.seconds,
+            result.file.display()
+        ))
     }
-}
-
-fn failed(error: ExportError) -> CliError {
-    CliError::Export(error.into())
 }

@@ -5,9 +5,9 @@ use crate::error::CliError;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
-use neat_pipeline::benchmark::benchmark;
+use neat_lab::benchmark::benchmark;
+use neat_pipeline::config::Preset;
 use neat_pipeline::event::Event;
-use neat_pipeline::preset::Preset;
 use neat_pipeline::reconstruct::software_warning;
 
 /// Time the parts of a training step against the machine's arithmetic

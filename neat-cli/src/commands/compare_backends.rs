@@ -6,12 +6,12 @@ use crate::error::CliError;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
-use neat_core::file;
-use neat_pipeline::compare_backends::compare_backends;
+use neat_core::{MemoryLimit, file};
+use neat_lab::compare_backends::compare_backends;
 use neat_pipeline::event::Event;
-use neat_pipeline::machine_memory::default_limit;
+use neat_pipeline::plan::{Machine, settle};
 use neat_pipeline::reconstruct::software_warning;
-use neat_pipeline::resources::Resources;
+use neat_pipeline::resources::{Resources, default_limit};
 use neat_pipeline::run_dir::RunDir;
 use neat_pipeline::scene::prepare_scene;
 use neat_tensor::Backend;
@@ -59,7 +59,7 @@ impl CompareBackendsArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         let existing = super::train::existing(self.overwrite);
         RunDir::check(&self.out, existing)?;
-        let mut config = self.method.config()?;
+        let asked = self.method.config()?;
         let backends = if self.backends.is_empty() {
             Backend::available()
         } else {
@@ -72,23 +72,23 @@ impl CompareBackendsArgs {
             }
         }
         let cache = self.cache.open();
-        let prepared = prepare_scene(
-            &self.scene,
-            &mut config,
-            None,
-            Resources {
-                cache: cache.as_ref(),
-                memory_limit: default_limit(),
-                ..Resources::default()
-            },
-            &mut |event| {
-                progress.show(event);
-            },
-        )?;
+        let resources = Resources {
+            cache: cache.as_ref(),
+            memory_limit: default_limit(),
+            ..Resources::default()
+        };
+        let on_event = &mut |event: Event<'_>| progress.show(event);
+        let scene = prepare_scene(&self.scene, &asked, None, resources, on_event)?.scene;
+        let machine = Machine {
+            backend: Backend::Flex,
+            // Every backend takes a step at once.
+            memory_limit: MemoryLimit::NONE,
+        };
+        let (plan, _) = settle(&asked, &scene, machine, None)?;
         file::create_dir(&self.out)?;
         let comparison = compare_backends(
-            &prepared.scene,
-            &config,
+            &scene,
+            &plan.config().training(),
             self.seed,
             self.method.steps.unwrap_or(DEFAULT_STEPS),
             &backends,

@@ -7,7 +7,7 @@ use crate::scene_arguments::SceneArgs;
 use clap::{Args, ValueEnum};
 use neat_core::convert::{SceneFormat, convert};
 use neat_core::load_scene;
-use neat_pipeline::machine_memory::default_limit;
+use neat_pipeline::resources::default_limit;
 use std::path::PathBuf;
 
 /// Write a scene in another format

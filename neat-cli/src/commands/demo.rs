@@ -8,7 +8,7 @@ use crate::error::CliError;
 use crate::progress::Progress;
 use crate::{interrupt, output};
 use clap::Args;
-use neat_pipeline::demo::demo;
+use neat_lab::demo::demo;
 use neat_pipeline::reconstruct::RunOptions;
 use std::path::PathBuf;
 

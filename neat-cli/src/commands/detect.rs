@@ -5,9 +5,8 @@ use crate::memory::MemoryArgs;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
+use neat_pipeline::config::{Preset, apply_overrides};
 use neat_pipeline::detection::{DetectOptions, SegmentSource, detect_folder};
-use neat_pipeline::overrides::apply_overrides;
-use neat_pipeline::preset::Preset;
 use std::path::PathBuf;
 
 /// Detect the 2D wireframe of every image in a folder

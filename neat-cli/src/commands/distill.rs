@@ -8,7 +8,7 @@ use crate::memory::MemoryArgs;
 use crate::output;
 use crate::progress::Progress;
 use clap::Args;
-use neat_pipeline::overrides::apply_overrides;
+use neat_pipeline::config::apply_overrides;
 use neat_pipeline::reconstruct::{distill_run, open_run};
 use neat_pipeline::resources::Resources;
 use std::path::PathBuf;

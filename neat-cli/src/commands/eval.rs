@@ -14,9 +14,9 @@ use neat_eval::{
     LimapLength, NeatAbc, NeatSurface, ObservationMask, Protocol, ScannedSurface, Scores,
     StructureScore, foreign,
 };
-use neat_pipeline::machine_memory::default_limit;
-use neat_pipeline::preset::Preset;
+use neat_pipeline::config::Preset;
 use neat_pipeline::resources::Resources;
+use neat_pipeline::resources::default_limit;
 use neat_pipeline::scene::prepare_scene;
 use neat_wireframe::ViewObservation;
 use neat_wireframe::evidence::EdgeSupportConfig;
@@ -338,14 +338,14 @@ impl EvalArgs {
         scene: &Path,
         inputs: &Inputs,
     ) -> Result<EvaluationReport, CliError> {
-        let mut config = Preset::default().config();
+        let config = Preset::default().config();
         let cache = self.cache.open();
         let resources = Resources {
             cache: cache.as_ref(),
             memory_limit: default_limit(),
             ..Resources::default()
         };
-        let prepared = prepare_scene(scene, &mut config, None, resources, &mut |_| ())?;
+        let prepared = prepare_scene(scene, &config, None, resources, &mut |_| ())?;
         let views = ViewObservation::from_scene(&prepared.scene, config.data.min_segment_score);
         let required = EdgeSupportConfig::default().required_views(views.len());
         let world_from_original = prepared.scene.original_from_world.inverse();

@@ -13,9 +13,9 @@ use neat_export::{
     EdgeFilter, ExportError, ExportOptions, Format, LengthUnit, ViewDirection, export,
 };
 use neat_pipeline::event::{Event, Stage};
-use neat_pipeline::machine_memory::default_limit;
 use neat_pipeline::reconstruct::open_run;
 use neat_pipeline::resources::Resources;
+use neat_pipeline::resources::default_limit;
 use neat_pipeline::run_dir::RunDir;
 use neat_wireframe::export::read_json;
 use std::fs;

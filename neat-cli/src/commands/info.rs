@@ -5,7 +5,7 @@ use crate::output;
 use crate::scene_arguments::SceneArgs;
 use clap::Args;
 use neat_core::{LoadOptions, LoadedScene, View, load_scene};
-use neat_pipeline::machine_memory::default_limit;
+use neat_pipeline::resources::default_limit;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::PathBuf;

@@ -2,7 +2,6 @@
 
 use super::train::RunArgs;
 use crate::error::CliError;
-use crate::progress::Progress;
 use crate::{interrupt, output};
 use clap::Args;
 use neat_pipeline::reconstruct::{Reconstruction, reconstruct};
@@ -35,7 +34,7 @@ impl ReconstructArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         let options = self.run.options()?;
         let interrupted = interrupt::flag()?;
-        let mut progress = Progress::new(quiet);
+        let mut progress = self.run.progress(quiet);
         let reconstruction = reconstruct(&options, &interrupted, &mut |event| progress.show(event))
             .map_err(CliError::of_resumable)?;
         drop(progress);

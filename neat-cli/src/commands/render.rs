@@ -8,12 +8,12 @@ use crate::output;
 use crate::progress::Progress;
 use clap::Args;
 use image::{RgbImage, imageops};
-use neat_core::{View, file};
+use neat_core::View;
+use neat_core::file::{self, write_png};
 use neat_eval::image_colouring::{DepthColors, color_image, depth_image, normal_image};
 use neat_eval::image_quality::psnr;
-use neat_pipeline::image_io::{every_nth_pixel, write_png};
 use neat_pipeline::reconstruct::{OpenedRun, open_run};
-use neat_pipeline::render::render_view;
+use neat_pipeline::render::{every_nth_pixel, render_view};
 use neat_pipeline::resources::Resources;
 use std::path::{Path, PathBuf};
 

@@ -5,7 +5,7 @@ use crate::output;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use neat_core::synthetic::{Solid, SyntheticScene};
-use neat_pipeline::demo::{GROUND_TRUTH, synthesise};
+use neat_lab::demo::{GROUND_TRUTH, synthesise};
 use std::path::PathBuf;
 
 /// Write a synthetic scene with its true wireframe

@@ -3,7 +3,7 @@
 use crate::arguments::{ComputeArgs, MethodArgs};
 use crate::cache::CacheArgs;
 use crate::error::CliError;
-use crate::progress::Progress;
+use crate::progress::{Progress, ProgressFormat};
 use crate::scene_arguments::SceneArgs;
 use crate::{interrupt, output};
 use clap::Args;
@@ -53,6 +53,9 @@ pub struct RunArgs {
     /// Begin without a look at whether poses and images agree (see `neat doctor`)
     #[arg(long)]
     no_doctor: bool,
+    /// How progress is shown on the standard error
+    #[arg(long, value_enum, value_name = "FORMAT", default_value_t)]
+    progress: ProgressFormat,
     #[command(flatten)]
     cache: CacheArgs,
     #[command(flatten)]
@@ -60,23 +63,26 @@ pub struct RunArgs {
 }
 
 impl RunArgs {
+    /// Shows how far the run is.
+    pub fn progress(&self, quiet: bool) -> Progress {
+        Progress::with_format(quiet, self.progress)
+    }
+
     /// The options of the run.
     pub fn options(&self) -> Result<RunOptions, CliError> {
-        let earlier = match self.resume {
-            true => RunDir::to_resume(&self.out)?,
-            false => None,
-        };
-        let existing = match self.resume {
-            true => Existing::Resume,
-            false => existing(self.overwrite),
+        let (earlier, existing) = if self.resume {
+            (RunDir::to_resume(&self.out)?, Existing::Resume)
+        } else {
+            (None, existing(self.overwrite))
         };
         let (mut config, preset, seed) = match earlier {
             Some(run) => {
                 let manifest = run.manifest()?;
                 // What is not said again stays; what is said has to be the same.
-                let config = match self.method.has_base() {
-                    true => self.method.config()?,
-                    false => self.method.apply(&run.config()?)?,
+                let config = if self.method.has_base() {
+                    self.method.config()?
+                } else {
+                    self.method.apply(&run.config()?)?
                 };
                 (config, manifest.preset, manifest.seed)
             }
@@ -121,7 +127,7 @@ impl TrainArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         let options = self.run.options()?;
         let interrupted = interrupt::flag()?;
-        let mut progress = Progress::new(quiet);
+        let mut progress = self.run.progress(quiet);
         let run = train(&options, &interrupted, &mut |event| progress.show(event))
             .map_err(CliError::of_resumable)?;
         drop(progress);

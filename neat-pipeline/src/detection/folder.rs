@@ -97,7 +97,7 @@ pub fn detect_folder(
     } else {
         &options.out
     })?;
-    let (detected, _) = timed(on_event, Stage::Detect, |on_event| {
+    timed(on_event, Stage::Detect, |on_event| {
         let mut detected = Vec::with_capacity(images.len());
         // Some at a time, so that progress can be told in between.
         for chunk in images.chunks(2 * rayon::current_num_threads()) {
@@ -110,8 +110,7 @@ pub fn detect_folder(
             });
         }
         Ok(detected)
-    })?;
-    Ok(detected)
+    })
 }
 
 fn detect_one(

@@ -20,8 +20,9 @@ impl Session<'_> {
         let path = self.dir.report();
         // A page of an earlier result must not stand beside this one.
         self.dir.remove_report()?;
-        let min_score = self.config.data.min_segment_score;
-        let photographs = match self.config.distill.overlay {
+        let config = self.plan.config();
+        let min_score = config.data.min_segment_score;
+        let photographs = match config.distill.overlay {
             OverlayGround::Photo => PhotographConfig::default(),
             // Photographs that may not be passed on have no place in a page either.
             OverlayGround::Segments => PhotographConfig {
@@ -40,12 +41,14 @@ impl Session<'_> {
             })
             .collect();
         // The configuration was written as TOML when the run began.
-        report.configuration = toml::to_string_pretty(&self.config).unwrap_or_default();
+        report.configuration = toml::to_string_pretty(config).unwrap_or_default();
         report.facts = self.facts(&report.document, agreement);
         // The page may be passed on: where the scene lies is nobody's business.
         let folder = format!("{}{MAIN_SEPARATOR}", self.manifest.scene.display());
         let warnings = self.manifest.warnings.iter();
-        report.warnings = warnings.map(|text| text.replace(&folder, "")).collect();
+        report.warnings = warnings
+            .map(|warning| warning.message.replace(&folder, ""))
+            .collect();
         report.write(&path)?;
         Ok(path)
     }
@@ -93,14 +96,25 @@ impl Session<'_> {
                 .map(|(label, value)| (label.to_owned(), value))
                 .collect(),
         };
-        vec![
+        let decisions = (manifest.decisions.iter())
+            .map(|decided| {
+                let told = format!("{}, {}", decided.value, decided.reason);
+                (decided.setting.clone(), told)
+            })
+            .collect();
+        let named = |heading: &str, facts| FactGroup {
+            heading: heading.to_owned(),
+            facts,
+        };
+        let mut groups = vec![
             group("Result", result),
             group("Run", run),
-            FactGroup {
-                heading: "Seconds".to_owned(),
-                facts: seconds,
-            },
-        ]
+            named("Decided by scene and machine", decisions),
+            named("Seconds", seconds),
+        ];
+        // Earlier versions kept no decisions.
+        groups.retain(|group| !group.facts.is_empty());
+        groups
     }
 }
 

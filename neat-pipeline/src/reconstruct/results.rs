@@ -5,9 +5,10 @@ use super::session::Session;
 use crate::config::OverlayGround;
 use crate::distill::{Cancelled, Distilled, agreement, distill};
 use crate::error::PipelineError;
-use crate::event::{Event, Stage};
-use crate::image_io::write_png;
-use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe, spread_views};
+use crate::event::{Event, Stage, WarningKind};
+use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe};
+use crate::scene::spread_views;
+use neat_core::file::write_png;
 use neat_core::{View, Wireframe3d, file};
 use neat_report::ReportError;
 use neat_train::TrainedField;
@@ -30,13 +31,13 @@ const AGREEMENT: &str = "agreement";
 
 const NO_EDGES: &str =
     "the wireframe has no edges: train longer, or look at the 2D wireframes of the scene";
-const NO_REPORT: &str = "there is no report.html";
 
 impl Session<'_> {
     /// Warnings about an earlier result, which a new one replaces.
     pub fn forget_distillation_warnings(&mut self) {
+        let gone = [WarningKind::NoEdges, WarningKind::NoReport];
         let warnings = &mut self.manifest.warnings;
-        warnings.retain(|text| text != NO_EDGES && !text.starts_with(NO_REPORT));
+        warnings.retain(|warning| !gone.contains(&warning.kind));
     }
 
     /// The result that is on disk, where there is one that can be read.
@@ -65,18 +66,18 @@ impl Session<'_> {
                     stage: Stage::Distill,
                     fraction,
                 });
-                match cancelled.load(Ordering::Relaxed) {
-                    true => Err(Cancelled),
-                    false => Ok(()),
+                if cancelled.load(Ordering::Relaxed) {
+                    return Err(Cancelled);
                 }
+                Ok(())
             };
-            let (scene, config) = (&session.scene, &session.config);
-            Ok(distill(scene, field, config, &mut progress)?)
+            let (scene, plan) = (&session.scene, &session.plan);
+            Ok(distill(scene, field, plan, &mut progress)?)
         })?;
         if distilled.wireframe.edges.is_empty() {
-            self.warn(NO_EDGES);
+            self.warn(WarningKind::NoEdges, NO_EDGES);
         }
-        let agreement = agreement(&self.scene, &self.config, &distilled.wireframe);
+        let agreement = agreement(&self.scene, self.plan.config(), &distilled.wireframe);
         let (wireframe, document) = self.stage(Stage::Export, |session| {
             session.export(&distilled, agreement)
         })?;
@@ -86,7 +87,10 @@ impl Session<'_> {
             Ok(report) => self.written(report),
             // Of a full disk, a later session can write it.
             Err(PipelineError::Report(ReportError::File(error))) => return Err(error.into()),
-            Err(error) => self.warn(&format!("{NO_REPORT}: {error}")),
+            Err(error) => {
+                let text = format!("there is no report.html: {error}");
+                self.warn(WarningKind::NoReport, text);
+            }
         }
         Ok(Reconstruction {
             run: self.dir.clone(),
@@ -127,10 +131,10 @@ impl Session<'_> {
         }
         let draw = |(view, path): &(&View, PathBuf)| {
             let pixel_center = self.scene.pixel_center;
-            let picture = match self.config.distill.overlay {
+            let picture = match self.plan.config().distill.overlay {
                 OverlayGround::Photo => draw_overlay(view, pixel_center, in_world)?,
                 OverlayGround::Segments => {
-                    let min_score = self.config.data.min_segment_score;
+                    let min_score = self.plan.config().data.min_segment_score;
                     draw_sketch(view, pixel_center, min_score, in_world)
                 }
             };
@@ -160,7 +164,7 @@ impl Session<'_> {
             ("seed", json!(self.manifest.seed)),
             ("steps", json!(self.manifest.steps)),
             // `neat distill` may have chosen others than those of config.toml.
-            ("distill", json!(self.config.distill)),
+            ("distill", json!(self.plan.config().distill)),
             (REPORT, distilled.report.clone()),
             (AGREEMENT, json!(agreement)),
         ]

@@ -1,21 +1,20 @@
 //! A run in progress: its folder, its scene, and its manifest kept up to date.
 
 use super::RunOptions;
+use super::opened::software_warning;
 use crate::changes::Belonging;
 use crate::config::Config;
 use crate::error::PipelineError;
-use crate::estimate::fit_memory;
-use crate::event::{Event, OnEvent, Stage, timed};
+use crate::event::{Decision, Event, OnEvent, Stage, Warning, WarningKind, timed};
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
+use crate::plan::{Machine, Plan, changes_of_presets, settings_without_effect, settle};
 use crate::resources::Resources;
-use crate::run_dir::{Existing, RunDir, RunDirError, RunLock};
-use crate::scene::{examine_quickly, prepare_scene};
+use crate::run_dir::{Existing, RunDir, RunLock};
+use crate::scene::{PreparedScene, examine_quickly, prepare_scene};
 use burn::tensor::Device;
 use neat_core::{Scene, SceneError, file, hawp_json};
 use neat_tensor::Backend;
-use neat_tensor::backend::software_driver;
 use neat_train::TrainError;
-use neat_train::TrainedField;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,11 +23,11 @@ use std::time::Instant;
 /// A run in progress.
 pub(super) struct Session<'a> {
     pub dir: RunDir,
-    pub config: Config,
+    pub plan: Plan,
     pub manifest: Manifest,
     pub scene: Scene,
     pub device: Device,
-    /// Rays per pass, where the device could not take as many as configured.
+    /// Rays per pass, where the device could not take as many as planned.
     pub ray_chunk: Option<usize>,
     /// Whether the run had ended when the session began.
     pub finished: bool,
@@ -40,12 +39,13 @@ pub(super) struct Session<'a> {
 /// The part of a run that is on disk already.
 struct Earlier {
     manifest: Manifest,
-    config: Config,
+    plan: Plan,
 }
 
 impl<'a> Session<'a> {
-    /// Reads the scene, then makes the run folder with `config.toml` and a first
-    /// `manifest.json`: bad input leaves no folder behind.
+    /// Reads the scene and settles what is open, then makes the run folder with
+    /// `config.toml`, `plan.toml` and a first `manifest.json`: bad input leaves no folder
+    /// behind.
     pub fn start(
         options: &RunOptions,
         cancelled: &AtomicBool,
@@ -59,90 +59,36 @@ impl<'a> Session<'a> {
             Existing::Resume => earlier(&options.out, on_event)?,
             Existing::Refuse | Existing::Overwrite => None,
         };
-        let scene_dir = absolute(&options.scene)?;
-
-        let mut warnings: Vec<String> = software_warning(&device).into_iter().collect();
-        for warning in &warnings {
-            on_event(Event::Warning(warning.clone()));
-        }
-        let placed = earlier.as_ref().and_then(|e| e.manifest.sphere.as_ref());
-        let mut config = options.config.clone();
-        let resources = Resources {
-            cache: options.cache.as_ref(),
-            memory_limit: options.memory_limit,
-            cancelled: Some(cancelled),
+        let mut manifest = begun_now(options, backend, &device)?;
+        let mut tell = |event: Event<'_>| {
+            manifest.record(&event);
+            on_event(event);
         };
-        let prepared = prepare_scene(&scene_dir, &mut config, placed, resources, on_event)?;
-        // Before anything is written; what depends on the scene is decided now.
-        config.training().validate()?;
-        let limit = options.memory_limit;
-        // A GPU has memory of its own.
-        if let Some(earlier) = &earlier {
-            // A run keeps the passes that it began with, whatever memory is here.
-            config.train.ray_chunk = earlier.config.train.ray_chunk;
-        } else if backend != Backend::Wgpu {
-            fit_memory(&mut config, limit, on_event);
-        }
-        warnings.extend(prepared.warnings);
-        let mut seconds = prepared.seconds;
-        if options.examine && earlier.is_none() {
-            let (found, time) = timed(on_event, Stage::Examine, |on_event| {
-                examine_quickly(&prepared.scene, &config.data, limit, on_event)
-            })?;
-            warnings.extend(found);
-            seconds.insert(Stage::Examine, time);
-        }
-        let inputs = hash_inputs(&scene_dir, &prepared.files)?;
+        tell_of_device(options.backend, backend, &device, &mut tell);
+        let (prepared, plan) = prepare(options, backend, earlier.as_ref(), cancelled, &mut tell)?;
+        manifest.sphere = Some(prepared.sphere);
+        manifest.inputs = hash_inputs(&manifest.scene, &prepared.files)?;
         if cancelled.load(Ordering::Relaxed) {
             return Err(PipelineError::InterruptedIn(Stage::Load));
         }
-
-        let now = utc_now();
-        let mut manifest = Manifest {
-            neat: env!("CARGO_PKG_VERSION").to_owned(),
-            compiler: env!("NEAT_RUSTC").to_owned(),
-            target: env!("NEAT_TARGET").to_owned(),
-            command_line: options.command_line.clone(),
-            preset: options.preset.clone(),
-            backend: backend.to_string(),
-            device: device_name(&device),
-            threads: rayon::current_num_threads(),
-            seed: options.seed,
-            scene: scene_dir,
-            sphere: Some(prepared.sphere),
-            inputs,
-            warnings,
-            status: Status::Running,
-            steps: 0,
-            started: now.clone(),
-            updated: now,
-            seconds: BTreeMap::new(),
-        };
         let mut finished = false;
         if let Some(Earlier {
             manifest: before,
-            config: configured,
-        }) = &earlier
+            plan: planned,
+        }) = earlier
         {
-            let now = Belonging::new(&config, &manifest)?;
-            let then = Belonging::new(configured, before)?;
+            let now = Belonging::new(plan.config(), &manifest)?;
+            let then = Belonging::new(planned.config(), &before)?;
             then.refuse_changes(&now, &options.out)?;
             refuse_other_state(&now, &options.out)?;
-            warn_of_other_programs(before, &mut manifest, on_event);
             finished = before.status == Status::Finished;
-            manifest.steps = before.steps;
-            manifest.started.clone_from(&before.started);
-            manifest.seconds.clone_from(&before.seconds);
-            for warning in &before.warnings {
-                if !manifest.warnings.contains(warning) {
-                    manifest.warnings.push(warning.clone());
-                }
-            }
+            warn_of_other_programs(&before, &mut manifest, on_event);
+            manifest.continue_from(before);
         }
         let (dir, lock) = RunDir::create(&options.out, options.existing)?;
         let mut session = Self {
             dir,
-            config,
+            plan,
             manifest,
             scene: prepared.scene,
             device,
@@ -151,20 +97,22 @@ impl<'a> Session<'a> {
             on_event,
             _lock: lock,
         };
-        for (stage, seconds) in seconds {
-            session.add_seconds(stage, seconds);
+        if !finished {
+            session.begin(&options.config, prepared.detected)?;
         }
-        if finished {
-            return Ok(session);
-        }
-        session.set_damaged_aside()?;
-        session.dir.write_config(&session.config)?;
-        if prepared.detected {
-            session.write_detections()?;
-        }
-        // The last of the three: now the folder holds a run.
-        session.write_manifest()?;
         Ok(session)
+    }
+
+    /// Writes what says what the run is.
+    fn begin(&mut self, asked: &Config, detected: bool) -> Result<(), PipelineError> {
+        self.set_damaged_aside()?;
+        self.dir.write_config(asked)?;
+        self.dir.write_plan(&self.plan)?;
+        if detected {
+            self.write_detections()?;
+        }
+        // The last of them: now the folder holds a run.
+        self.write_manifest()
     }
 
     /// Renames checkpoints that cannot be read, so that they do not stand in the way
@@ -176,7 +124,8 @@ impl<'a> Session<'a> {
         for (path, error) in usable.damaged {
             self.dir.set_aside(&path)?;
             let used = usable.path.display();
-            self.warn(&format!("{error}: {used} is used instead"));
+            let text = format!("{error}: {used} is used instead");
+            self.warn(WarningKind::DamagedCheckpoint, text);
         }
         Ok(())
     }
@@ -207,12 +156,12 @@ impl<'a> Session<'a> {
         stage: Stage,
         work: impl FnOnce(&mut Self) -> Result<T, PipelineError>,
     ) -> Result<T, PipelineError> {
+        let _span = tracing::info_span!("stage", %stage).entered();
         (self.on_event)(Event::StageStarted(stage));
         let start = Instant::now();
         let value = work(self)?;
         let seconds = start.elapsed().as_secs_f64();
-        self.add_seconds(stage, seconds);
-        (self.on_event)(Event::StageFinished { stage, seconds });
+        self.tell(Event::StageFinished { stage, seconds });
         Ok(value)
     }
 
@@ -226,9 +175,14 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    pub fn warn(&mut self, warning: &str) {
-        self.manifest.warnings.push(warning.to_owned());
-        (self.on_event)(Event::Warning(warning.to_owned()));
+    pub fn warn(&mut self, kind: WarningKind, message: impl Into<String>) {
+        self.tell(Event::Warning(Warning::new(kind, message)));
+    }
+
+    /// Tells an event, and keeps what of it has to last.
+    fn tell(&mut self, event: Event<'_>) {
+        self.manifest.record(&event);
+        (self.on_event)(event);
     }
 
     pub fn written(&mut self, path: PathBuf) {
@@ -239,9 +193,94 @@ impl<'a> Session<'a> {
         self.manifest.updated = utc_now();
         Ok(self.dir.write_manifest(&self.manifest)?)
     }
+}
 
-    fn add_seconds(&mut self, stage: Stage, seconds: f64) {
-        *self.manifest.seconds.entry(stage).or_default() += seconds;
+/// The manifest of a run that begins now.
+fn begun_now(
+    options: &RunOptions,
+    backend: Backend,
+    device: &Device,
+) -> Result<Manifest, PipelineError> {
+    let now = utc_now();
+    Ok(Manifest {
+        neat: env!("CARGO_PKG_VERSION").to_owned(),
+        compiler: env!("NEAT_RUSTC").to_owned(),
+        target: env!("NEAT_TARGET").to_owned(),
+        command_line: options.command_line.clone(),
+        preset: options.preset.clone(),
+        backend: backend.to_string(),
+        device: device_name(device),
+        threads: rayon::current_num_threads(),
+        seed: options.seed,
+        scene: absolute(&options.scene)?,
+        sphere: None,
+        inputs: BTreeMap::new(),
+        decisions: Vec::new(),
+        warnings: Vec::new(),
+        status: Status::Running,
+        steps: 0,
+        started: now.clone(),
+        updated: now,
+        seconds: BTreeMap::new(),
+    })
+}
+
+/// Reads the scene, settles what is open, and examines the scene of a new run.
+fn prepare(
+    options: &RunOptions,
+    backend: Backend,
+    earlier: Option<&Earlier>,
+    cancelled: &AtomicBool,
+    on_event: OnEvent<'_>,
+) -> Result<(PreparedScene, Plan), PipelineError> {
+    let memory_limit = options.memory_limit;
+    let resources = Resources {
+        cache: options.cache.as_ref(),
+        memory_limit,
+        cancelled: Some(cancelled),
+    };
+    let asked = &options.config;
+    let scene_dir = absolute(&options.scene)?;
+    let placed = earlier.and_then(|earlier| earlier.manifest.sphere.as_ref());
+    let prepared = prepare_scene(&scene_dir, asked, placed, resources, on_event)?;
+    let machine = Machine {
+        backend,
+        memory_limit,
+    };
+    let planned = earlier.map(|earlier| &earlier.plan);
+    let (plan, decisions) = settle(asked, &prepared.scene, machine, planned)?;
+    for decision in decisions {
+        tracing::info!(%decision);
+        on_event(Event::Decided(decision));
+    }
+    let changes = changes_of_presets(asked);
+    let sparse_points = !prepared.scene.sparse_points.is_empty();
+    for warning in settings_without_effect(&changes, &plan, sparse_points, prepared.detected) {
+        on_event(Event::Warning(warning));
+    }
+    if options.examine && earlier.is_none() {
+        timed(on_event, Stage::Examine, |on_event| {
+            examine_quickly(&prepared.scene, &asked.data, memory_limit, on_event)
+        })?;
+    }
+    Ok((prepared, plan))
+}
+
+/// Tells what computes if that was open, and what is wrong with it.
+fn tell_of_device(asked: Backend, backend: Backend, device: &Device, on_event: OnEvent<'_>) {
+    if asked == Backend::Auto {
+        let reason = match backend {
+            Backend::Wgpu => format!("as there is a GPU, {}", device_name(device)),
+            _ => "as there is no GPU".to_owned(),
+        };
+        on_event(Event::Decided(Decision {
+            setting: "backend".to_owned(),
+            value: backend.to_string(),
+            reason,
+        }));
+    }
+    if let Some(warning) = software_warning(device) {
+        on_event(Event::Warning(warning));
     }
 }
 
@@ -254,7 +293,7 @@ fn earlier(out: &Path, on_event: OnEvent<'_>) -> Result<Option<Earlier>, Pipelin
     };
     Ok(Some(Earlier {
         manifest: dir.manifest()?,
-        config: dir.config()?,
+        plan: dir.plan()?,
     }))
 }
 
@@ -278,92 +317,10 @@ fn warn_of_other_programs(before: &Manifest, now: &mut Manifest, on_event: OnEve
         let warning = format!(
             "the run began with {then} and continues with {with}: the result may differ in the last digits"
         );
-        on_event(Event::Warning(warning.clone()));
-        now.warnings.push(warning);
+        let event = Event::Warning(Warning::new(WarningKind::OtherProgram, warning));
+        now.record(&event);
+        on_event(event);
     }
-}
-
-/// A run that has been, with its scene and its trained field.
-#[derive(Debug)]
-pub struct OpenedRun {
-    /// Its folder.
-    pub dir: RunDir,
-    /// Its configuration.
-    pub config: Config,
-    /// Its manifest.
-    pub manifest: Manifest,
-    /// Its scene.
-    pub scene: Scene,
-    /// What computes.
-    pub device: Device,
-    /// The field of its last checkpoint.
-    pub field: TrainedField,
-}
-
-/// Opens the run in the folder `run`: reads its configuration, changed by
-/// `configure`, its scene, and its last checkpoint.
-///
-/// `scene` is the folder of the scene; `None` takes the one that the run was
-/// trained on.
-///
-/// # Errors
-/// If a part of the run or the scene cannot be read, or the backend cannot be
-/// used.
-pub fn open_run<E>(
-    run: &Path,
-    scene: Option<&Path>,
-    backend: Backend,
-    resources: Resources<'_>,
-    configure: impl FnOnce(Config) -> Result<Config, E>,
-    on_event: OnEvent<'_>,
-) -> Result<OpenedRun, E>
-where
-    E: From<PipelineError>,
-{
-    let dir = RunDir::open(run).map_err(PipelineError::from)?;
-    let config = configure(dir.config().map_err(PipelineError::from)?)?;
-    Ok(read_run(dir, config, scene, backend, resources, on_event)?)
-}
-
-fn read_run(
-    dir: RunDir,
-    mut config: Config,
-    scene: Option<&Path>,
-    backend: Backend,
-    resources: Resources<'_>,
-    on_event: OnEvent<'_>,
-) -> Result<OpenedRun, PipelineError> {
-    let device = backend.device()?;
-    if let Some(warning) = software_warning(&device) {
-        on_event(Event::Warning(warning));
-    }
-    let manifest = dir.manifest()?;
-    let scene_dir = scene.unwrap_or(&manifest.scene);
-    let placed = manifest.sphere.as_ref();
-    let prepared = prepare_scene(scene_dir, &mut config, placed, resources, on_event)?;
-    let no_checkpoint = || RunDirError::NoCheckpoint(dir.root().into());
-    let usable = dir.usable_checkpoint()?.ok_or_else(no_checkpoint)?;
-    for (_, error) in &usable.damaged {
-        let used = usable.path.display();
-        on_event(Event::Warning(format!("{error}: {used} is used instead")));
-    }
-    let field = TrainedField::load(&config.training(), &usable.checkpoint, &device)?;
-    Ok(OpenedRun {
-        dir,
-        config,
-        manifest,
-        scene: prepared.scene,
-        device,
-        field,
-    })
-}
-
-/// What a person should know who computes through a software driver.
-pub fn software_warning(device: &Device) -> Option<String> {
-    let driver = software_driver(device)?;
-    Some(format!(
-        "{driver} is a software driver, not a GPU: right but slow; `--backend flex` is many times faster"
-    ))
 }
 
 /// The path from the root, so that the manifest leads there from anywhere.

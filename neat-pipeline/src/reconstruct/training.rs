@@ -6,7 +6,7 @@ use super::device_failure::{self, Replacement};
 use super::session::Session;
 use crate::changes::Belonging;
 use crate::error::PipelineError;
-use crate::event::{Event, Stage};
+use crate::event::{Event, Stage, WarningKind};
 use crate::manifest::Manifest;
 use crate::run_dir::{Existing, RunDir};
 use nalgebra::Vector3;
@@ -26,7 +26,7 @@ const METRICS_INTERVAL: u64 = 10;
 const JUNCTION_SNAPSHOTS: f64 = 50.0;
 
 /// How much of the training is done: by steps or by time, whichever is ahead.
-struct Progress {
+struct Schedule {
     steps: u64,
     budget: Option<Duration>,
     /// Time of earlier sessions of the run.
@@ -34,7 +34,7 @@ struct Progress {
     start: Instant,
 }
 
-impl Progress {
+impl Schedule {
     fn elapsed(&self) -> Duration {
         self.before + self.start.elapsed()
     }
@@ -86,8 +86,8 @@ impl Session<'_> {
         options: &RunOptions,
         cancelled: &AtomicBool,
     ) -> Result<TrainedField, PipelineError> {
-        let progress = Progress {
-            steps: self.config.train.steps,
+        let schedule = Schedule {
+            steps: self.plan.config().train.steps,
             budget: options.time_budget,
             before: self.earlier_training_time(),
             start: Instant::now(),
@@ -101,9 +101,8 @@ impl Session<'_> {
             // of it.
             self.manifest.steps = from;
             if from > 0 {
-                let steps = progress.steps;
-                let note = format!("training goes on after step {from} of {steps}");
-                (self.on_event)(Event::Note(note));
+                let steps = schedule.steps;
+                (self.on_event)(Event::Resumed { step: from, steps });
             }
             // Another checkpoint has been reached since the last failure, and holds
             // the rates that led there.
@@ -111,7 +110,7 @@ impl Session<'_> {
                 (tries, tried_from) = (0, from);
             }
             trainer.scale_learning_rates(LOWER_RATE.powi(tries as i32));
-            let failure = match self.optimise(&mut trainer, &progress, cancelled) {
+            let failure = match self.optimise(&mut trainer, &schedule, cancelled) {
                 Ok(()) => return Ok(trainer.field()),
                 Err(PipelineError::Train(failure)) if failure.is_numerical() => failure,
                 Err(error) => return Err(error),
@@ -129,9 +128,10 @@ impl Session<'_> {
                 let name = usable.path.file_name().unwrap_or_default();
                 name.to_string_lossy().into_owned()
             });
-            self.warn(&format!(
+            let text = format!(
                 "{failure}: training goes on from {from} with {LOWER_RATE} of the learning rates"
-            ));
+            );
+            self.warn(WarningKind::Divergence, text);
         }
     }
 
@@ -139,23 +139,24 @@ impl Session<'_> {
     fn optimise(
         &mut self,
         trainer: &mut Trainer,
-        progress: &Progress,
+        schedule: &Schedule,
         cancelled: &AtomicBool,
     ) -> Result<(), PipelineError> {
         let mut metrics = StepLog::open(&self.dir.metrics(), trainer.iteration())?;
         let mut junctions = StepLog::open(&self.dir.junctions(), trainer.iteration())?;
-        let mut fraction = progress.fraction(trainer.iteration());
-        let mut snapshots = match trainer.iteration() {
-            0 => 0.0,
-            _ => (fraction * JUNCTION_SNAPSHOTS).floor() + 1.0,
+        let mut fraction = schedule.fraction(trainer.iteration());
+        let mut snapshots = if trainer.iteration() == 0 {
+            0.0
+        } else {
+            (fraction * JUNCTION_SNAPSHOTS).floor() + 1.0
         };
-        let interval = self.config.train.checkpoint_interval;
+        let interval = self.plan.config().train.checkpoint_interval;
         let mut saved = Instant::now();
         while fraction < 1.0 {
             if cancelled.load(Ordering::Relaxed) {
                 metrics.sync()?;
                 junctions.sync()?;
-                let checkpoint = self.save(trainer, progress)?;
+                let checkpoint = self.save(trainer, schedule)?;
                 return Err(PipelineError::Interrupted {
                     step: trainer.iteration(),
                     checkpoint,
@@ -163,7 +164,7 @@ impl Session<'_> {
             }
             let report = trainer.step(fraction)?;
             let iteration = trainer.iteration();
-            fraction = progress.fraction(iteration);
+            fraction = schedule.fraction(iteration);
             (self.on_event)(Event::Step {
                 report: &report,
                 fraction,
@@ -175,12 +176,12 @@ impl Session<'_> {
                 junctions.append(&self.junctions_line(trainer))?;
                 snapshots = (fraction * JUNCTION_SNAPSHOTS).floor() + 1.0;
             }
-            let late = saved.elapsed().as_secs_f64() > self.config.train.checkpoint_seconds;
+            let late = saved.elapsed().as_secs_f64() > self.plan.config().train.checkpoint_seconds;
             if fraction >= 1.0 || late || iteration.is_multiple_of(interval) {
                 // A checkpoint never knows more than the logs beside it.
                 metrics.sync()?;
                 junctions.sync()?;
-                self.save(trainer, progress)?;
+                self.save(trainer, schedule)?;
                 saved = Instant::now();
             }
         }
@@ -189,7 +190,7 @@ impl Session<'_> {
 
     /// A trainer that continues from the last checkpoint, or a new one.
     fn trainer(&self, options: &RunOptions) -> Result<Trainer, PipelineError> {
-        let mut config = self.config.training();
+        let mut config = self.plan.config().training();
         config.kernels = Kernels::within(options.memory_limit.bytes());
         if let Some(chunk) = self.ray_chunk {
             config.train.ray_chunk = Some(chunk);
@@ -203,7 +204,7 @@ impl Session<'_> {
 
     /// Takes less memory, or another device, after the device has failed.
     fn replace_device(&mut self, reason: &str, options: &RunOptions) -> Result<(), PipelineError> {
-        let train = &self.config.train;
+        let train = &self.plan.config().train;
         let chunk = self.ray_chunk.or(train.ray_chunk).unwrap_or(train.rays);
         // Who asked for one backend by name gets that one or none.
         let cpu_allowed = options.backend == Backend::Auto;
@@ -223,9 +224,10 @@ impl Session<'_> {
                 return Err(PipelineError::DeviceFailed { reason });
             }
         };
-        self.warn(&format!(
+        let text = format!(
             "the device failed ({reason}): training goes on from the last checkpoint with {what}"
-        ));
+        );
+        self.warn(WarningKind::DeviceFailure, text);
         Ok(())
     }
 
@@ -233,7 +235,8 @@ impl Session<'_> {
     fn dump(&self, trainer: &Trainer) -> Result<PathBuf, PipelineError> {
         let path = self.dir.failure();
         let (dump, _lock) = RunDir::create(&path, Existing::Overwrite)?;
-        dump.write_config(&self.config)?;
+        dump.write_config(self.plan.config())?;
+        dump.write_plan(&self.plan)?;
         dump.write_checkpoint(trainer.iteration(), &self.checkpoint(trainer)?, 1)?;
         dump.write_manifest(&Manifest {
             steps: trainer.iteration(),
@@ -264,18 +267,19 @@ impl Session<'_> {
     /// The trainer's state, with what it belongs to.
     fn checkpoint(&self, trainer: &Trainer) -> Result<Checkpoint, PipelineError> {
         let mut checkpoint = trainer.checkpoint();
-        let of = Belonging::new(&self.config, &self.manifest)?;
+        let of = Belonging::new(self.plan.config(), &self.manifest)?;
         of.write_into(&mut checkpoint.metadata);
         Ok(checkpoint)
     }
 
     /// Writes a checkpoint, and the manifest that says how far the run is.
-    fn save(&mut self, trainer: &Trainer, progress: &Progress) -> Result<PathBuf, PipelineError> {
+    fn save(&mut self, trainer: &Trainer, schedule: &Schedule) -> Result<PathBuf, PipelineError> {
         let checkpoint = self.checkpoint(trainer)?;
-        let kept = self.config.train.kept_checkpoints;
+        let kept = self.plan.config().train.kept_checkpoints;
         let path = (self.dir).write_checkpoint(trainer.iteration(), &checkpoint, kept)?;
+        tracing::debug!(step = trainer.iteration(), path = %path.display(), "checkpoint");
         self.manifest.steps = trainer.iteration();
-        let seconds = progress.elapsed().as_secs_f64();
+        let seconds = schedule.elapsed().as_secs_f64();
         self.manifest.seconds.insert(Stage::Train, seconds);
         self.write_manifest()?;
         Ok(path)
@@ -286,8 +290,8 @@ impl Session<'_> {
 mod tests {
     use super::*;
 
-    fn progress(budget: Option<f64>, before: f64) -> Progress {
-        Progress {
+    fn schedule(budget: Option<f64>, before: f64) -> Schedule {
+        Schedule {
             steps: 100,
             budget: budget.map(Duration::from_secs_f64),
             before: Duration::from_secs_f64(before),
@@ -297,11 +301,11 @@ mod tests {
 
     #[test]
     fn the_faster_of_steps_and_time_counts() {
-        assert_eq!(progress(None, 1e6).fraction(25), 0.25);
-        assert_eq!(progress(Some(1e9), 0.0).fraction(100), 1.0);
-        let by_time = progress(Some(1e6), 5e5).fraction(25);
+        assert_eq!(schedule(None, 1e6).fraction(25), 0.25);
+        assert_eq!(schedule(Some(1e9), 0.0).fraction(100), 1.0);
+        let by_time = schedule(Some(1e6), 5e5).fraction(25);
         assert!((by_time - 0.5).abs() < 1e-3, "{by_time}");
         // More steps than asked for, as after --resume with fewer.
-        assert_eq!(progress(None, 0.0).fraction(300), 1.0);
+        assert_eq!(schedule(None, 0.0).fraction(300), 1.0);
     }
 }

@@ -1,8 +1,6 @@
 //! How many global junctions a scene asks for.
 
-use crate::config::Config;
-use neat_core::{Scene, Wireframe2d};
-use neat_gjp::JunctionCount;
+use neat_core::Wireframe2d;
 
 /// A view with more junctions than this share of the views stands for the scene:
 /// most views see only a part of it, and a few are full of false segments.
@@ -16,19 +14,12 @@ const STEP: usize = 8;
 /// The assignment of 50 ends to 1024 junctions takes 0.2 ms, a fiftieth of a step.
 const LIMITS: [usize; 2] = [16, 1024];
 
-/// Decides a [`JunctionCount::AUTO`] of `config` by the 2D wireframes of `scene`.
-pub(crate) fn fit_latents(config: &mut Config, scene: &Scene) {
-    let junctions = &mut config.model.perceiver.junctions;
-    if junctions.fixed().is_none() {
-        let wireframes = scene.views.iter().map(|view| &view.wireframe);
-        let count = latents_for(wireframes, config.data.min_segment_score);
-        *junctions = JunctionCount::Fixed(count);
-    }
-}
-
 /// The number of latents for 2D wireframes, of which edges with a score above
 /// `min_score` count.
-fn latents_for<'a>(wireframes: impl Iterator<Item = &'a Wireframe2d>, min_score: f64) -> usize {
+pub(super) fn latents_for<'a>(
+    wireframes: impl Iterator<Item = &'a Wireframe2d>,
+    min_score: f64,
+) -> usize {
     let mut counts: Vec<usize> = wireframes
         .map(|wireframe| joined_vertices(wireframe, min_score))
         .collect();
@@ -57,9 +48,7 @@ fn joined_vertices(wireframe: &Wireframe2d, min_score: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::preset::Preset;
     use nalgebra::Vector2;
-    use neat_core::synthetic::{SyntheticScene, generate};
 
     /// A closed ring of `junctions` vertices, an edge that meets nothing, and one
     /// that no one believes.
@@ -93,22 +82,5 @@ mod tests {
         assert_eq!(latents_for([ring(3)].iter(), 0.05), LIMITS[0]);
         assert_eq!(latents_for([ring(3000)].iter(), 0.05), LIMITS[1]);
         assert_eq!(latents_for([].into_iter(), 0.05), LIMITS[0]);
-    }
-
-    #[test]
-    fn a_number_that_is_given_stays() {
-        let scene = generate(&SyntheticScene {
-            views: 4,
-            image_size: 128,
-            ..SyntheticScene::default()
-        });
-        let scene = scene.unwrap().scene;
-        let mut config = Preset::PaperDtu.config();
-        fit_latents(&mut config, &scene);
-        assert_eq!(config, Preset::PaperDtu.config());
-        config.model.perceiver.junctions = JunctionCount::AUTO;
-        fit_latents(&mut config, &scene);
-        let decided = config.model.perceiver.junctions.fixed().unwrap();
-        assert!((LIMITS[0]..100).contains(&decided), "{decided}");
     }
 }

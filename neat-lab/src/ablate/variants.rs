@@ -1,6 +1,6 @@
 //! What an ablation leaves out or changes, one thing at a time.
 
-use crate::config::BackEnd;
+use neat_pipeline::config::Assembler;
 
 /// One row of an ablation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -221,11 +221,11 @@ const TRACK_STEPS: [Variant; 1] = [step_off(
 )];
 
 /// All variants that make sense for a run with this back end, the base first.
-pub fn variants(back_end: BackEnd) -> Vec<Variant> {
-    let steps: &[Variant] = match back_end {
-        BackEnd::Fast | BackEnd::Auto => &FAST_STEPS,
-        BackEnd::Tracks => &TRACK_STEPS,
-        BackEnd::Paper => &[],
+pub fn variants(assembler: Assembler) -> Vec<Variant> {
+    let steps: &[Variant] = match assembler {
+        Assembler::Fast => &FAST_STEPS,
+        Assembler::Tracks => &TRACK_STEPS,
+        Assembler::Paper => &[],
     };
     [BASE]
         .iter()
@@ -239,13 +239,13 @@ pub fn variants(back_end: BackEnd) -> Vec<Variant> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::overrides::apply_overrides;
-    use crate::preset::Preset;
+    use neat_pipeline::config::Preset;
+    use neat_pipeline::config::apply_overrides;
     use std::collections::BTreeSet;
 
     #[test]
     fn every_variant_applies_to_every_preset_and_most_change_something() {
-        let all = [BackEnd::Fast, BackEnd::Tracks, BackEnd::Paper];
+        let all = [Assembler::Fast, Assembler::Tracks, Assembler::Paper];
         for preset in Preset::ALL {
             let config = preset.config();
             for variant in all.into_iter().flat_map(variants) {
@@ -262,8 +262,8 @@ mod tests {
 
     #[test]
     fn folders_are_not_shared() {
-        for back_end in [BackEnd::Fast, BackEnd::Tracks, BackEnd::Paper] {
-            let variants = variants(back_end);
+        for assembler in [Assembler::Fast, Assembler::Tracks, Assembler::Paper] {
+            let variants = variants(assembler);
             let slugs: BTreeSet<_> = variants.iter().map(|v| v.slug).collect();
             assert_eq!(slugs.len(), variants.len());
         }

@@ -1,10 +1,10 @@
 //! The same seeds on every backend: time, memory and agreement.
 
-use crate::config::Config;
 use burn::tensor::TensorData;
 use neat_core::Scene;
 use neat_tensor::{Backend, BackendError, Kernels};
 use neat_train::TrainError;
+use neat_train::config::TrainingConfig;
 use neat_train::trainer::{Probe, Trainer};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -76,7 +76,7 @@ pub struct Comparison {
 /// If a backend has no device, or a step fails.
 pub fn compare_backends(
     scene: &Scene,
-    config: &Config,
+    config: &TrainingConfig,
     seed: u64,
     steps: u64,
     backends: &[Backend],
@@ -93,7 +93,7 @@ pub fn compare_backends(
             backend: *backend,
             source,
         };
-        let mut training = config.training();
+        let mut training = config.clone();
         if plain {
             training.kernels = Kernels::plain();
         }

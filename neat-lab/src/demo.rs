@@ -1,15 +1,15 @@
 //! The whole method on a scene whose truth is known: synthesise, reconstruct,
 //! evaluate.
 
-use crate::error::PipelineError;
-use crate::event::{Event, OnEvent, Stage, timed};
-use crate::reconstruct::{Reconstruction, RunOptions, reconstruct};
-use crate::run_dir::{Existing, RunDir};
+use crate::error::LabError;
 use neat_core::SceneError;
 use neat_core::ground_truth::{GroundTruth, write_ground_truth};
 use neat_core::layout::abc;
 use neat_core::synthetic::{SyntheticScene, generate_on_demand};
 use neat_eval::{EvaluationReport, NeatAbc, Scores};
+use neat_pipeline::event::{Event, OnEvent, Stage, timed};
+use neat_pipeline::reconstruct::{Reconstruction, RunOptions, reconstruct};
+use neat_pipeline::run_dir::{Existing, RunDir};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -33,13 +33,13 @@ pub struct Demo {
 ///
 /// # Errors
 /// If the scene is impossible, or the folder is not empty or cannot be written.
-pub fn synthesise(config: &SyntheticScene, dir: &Path) -> Result<GroundTruth, PipelineError> {
+pub fn synthesise(config: &SyntheticScene, dir: &Path) -> Result<GroundTruth, LabError> {
     config.validate()?;
     if dir
         .read_dir()
         .is_ok_and(|mut entries| entries.next().is_some())
     {
-        return Err(PipelineError::SceneDirNotEmpty(dir.into()));
+        return Err(LabError::SceneDirNotEmpty(dir.into()));
     }
     let data = generate_on_demand(config)?;
     let truth = GroundTruth {
@@ -62,7 +62,7 @@ pub fn demo(
     options: &RunOptions,
     cancelled: &AtomicBool,
     on_event: OnEvent<'_>,
-) -> Result<Demo, PipelineError> {
+) -> Result<Demo, LabError> {
     RunDir::check(&options.out, options.existing)?;
     if options.existing == Existing::Overwrite {
         remove_earlier_demo(&options.out)?;
@@ -73,14 +73,14 @@ pub fn demo(
         ..options.clone()
     };
     let evaluation_file = options.out.with_file_name("evaluation.json");
-    let (truth, _) = timed(on_event, Stage::Synthesise, |_| {
+    let truth = timed(on_event, Stage::Synthesise, |_| {
         synthesise(synthetic, &options.scene)
     })?;
     let reconstruction = reconstruct(&options, cancelled, on_event)?;
-    let (evaluation, _) = timed(on_event, Stage::Evaluate, |_| {
+    let evaluation = timed(on_event, Stage::Evaluate, |_| {
         let scores =
             NeatAbc::default().evaluate(&reconstruction.wireframe, None, &truth.wireframe)?;
-        Ok(EvaluationReport::new(Scores::NeatAbc(scores)))
+        Ok::<_, LabError>(EvaluationReport::new(Scores::NeatAbc(scores)))
     })?;
     evaluation.write_json(&evaluation_file)?;
     on_event(Event::FileWritten(evaluation_file.clone()));
@@ -92,7 +92,7 @@ pub fn demo(
 }
 
 /// Removes the scene of an earlier demonstration in `out`.
-fn remove_earlier_demo(out: &Path) -> Result<(), PipelineError> {
+fn remove_earlier_demo(out: &Path) -> Result<(), LabError> {
     let scene = out.join("scene");
     if !scene.exists() {
         return Ok(());

@@ -4,22 +4,23 @@ mod folder;
 pub mod table;
 pub mod variants;
 
-use crate::config::{BackEnd, Config};
-use crate::distill::distill;
-use crate::error::PipelineError;
-use crate::event::{Event, OnEvent, Stage};
-use crate::image_io::every_nth_pixel;
-use crate::overlay::spread_views;
-use crate::overrides::apply_overrides;
-use crate::reconstruct::{OpenedRun, RunOptions, open_run, reconstruct};
-use crate::render::render_view;
-use crate::resources::Resources;
-use crate::run_dir::Existing;
+use crate::error::LabError;
 use nalgebra::Vector3;
 use neat_core::{Scene, Wireframe3d, file, with_causes};
 use neat_eval::image_quality::psnr;
 use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
 use neat_field::region_pixels::RegionPixels;
+use neat_pipeline::config::apply_overrides;
+use neat_pipeline::config::{Assembler, Choice, Config};
+use neat_pipeline::distill::distill;
+use neat_pipeline::error::{PipelineError, with_causes};
+use neat_pipeline::event::{Event, OnEvent, Stage, Warning, WarningKind};
+use neat_pipeline::reconstruct::{OpenedRun, RunOptions, open_run, reconstruct};
+use neat_pipeline::render::every_nth_pixel;
+use neat_pipeline::render::render_view;
+use neat_pipeline::resources::Resources;
+use neat_pipeline::run_dir::Existing;
+use neat_pipeline::scene::spread_views;
 use neat_train::TrainedField;
 use neat_wireframe::export::write_json;
 use neat_wireframe::metrics::PrecisionRecall;
@@ -57,29 +58,31 @@ pub struct Truth {
 ///
 /// # Errors
 /// If the folder holds something else, the unchanged run fails, see [`reconstruct`],
-/// or a table cannot be written; [`PipelineError::AblationInterrupted`] once
+/// or a table cannot be written; [`LabError::AblationInterrupted`] once
 /// `cancelled` is set.
 pub fn ablate(
     options: &RunOptions,
     truth: &Truth,
     cancelled: &AtomicBool,
     on_event: OnEvent<'_>,
-) -> Result<Vec<Row>, PipelineError> {
+) -> Result<Vec<Row>, LabError> {
     // Once: looking for GPUs takes a while.
     let options = &RunOptions {
         backend: options.backend.resolve(),
         ..options.clone()
     };
     folder::claim(options)?;
-    let expected = variants(options.config.distill.back_end).len();
+    let expected = match options.config.distill.back_end {
+        Choice::Given(assembler) => variants(assembler).len(),
+        Choice::Auto => variants(Assembler::Fast).len(),
+    };
     let base = run_variant(&variants::BASE, options, cancelled, on_event)
         .map_err(|error| interrupted(error, 0, expected))?;
-    let config = settled(&options.config, &base.config);
-    let all = variants(config.distill.back_end);
+    let all = variants(base.plan.assembler());
     let mut rows: Vec<Row> = Vec::with_capacity(all.len());
     for (index, variant) in all.iter().enumerate() {
         if cancelled.load(Ordering::Relaxed) {
-            return Err(PipelineError::AblationInterrupted {
+            return Err(LabError::AblationInterrupted {
                 done: index,
                 all: all.len(),
             });
@@ -92,7 +95,7 @@ pub fn ablate(
         )));
         let measured = match rows.first() {
             None => measure(variant, &base, options, truth),
-            Some(row) if variant.is_base(&config)? => Ok(Row {
+            Some(row) if variant.is_base(&options.config)? => Ok(Row {
                 note: row.note.clone().or(Some(Note::SameAsBase)),
                 ..row.clone()
             }),
@@ -101,12 +104,13 @@ pub fn ablate(
             Some(_) => measure(variant, &base, options, truth),
         };
         let row = match measured {
-            Err(error @ PipelineError::Interrupted { .. }) => {
+            Err(error @ LabError::Pipeline(PipelineError::Interrupted { .. })) => {
                 return Err(interrupted(error, index, all.len()));
             }
             Err(error) => {
                 let reason = with_causes(&error);
-                on_event(Event::Warning(format!("{}: {reason}", variant.name)));
+                let text = format!("{}: {reason}", variant.name);
+                on_event(Event::Warning(Warning::new(WarningKind::Part, text)));
                 Row {
                     note: Some(Note::Failed(reason)),
                     ..Row::default()
@@ -125,35 +129,25 @@ pub fn ablate(
 }
 
 /// What an interrupted training means for the ablation that it is part of.
-fn interrupted(error: PipelineError, done: usize, all: usize) -> PipelineError {
+fn interrupted(error: LabError, done: usize, all: usize) -> LabError {
     match error {
-        PipelineError::Interrupted { .. } => PipelineError::AblationInterrupted { done, all },
+        LabError::Pipeline(PipelineError::Interrupted { .. }) => {
+            LabError::AblationInterrupted { done, all }
+        }
         error => error,
     }
 }
 
-/// The configuration of a run as it is asked for now. What its scene has decided
-/// stays: the background with all that follows, and the back end for
-/// [`BackEnd::Auto`].
-fn settled(asked: &Config, run: &Config) -> Config {
-    let mut config = run.clone();
-    config.distill.clone_from(&asked.distill);
-    if asked.distill.back_end == BackEnd::Auto {
-        config.distill.back_end = run.distill.back_end;
-    }
-    config
-}
-
 impl Variant {
     /// `config` with what the variant changes.
-    fn apply(&self, config: &Config) -> Result<Config, PipelineError> {
+    fn apply(&self, config: &Config) -> Result<Config, LabError> {
         let overrides: Vec<String> = self.overrides.iter().map(ToString::to_string).collect();
         // They are part of the program, and a test applies them all.
-        apply_overrides(config, &overrides).map_err(PipelineError::Override)
+        Ok(apply_overrides(config, &overrides)?)
     }
 
     /// Whether the variant leaves `config` as it is.
-    fn is_base(&self, config: &Config) -> Result<bool, PipelineError> {
+    fn is_base(&self, config: &Config) -> Result<bool, LabError> {
         Ok(self.apply(config)? == *config)
     }
 }
@@ -164,7 +158,7 @@ fn run_variant(
     options: &RunOptions,
     cancelled: &AtomicBool,
     on_event: OnEvent<'_>,
-) -> Result<OpenedRun, PipelineError> {
+) -> Result<OpenedRun, LabError> {
     let out = options.out.join(variant.slug);
     if !folder::is_finished(&out) {
         let options = RunOptions {
@@ -176,7 +170,7 @@ fn run_variant(
         };
         reconstruct(&options, cancelled, on_event)?;
     }
-    open_run(
+    Ok(open_run(
         &out,
         Some(&options.scene),
         options.backend,
@@ -185,14 +179,18 @@ fn run_variant(
             memory_limit: options.memory_limit,
             cancelled: None,
         },
-        Ok,
+        Ok::<_, PipelineError>,
         &mut |event| {
             // What the scene is like has been told by the run.
-            if !matches!(event, Event::Note(_) | Event::Warning(_)) {
+            let told = matches!(
+                event,
+                Event::Note(_) | Event::Decided(_) | Event::Warning(_)
+            );
+            if !told {
                 on_event(event);
             }
         },
-    )
+    )?)
 }
 
 /// Distils a variant from the field of `run` and measures the result. If it has no
@@ -202,10 +200,11 @@ fn measure(
     run: &OpenedRun,
     options: &RunOptions,
     truth: &Truth,
-) -> Result<Row, PipelineError> {
-    let config = variant.apply(&settled(&options.config, &run.config))?;
+) -> Result<Row, LabError> {
+    let plan = run.replan(&variant.apply(&run.asked)?)?;
     let start = Instant::now();
-    let distilled = distill(&run.scene, &run.field, &config, &mut |_| Ok(()))?;
+    let distilled = distill(&run.scene, &run.field, &plan, &mut |_| Ok(()));
+    let distilled = distilled.map_err(PipelineError::from)?;
     let seconds = start.elapsed().as_secs_f64();
     let document = distilled.document(&run.scene);
     if !variant.trains {
@@ -213,7 +212,14 @@ fn measure(
         file::create_dir(&folder)?;
         write_json(&folder.join("wireframe.json"), &document)?;
     }
-    row(variant, run, &config, &document.wireframe(), truth, seconds)
+    row(
+        variant,
+        run,
+        plan.config(),
+        &document.wireframe(),
+        truth,
+        seconds,
+    )
 }
 
 /// Everything but the names of the variant.
@@ -224,7 +230,7 @@ fn row(
     wireframe: &Wireframe3d,
     truth: &Truth,
     distillation_seconds: f64,
-) -> Result<Row, PipelineError> {
+) -> Result<Row, LabError> {
     let protocol = NeatAbc {
         thresholds: vec![truth.threshold],
         ..NeatAbc::default()
@@ -303,49 +309,31 @@ fn masked_out(scene: &Scene, config: &Config) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::background::Background;
-    use crate::preset::Preset;
-
-    #[test]
-    fn what_the_scene_has_decided_stays() {
-        let mut asked = Preset::Fast.config();
-        let mut run = asked.clone();
-        run.data.background = Some(Background::Photo);
-        run.train.loss.mask = 0.0;
-        run.distill.back_end = BackEnd::Tracks;
-        asked.distill.rays_per_segment = 3;
-        let config = settled(&asked, &run);
-        assert_eq!(config.distill.back_end, BackEnd::Tracks);
-        assert_eq!(config.distill.rays_per_segment, 3);
-        assert_eq!((&config.data, &config.train), (&run.data, &run.train));
-
-        asked.distill.back_end = BackEnd::Paper;
-        assert_eq!(settled(&asked, &run).distill, asked.distill);
-    }
+    use neat_pipeline::config::Preset;
 
     #[test]
     fn variants_that_change_nothing_are_known() {
-        let same = |preset: Preset, back_end| {
+        let same = |preset: Preset, assembler| {
             let mut config = preset.config();
-            config.distill.back_end = back_end;
-            let all = variants(back_end).into_iter();
+            config.distill.back_end = Choice::Given(assembler);
+            let all = variants(assembler).into_iter();
             all.filter(|variant| variant.is_base(&config).unwrap())
                 .map(|variant| variant.slug)
                 .collect::<Vec<_>>()
         };
-        for back_end in [BackEnd::Fast, BackEnd::Tracks] {
+        for assembler in [Assembler::Fast, Assembler::Tracks] {
             assert_eq!(
-                same(Preset::Fast, back_end),
+                same(Preset::Fast, assembler),
                 ["base", "direction-no-clustering", "attraction-10"]
             );
         }
         assert_eq!(
-            same(Preset::PaperAbc, BackEnd::Paper),
+            same(Preset::PaperAbc, Assembler::Paper),
             ["base", "direction-clustering", "attraction-10", "paper"]
         );
         for preset in [Preset::PaperDtu, Preset::PaperBlendedmvs] {
             assert_eq!(
-                same(preset, BackEnd::Paper),
+                same(preset, Assembler::Paper),
                 ["base", "direction-clustering", "attraction-5", "paper"]
             );
         }
@@ -357,7 +345,7 @@ mod tests {
             step: 1,
             checkpoint: "base/checkpoints".into(),
         };
-        let error = interrupted(training, 2, 20);
+        let error = interrupted(training.into(), 2, 20);
         assert_eq!(error.to_string(), "interrupted: 2 of 20 variants are done");
     }
 }

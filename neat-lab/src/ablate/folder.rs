@@ -1,12 +1,12 @@
 //! The folder of an ablation: one request, which its `ablation.json` states.
 
 use super::table::{Row, to_csv, to_markdown};
-use crate::config::Config;
-use crate::error::PipelineError;
-use crate::manifest::Status;
-use crate::reconstruct::RunOptions;
-use crate::run_dir::{RunDir, malformed, read_error};
-use neat_core::file;
+use crate::error::LabError;
+use neat_core::{SceneError, file};
+use neat_pipeline::config::Config;
+use neat_pipeline::manifest::Status;
+use neat_pipeline::reconstruct::RunOptions;
+use neat_pipeline::run_dir::{RunDir, RunDirError};
 use serde::Serialize;
 use serde_json::Value;
 use std::fs;
@@ -47,7 +47,7 @@ enum Found {
 /// # Errors
 /// If the folder holds another ablation or anything else, or cannot be read or
 /// written.
-pub(super) fn claim(options: &RunOptions) -> Result<(), PipelineError> {
+pub(super) fn claim(options: &RunOptions) -> Result<(), LabError> {
     let out = &options.out;
     let scene = std::path::absolute(&options.scene);
     let request = Request {
@@ -64,7 +64,7 @@ pub(super) fn claim(options: &RunOptions) -> Result<(), PipelineError> {
     // Both by way of a text: reading may round the last digit of a number.
     let asked: Value = serde_json::from_slice(&text).map_err(|error| malformed(&path, &error))?;
     if let Some(what) = obstacle(&find(out)?, &asked) {
-        return Err(PipelineError::OtherAblation {
+        return Err(LabError::OtherAblation {
             out: out.clone(),
             what,
         });
@@ -73,7 +73,21 @@ pub(super) fn claim(options: &RunOptions) -> Result<(), PipelineError> {
     Ok(file::write_atomically(&path, &text)?)
 }
 
-fn find(out: &Path) -> Result<Found, PipelineError> {
+fn malformed(path: &Path, error: &serde_json::Error) -> RunDirError {
+    RunDirError::Malformed {
+        path: path.into(),
+        reason: error.to_string(),
+    }
+}
+
+fn read_error(path: &Path, source: io::Error) -> SceneError {
+    SceneError::Read {
+        path: path.into(),
+        source,
+    }
+}
+
+fn find(out: &Path) -> Result<Found, LabError> {
     let entries = match fs::read_dir(out) {
         Ok(entries) => entries,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Found::Nothing),
@@ -133,7 +147,7 @@ pub(super) fn is_finished(run: &Path) -> bool {
 ///
 /// # Errors
 /// If a file cannot be written.
-pub(super) fn write_tables(out: &Path, rows: &[Row]) -> Result<(), PipelineError> {
+pub(super) fn write_tables(out: &Path, rows: &[Row]) -> Result<(), LabError> {
     file::write_atomically(&out.join(TABLE), to_markdown(rows).as_bytes())?;
     file::write_atomically(&out.join(TABLE_FOR_PROGRAMS), to_csv(rows).as_bytes())?;
     Ok(())
@@ -142,9 +156,9 @@ pub(super) fn write_tables(out: &Path, rows: &[Row]) -> Result<(), PipelineError
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::preset::Preset;
-    use crate::run_dir::Existing;
     use neat_core::MemoryLimit;
+    use neat_pipeline::config::Preset;
+    use neat_pipeline::run_dir::Existing;
     use neat_tensor::Backend;
     use serde_json::json;
     use std::time::Duration;

@@ -3,11 +3,13 @@
 //! Every time stands beside a yardstick of the same run: a large matrix product
 //! on the same backend.
 
-use crate::latents::fit_latents;
-use crate::preset::Preset;
-use crate::scene::scaled_for;
+use crate::error::LabError;
 use burn::tensor::{DType, Device, Tensor, TensorData};
+use neat_core::MemoryLimit;
 use neat_core::synthetic::{SyntheticScene, generate};
+use neat_pipeline::config::Preset;
+use neat_pipeline::plan::{Machine, settle};
+use neat_pipeline::scene::scaled_for;
 use neat_sdf::ImplicitNetwork;
 use neat_tensor::backend::software_driver;
 use neat_tensor::random::{Purpose, stream};
@@ -128,7 +130,7 @@ pub fn benchmark(
     seconds: f64,
     plain: bool,
     progress: &mut dyn FnMut(&str, f64),
-) -> Result<Benchmark, TrainError> {
+) -> Result<Benchmark, LabError> {
     let kernels = if plain {
         Kernels::plain()
     } else {
@@ -150,9 +152,14 @@ pub fn benchmark(
             let done = (i as f64 + fraction) / presets.len() as f64;
             progress(&format!("{preset}: {step}"), done);
         };
-        let mut config = preset.config();
-        let scene = scaled_for(&config.data, views.clone());
-        fit_latents(&mut config, &scene);
+        let asked = preset.config();
+        let scene = scaled_for(&asked.data, views.clone());
+        let machine = Machine {
+            backend,
+            memory_limit: MemoryLimit::NONE,
+        };
+        let (plan, _) = settle(&asked, &scene, machine, None)?;
+        let config = plan.config();
         let mut training = config.training();
         training.kernels = kernels.clone();
         let mut trainer = Trainer::new(&scene, &training, 0, device)?;
@@ -449,12 +456,17 @@ mod tests {
     fn every_preset_trains_on_the_scene() {
         let views = generate(&views()).unwrap().scene;
         for preset in Preset::ALL {
-            let mut config = preset.config();
-            config.train.rays = 8;
-            config.train.eikonal.uniform_points = Some(8);
-            let scene = scaled_for(&config.data, views.clone());
-            fit_latents(&mut config, &scene);
-            let mut trainer = Trainer::new(&scene, &config.training(), 0, &Device::flex()).unwrap();
+            let mut asked = preset.config();
+            asked.train.rays = 8;
+            asked.train.eikonal.uniform_points = Some(8);
+            let scene = scaled_for(&asked.data, views.clone());
+            let machine = Machine {
+                backend: Backend::Flex,
+                memory_limit: MemoryLimit::NONE,
+            };
+            let (plan, _) = settle(&asked, &scene, machine, None).unwrap();
+            let training = plan.config().training();
+            let mut trainer = Trainer::new(&scene, &training, 0, &Device::flex()).unwrap();
             trainer.step(SCHEDULE).unwrap();
             let rows = trainer.rows();
             let all = [rows.sampler, rows.samples, rows.full, rows.segment];

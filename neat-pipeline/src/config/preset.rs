@@ -1,6 +1,6 @@
 //! Configurations by name.
 
-use crate::config::Config;
+use super::Config;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
@@ -9,11 +9,11 @@ use toml::{Table, Value};
 /// A named configuration to start from.
 ///
 /// ```
-/// use neat_pipeline::preset::Preset;
+/// use neat_pipeline::config::Preset;
 ///
 /// let preset: Preset = "fast".parse()?;
 /// assert!(preset.config().train.steps > 0);
-/// # Ok::<(), neat_pipeline::preset::UnknownPreset>(())
+/// # Ok::<(), neat_pipeline::config::UnknownPreset>(())
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -62,14 +62,14 @@ impl Preset {
     /// Its configuration files, with comments that say where the values are from;
     /// later ones lie on top of earlier ones.
     fn layers(self) -> &'static [&'static str] {
-        const PAPER: &str = include_str!("../presets/paper.toml");
-        const FAST: &str = include_str!("../presets/fast.toml");
+        const PAPER: &str = include_str!("../../presets/paper.toml");
+        const FAST: &str = include_str!("../../presets/fast.toml");
         match self {
-            Self::PaperAbc => &[PAPER, include_str!("../presets/paper-abc.toml")],
-            Self::PaperDtu => &[PAPER, include_str!("../presets/paper-dtu.toml")],
-            Self::PaperBlendedmvs => &[PAPER, include_str!("../presets/paper-blendedmvs.toml")],
+            Self::PaperAbc => &[PAPER, include_str!("../../presets/paper-abc.toml")],
+            Self::PaperDtu => &[PAPER, include_str!("../../presets/paper-dtu.toml")],
+            Self::PaperBlendedmvs => &[PAPER, include_str!("../../presets/paper-blendedmvs.toml")],
             Self::Fast => &[FAST],
-            Self::Balanced => &[FAST, include_str!("../presets/balanced.toml")],
+            Self::Balanced => &[FAST, include_str!("../../presets/balanced.toml")],
         }
     }
 
@@ -120,7 +120,7 @@ impl FromStr for Preset {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::overrides::apply_overrides;
+    use crate::config::apply_overrides;
     use neat_gjp::JunctionCount;
     use neat_train::config::TrainingConfig;
 

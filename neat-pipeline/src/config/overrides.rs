@@ -10,7 +10,7 @@
 //! --set 'train.adam={ beta1 = 0.9, beta2 = 0.99 }'
 //! ```
 
-use crate::config::Config;
+use super::Config;
 use serde_json::Value;
 
 /// Why an override cannot be applied.
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn a_new_kind_forgets_the_keys_of_the_old_one() {
-        let config = crate::preset::Preset::Fast.config();
+        let config = crate::config::Preset::Fast.config();
         let text = "train.sampler.kind=uniform".to_owned();
         let uniform = apply_overrides(&config, &[text]).unwrap();
         assert_eq!(
@@ -235,7 +235,7 @@ mod tests {
             neat_sdf::RaySamplerConfig::ErrorBound(sampler) => Some(sampler.stop),
             _ => None,
         };
-        let config = crate::preset::Preset::PaperAbc.config();
+        let config = crate::config::Preset::PaperAbc.config();
         assert_eq!(stop(&config), Some(StopRule::Batch));
         let text = "train.sampler.stop=ray".to_owned();
         let config = apply_overrides(&config, &[text]).unwrap();

@@ -1,0 +1,184 @@
+//! What was asked, and a scene and a machine to do it with: what will be done.
+//!
+//! A [`Config`] may leave values to the scene and the machine. [`settle`] decides them,
+//! once, tells what it has decided and why, and checks the whole. What runs is the
+//! [`Plan`]: nothing after it changes a setting.
+
+mod background;
+mod latents;
+mod step_memory;
+mod without_effect;
+
+pub use step_memory::{bytes_per_ray, rows_of_step};
+pub(crate) use without_effect::{changes_of_presets, settings_without_effect};
+
+use crate::config::{Assembler, Background, Choice, Config};
+use crate::event::Decision;
+use neat_core::{MemoryLimit, Scene, SceneError};
+use neat_gjp::JunctionCount;
+use neat_tensor::Backend;
+use neat_train::TrainError;
+use std::fmt;
+
+/// Slope of the sphere's distance, as published for DTU.
+const SPHERE_SLOPE: f64 = 20.0;
+
+/// What a run does: a configuration that leaves nothing open and has been checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    config: Config,
+    background: Option<Background>,
+    assembler: Assembler,
+}
+
+/// Why there is no plan.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// An image that the decision needs cannot be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The configuration contradicts itself.
+    #[error(transparent)]
+    Config(#[from] TrainError),
+    /// A value that a scene decides is still open.
+    #[error("{0} is open: a scene has to decide it")]
+    Open(&'static str),
+}
+
+/// What a run has of the machine.
+#[derive(Clone, Copy, Debug)]
+pub struct Machine {
+    /// What computes, never [`Backend::Auto`].
+    pub backend: Backend,
+    /// How much memory may be used.
+    pub memory_limit: MemoryLimit,
+}
+
+impl Plan {
+    /// The plan that `config` is, if it leaves nothing open.
+    ///
+    /// # Errors
+    /// If something is open or contradicts itself.
+    pub fn new(mut config: Config) -> Result<Self, PlanError> {
+        let background = match config.data.background {
+            None => None,
+            Some(Choice::Given(background)) => Some(background),
+            Some(Choice::Auto) => return Err(PlanError::Open("data.background")),
+        };
+        let assembler = match config.distill.back_end {
+            Choice::Given(assembler) => assembler,
+            // It follows from the background alone.
+            Choice::Auto if background == Some(Background::Photo) => Assembler::Tracks,
+            Choice::Auto => Assembler::Fast,
+        };
+        config.distill.back_end = Choice::Given(assembler);
+        config.training().validate()?;
+        Ok(Self {
+            config,
+            background,
+            assembler,
+        })
+    }
+
+    /// The configuration, with every choice made.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// What lies behind the object; `None` where nothing follows from it.
+    pub fn background(&self) -> Option<Background> {
+        self.background
+    }
+
+    /// What assembles the wireframe.
+    pub fn assembler(&self) -> Assembler {
+        self.assembler
+    }
+}
+
+/// Decides what `asked` leaves open, by the scene and the machine, and tells it. What
+/// an `earlier` part of the run has decided stays.
+///
+/// For a photograph the border of the sphere is put behind the scene and the silhouette
+/// term is dropped. A configuration without `data.background` stays as it is.
+///
+/// # Errors
+/// If an image lies in a file that cannot be read, or the whole contradicts itself.
+pub fn settle(
+    asked: &Config,
+    scene: &Scene,
+    machine: Machine,
+    earlier: Option<&Plan>,
+) -> Result<(Plan, Vec<Decision>), PlanError> {
+    let mut decisions = Vec::new();
+    let mut decide = |setting: &str, value: &dyn fmt::Display, reason: String| {
+        decisions.push(Decision {
+            setting: setting.to_owned(),
+            value: value.to_string(),
+            reason,
+        });
+    };
+    let mut config = asked.clone();
+    if asked.data.background == Some(Choice::Auto) {
+        let background = match earlier.and_then(Plan::background) {
+            Some(background) => background,
+            None => {
+                let (background, reason) = background::background(scene, machine.memory_limit)?;
+                decide("data.background", &background, reason);
+                background
+            }
+        };
+        config.data.background = Some(Choice::Given(background));
+    }
+    if config.data.background == Some(Choice::Given(Background::Photo)) {
+        if asked.train.loss.mask != 0.0 {
+            config.train.loss.mask = 0.0;
+            let reason = "as photographs show no silhouettes".to_owned();
+            decide("train.loss.mask", &0, reason);
+        }
+        if asked.model.implicit.bounding_sphere_slope == 0.0 {
+            config.model.implicit.bounding_sphere_slope = SPHERE_SLOPE;
+            let reason = "as the sphere stands for all that is behind the scene".to_owned();
+            let setting = "model.implicit.bounding_sphere_slope";
+            decide(setting, &SPHERE_SLOPE, reason);
+        }
+    }
+    if asked.model.perceiver.junctions.fixed().is_none() {
+        let kept = earlier.and_then(|plan| plan.config.model.perceiver.junctions.fixed());
+        let count = kept.unwrap_or_else(|| {
+            let wireframes = scene.views.iter().map(|view| &view.wireframe);
+            let count = latents::latents_for(wireframes, asked.data.min_segment_score);
+            let reason = "as the 2D wireframes have junctions".to_owned();
+            decide("model.perceiver.junctions", &count, reason);
+            count
+        });
+        config.model.perceiver.junctions = JunctionCount::Fixed(count);
+    }
+    let mut plan = Plan::new(config)?;
+    if asked.distill.back_end == Choice::Auto {
+        let reason = match plan.background {
+            Some(Background::Photo) => "for photographs",
+            Some(Background::Black) => "for an object on a black background",
+            None => "where nothing is said of the background",
+        };
+        decide("distill.back_end", &plan.assembler, reason.to_owned());
+    }
+    if asked.train.ray_chunk.is_none() {
+        plan.config.train.ray_chunk = match earlier {
+            // A run keeps the passes that it began with, whatever memory is here.
+            Some(plan) => plan.config.train.ray_chunk,
+            // A GPU has memory of its own.
+            None if machine.backend == Backend::Wgpu => None,
+            None => {
+                step_memory::ray_chunk(&plan.config, machine.memory_limit).map(|(chunk, reason)| {
+                    decide("train.ray_chunk", &chunk, reason);
+                    chunk
+                })
+            }
+        };
+    }
+    Ok((plan, decisions))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,129 @@
+use super::*;
+use crate::config::Preset;
+use neat_core::synthetic::{SyntheticScene, generate};
+
+const MACHINE: Machine = Machine {
+    backend: Backend::Flex,
+    memory_limit: MemoryLimit::NONE,
+};
+
+/// Of an object before black.
+fn black() -> Scene {
+    let small = SyntheticScene {
+        views: 4,
+        image_size: 48,
+        min_visible_length: 2.0,
+        ..SyntheticScene::default()
+    };
+    generate(&small).unwrap().scene
+}
+
+/// The same before something else.
+fn photographs() -> Scene {
+    let mut scene = black();
+    for view in &mut scene.views {
+        let mut image = view.image.read().unwrap().into_owned();
+        for pixel in image.pixels_mut() {
+            pixel.0 = pixel.0.map(|c| c.max(90));
+        }
+        view.image = image.into();
+    }
+    scene
+}
+
+fn settled(asked: &Config, scene: &Scene) -> (Plan, Vec<String>) {
+    let (plan, decisions) = settle(asked, scene, MACHINE, None).unwrap();
+    (plan, decisions.into_iter().map(|d| d.setting).collect())
+}
+
+#[test]
+fn an_object_before_black_gets_the_fast_back_end() {
+    let asked = Preset::Fast.config();
+    let (plan, decisions) = settled(&asked, &black());
+    assert_eq!(plan.background(), Some(Background::Black));
+    assert_eq!(plan.assembler(), Assembler::Fast);
+    assert_eq!(plan.config().train, asked.train);
+    assert_eq!(plan.config().model, asked.model);
+    assert_eq!(decisions, ["data.background", "distill.back_end"]);
+}
+
+#[test]
+fn photographs_get_a_sphere_behind_them_and_line_tracks() {
+    let (plan, decisions) = settled(&Preset::Fast.config(), &photographs());
+    assert_eq!(plan.background(), Some(Background::Photo));
+    assert_eq!(plan.assembler(), Assembler::Tracks);
+    let config = plan.config();
+    assert_eq!(config.train.loss.mask, 0.0);
+    assert_eq!(config.model.implicit.bounding_sphere_slope, SPHERE_SLOPE);
+    assert_eq!(
+        decisions,
+        [
+            "data.background",
+            "train.loss.mask",
+            "model.implicit.bounding_sphere_slope",
+            "distill.back_end",
+        ]
+    );
+}
+
+#[test]
+fn what_is_given_or_decided_stays() {
+    let (plan, _) = settled(&Preset::Fast.config(), &photographs());
+    // As the runs of earlier versions have it.
+    let (again, decisions) = settled(plan.config(), &black());
+    assert_eq!(again, plan);
+    assert!(decisions.is_empty(), "{decisions:?}");
+    let (published, decisions) = settled(&Preset::PaperDtu.config(), &photographs());
+    assert_eq!(published.config(), &Preset::PaperDtu.config());
+    assert!(decisions.is_empty(), "{decisions:?}");
+}
+
+#[test]
+fn what_an_earlier_part_of_a_run_has_decided_stays() {
+    let mut asked = Preset::Fast.config();
+    asked.model.perceiver.junctions = JunctionCount::AUTO;
+    let (mut first, decisions) = settled(&asked, &photographs());
+    assert!(decisions.contains(&"model.perceiver.junctions".to_owned()));
+    first.config.model.perceiver.junctions = JunctionCount::Fixed(99);
+    first.config.train.ray_chunk = Some(7);
+    let (again, _) = settle(&asked, &black(), MACHINE, Some(&first)).unwrap();
+    assert_eq!(again, first);
+    // But not against what is given.
+    asked.distill.back_end = Choice::Given(Assembler::Paper);
+    asked.train.ray_chunk = Some(8);
+    let (other, _) = settle(&asked, &black(), MACHINE, Some(&first)).unwrap();
+    assert_eq!(other.assembler(), Assembler::Paper);
+    assert_eq!(other.config().train.ray_chunk, Some(8));
+}
+
+#[test]
+fn steps_are_taken_in_passes_where_memory_is_short_and_nobody_has_decided() {
+    let mut asked = Preset::PaperAbc.config();
+    let scene = black();
+    let chunk = |asked: &Config, machine: Machine| {
+        let (plan, decisions) = settle(asked, &scene, machine, None).unwrap();
+        (plan.config.train.ray_chunk, decisions.len())
+    };
+    let small = Machine {
+        memory_limit: MemoryLimit::of_bytes(2 << 30),
+        ..MACHINE
+    };
+    assert_eq!(chunk(&asked, MACHINE), (None, 0));
+    assert!(matches!(chunk(&asked, small), (Some(350..512), 1)));
+    let on_gpu = Machine {
+        backend: Backend::Wgpu,
+        ..small
+    };
+    assert_eq!(chunk(&asked, on_gpu), (None, 0));
+    asked.train.ray_chunk = Some(999);
+    assert_eq!(chunk(&asked, small), (Some(999), 0));
+}
+
+#[test]
+fn what_is_open_or_contradicts_itself_is_no_plan() {
+    let open = Plan::new(Preset::Fast.config()).unwrap_err();
+    assert!(open.to_string().contains("data.background"), "{open}");
+    let mut config = Preset::PaperAbc.config();
+    config.train.rays = 0;
+    assert!(matches!(Plan::new(config), Err(PlanError::Config(_))));
+}
