@@ -5,8 +5,7 @@ use clap::Args;
 use neat_core::file_cache::FileCache;
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
 use neat_core::{LoadOptions, MemoryLimit, SphereChoice};
-use neat_pipeline::config::DataConfig;
-use neat_pipeline::config::Preset;
+use neat_pipeline::config::{DataConfig, Preset};
 use neat_pipeline::scene::load_options;
 use std::fmt;
 

@@ -19,11 +19,17 @@ fn reconstruct_leaves_every_result() {
     assert!(stdout(&assert).contains("wireframe.json"));
 
     let run = scene.file("run");
-    let config: toml::Table = fs::read_to_string(run.join("config.toml"))
-        .unwrap()
-        .parse()
-        .unwrap();
-    assert_eq!(config["train"]["steps"].as_integer(), Some(2));
+    let read = |name: &str| -> toml::Table {
+        let text = fs::read_to_string(run.join(name)).unwrap();
+        text.parse().unwrap()
+    };
+    let (asked, plan) = (read("config.toml"), read("plan.toml"));
+    for config in [&asked, &plan] {
+        assert_eq!(config["train"]["steps"].as_integer(), Some(2));
+    }
+    assert_eq!(asked["distill"]["back_end"].as_str(), Some("auto"));
+    assert_eq!(plan["distill"]["back_end"].as_str(), Some("fast"));
+    assert_eq!(plan["data"]["background"].as_str(), Some("black"));
     let manifest = json(&run.join("manifest.json"));
     assert_eq!(manifest["status"], "finished");
     assert_eq!(manifest["steps"], 2);
@@ -59,7 +65,7 @@ fn reconstruct_leaves_every_result() {
     // The same once more, on one thread.
     let again = scene.path("again");
     neat(&["reconstruct", &scene.path("scene"), "--out", &again])
-        .args(["--config", &scene.path("run/config.toml")])
+        .args(["--config", &scene.path("run/plan.toml")])
         .args(["--backend", "flex", "--threads", "1"])
         .assert()
         .success();
@@ -71,6 +77,66 @@ fn reconstruct_leaves_every_result() {
         read_wireframe(&scene.file("again/wireframe.json")).unwrap(),
         wireframe
     );
+}
+
+#[test]
+fn programs_read_what_is_decided_and_what_has_no_effect() {
+    let scene = TestScene::new();
+    let mut command = scene.run("reconstruct", "1");
+    command.args(["--progress", "json"]);
+    command.args(["--set", "distill.tracks.occlusion_test=true"]);
+    let assert = command.assert().success();
+    let events: Vec<Value> = stderr(&assert)
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let has = |event: &str, key: &str, value: &str| {
+        let is = |told: &Value| told["event"] == event && told[key] == value;
+        events.iter().any(is)
+    };
+    assert!(has("stage_started", "stage", "train"), "{events:?}");
+    assert!(has("stage_finished", "stage", "export"), "{events:?}");
+    assert!(has("decision", "setting", "data.background"), "{events:?}");
+    assert!(has("decision", "setting", "scene sphere"), "{events:?}");
+    assert!(has("warning", "kind", "no_effect"), "{events:?}");
+    let manifest = json(&scene.file("run/manifest.json"));
+    let warnings = manifest["warnings"].as_array().unwrap();
+    let warning = warnings.iter().find(|w| w["kind"] == "no_effect").unwrap();
+    let message = warning["message"].as_str().unwrap();
+    assert!(
+        message.contains("distill.tracks.occlusion_test"),
+        "{message}"
+    );
+    let decisions = manifest["decisions"].as_array().unwrap();
+    let black = decisions.iter().find(|d| d["setting"] == "data.background");
+    assert_eq!(black.unwrap()["value"], "black");
+}
+
+#[test]
+fn a_run_of_an_earlier_version_is_continued_and_distilled() {
+    let scene = TestScene::new();
+    scene.run("train", "1").assert().success();
+    // There what was settled was in config.toml, and a warning was its text.
+    let plan = scene.file("run/plan.toml");
+    let settled = fs::read(&plan).unwrap();
+    fs::rename(&plan, scene.file("run/config.toml")).unwrap();
+    let mut manifest = json(&scene.file("run/manifest.json"));
+    manifest.as_object_mut().unwrap().remove("decisions");
+    manifest["warnings"] = serde_json::json!(["a warning"]);
+    fs::write(scene.file("run/manifest.json"), manifest.to_string()).unwrap();
+
+    neat(&["distill", &scene.path("run"), "--backend", "flex"])
+        .assert()
+        .success();
+    // As if it had not ended.
+    let mut manifest = json(&scene.file("run/manifest.json"));
+    assert_eq!(manifest["warnings"][0]["message"], "a warning");
+    manifest["status"] = "interrupted".into();
+    fs::write(scene.file("run/manifest.json"), manifest.to_string()).unwrap();
+    let resume = || scene.run("reconstruct", "1").arg("--resume").assert();
+    resume().success();
+    assert_eq!(fs::read(&plan).unwrap(), settled);
+    assert_eq!(fs::read(scene.file("run/config.toml")).unwrap(), settled);
 }
 
 #[test]

@@ -45,7 +45,12 @@ fn results_do_not_depend_on_it() {
         assert!(a == b, "{} bytes and {} bytes", a.len(), b.len());
     };
     same(&only_checkpoint(&plenty), &only_checkpoint(&little));
-    for file in ["wireframe.json", "wireframe.png", "config.toml"] {
+    for file in [
+        "wireframe.json",
+        "wireframe.png",
+        "config.toml",
+        "plan.toml",
+    ] {
         same(&plenty.join(file), &little.join(file));
     }
     for folder in ["detections", "overlays"] {

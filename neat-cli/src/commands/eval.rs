@@ -15,8 +15,7 @@ use neat_eval::{
     StructureScore, foreign,
 };
 use neat_pipeline::config::Preset;
-use neat_pipeline::resources::Resources;
-use neat_pipeline::resources::default_limit;
+use neat_pipeline::resources::{Resources, default_limit};
 use neat_pipeline::scene::prepare_scene;
 use neat_wireframe::ViewObservation;
 use neat_wireframe::evidence::EdgeSupportConfig;

@@ -14,8 +14,7 @@ use neat_export::{
 };
 use neat_pipeline::event::{Event, Stage};
 use neat_pipeline::reconstruct::open_run;
-use neat_pipeline::resources::Resources;
-use neat_pipeline::resources::default_limit;
+use neat_pipeline::resources::{Resources, default_limit};
 use neat_pipeline::run_dir::RunDir;
 use neat_wireframe::export::read_json;
 use std::fs;

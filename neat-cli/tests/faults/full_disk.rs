@@ -98,6 +98,7 @@ fn a_full_disk_at_any_write_is_reported_and_loses_nothing() {
     let full_at: Vec<&str> = full_at.iter().map(|path| path.to_str().unwrap()).collect();
     for file in [
         "config.toml",
+        "plan.toml",
         "manifest.json",
         "metrics.jsonl",
         "junctions.jsonl",
