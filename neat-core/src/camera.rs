@@ -70,15 +70,32 @@ impl Intrinsics {
         }
     }
 
+    /// Rectangular pixels: focal lengths and principal point, in pixels.
+    pub fn new(fx: f64, fy: f64, cx: f64, cy: f64) -> Self {
+        let skew = 0.0;
+        Self {
+            fx,
+            fy,
+            cx,
+            cy,
+            skew,
+        }
+    }
+
     /// Square pixels, and the principal point in the middle of an image of
     /// `size` = (width, height) whose corner is the origin.
     pub fn centered(focal_length: f64, (width, height): (u32, u32)) -> Self {
+        let (cx, cy) = (f64::from(width) / 2.0, f64::from(height) / 2.0);
+        Self::new(focal_length, focal_length, cx, cy)
+    }
+
+    /// With focal lengths that are `factor` times as long.
+    pub fn with_focal_factor(self, factor: f64) -> Self {
         Self {
-            fx: focal_length,
-            fy: focal_length,
-            cx: f64::from(width) / 2.0,
-            cy: f64::from(height) / 2.0,
-            skew: 0.0,
+            fx: self.fx * factor,
+            fy: self.fy * factor,
+            skew: self.skew * factor,
+            ..self
         }
     }
 

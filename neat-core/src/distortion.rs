@@ -77,6 +77,24 @@ pub enum Distortion {
 }
 
 impl Distortion {
+    /// [`Self::Brown`] of the first radial coefficients, at most six; the others are
+    /// zero.
+    pub fn brown(radial: &[f64], tangential: [f64; 2]) -> Self {
+        Self::Brown {
+            radial: filled(radial),
+            tangential,
+        }
+    }
+
+    /// [`Self::Fisheye`] of the first radial coefficients, at most six, and no others.
+    pub fn fisheye(radial: &[f64]) -> Self {
+        Self::Fisheye {
+            radial: filled(radial),
+            tangential: [0.0; 2],
+            thin_prism: [0.0; 4],
+        }
+    }
+
     /// Whether all coefficients are zero and rays are not bent. A fisheye lens
     /// bends them with any coefficients.
     pub fn is_none(&self) -> bool {
@@ -315,6 +333,15 @@ impl Distortion {
             _ => return None,
         })
     }
+}
+
+/// The first coefficients, and zero for those that a simpler model does not have.
+pub(crate) fn filled<const N: usize>(first: &[f64]) -> [f64; N] {
+    let mut all = [0.0; N];
+    for (number, coefficient) in all.iter_mut().zip(first) {
+        *number = *coefficient;
+    }
+    all
 }
 
 /// Samples between the axis and a point in which a fold is looked for.

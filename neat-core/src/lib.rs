@@ -3,6 +3,37 @@
 //! Everything here is plain `f64` geometry on [`nalgebra`] types: no learning
 //! framework, so any program can embed it.
 //!
+//! ```
+//! use neat_core::synthetic::{SyntheticScene, generate};
+//! use neat_core::{LoadOptions, layout, load_scene};
+//!
+//! // A solid with exact truth, seen by four cameras …
+//! let config = SyntheticScene { views: 4, image_size: 64, ..SyntheticScene::default() };
+//! let data = generate(&config)?;
+//! // … written as files, and read back as any scene is, in whatever layout.
+//! let dir = tempfile::tempdir()?;
+//! layout::abc::write_scene(&data.scene, dir.path())?;
+//! let loaded = load_scene(dir.path(), &LoadOptions::default())?;
+//! for view in &loaded.scene.views {
+//!     let junction = view.camera.project(&data.truth.junctions[0]);
+//!     println!("{}: {} segments, {}", view.name, view.wireframe.edges.len(), junction.pixel);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! | where | what |
+//! | --- | --- |
+//! | [`Camera`], [`Intrinsics`], [`Distortion`], [`Undistortion`], [`Downscaling`] | from a point in space to a pixel of a photograph, and to one of an image without a lens |
+//! | [`LineSegment`], [`Wireframe2d`], [`Wireframe3d`] | what is found in images, and what is sought |
+//! | [`Scene`], [`View`], [`ViewImage`], [`SparsePoint`], [`SceneSphere`] | posed images in one world |
+//! | [`load_scene`], [`LoadOptions`], [`layout`] | a folder → a scene; one file for each of eleven layouts |
+//! | [`mod@convert`] | a scene → files for other programs |
+//! | [`hawp_json`], [`ground_truth`], [`npz`], [`ply`], [`image_file`] | single files |
+//! | [`file`], [`file_cache`], [`MemoryLimit`] | whole files or none, results kept, bounded memory |
+//! | [`synthetic`] | scenes with exact truth |
+//! | [`assignment`] | the matching of least cost |
+//! | [`SceneError`], [`with_causes`] | what can be wrong, with file, view and remedy |
+//!
 //! Conventions (all of neat):
 //! - OpenCV camera axes: +X right, +Y down, +Z forward.
 //! - *Image coordinates* are the coordinates that the intrinsics speak of. A
@@ -12,6 +43,8 @@
 //! - *Calibrated* means image coordinates after `K⁻¹`, on the plane z = 1.
 //! - *World* is the frame of a scene's cameras; [`Scene::original_from_world`]
 //!   leads back to the frame of the user's files.
+//!
+//! [`load_scene`] tells through `tracing` what it chose: `NEAT_LOG=neat_core=debug`.
 
 #![forbid(unsafe_code)]
 

@@ -81,7 +81,7 @@ impl Undistortion {
         let border = undistortion.border();
         let corners = undistortion.corners();
         let mut fits = |factor: f64| {
-            undistortion.pinhole = with_focal_factor(intrinsics, factor);
+            undistortion.pinhole = intrinsics.with_focal_factor(factor);
             // The corners are farthest from the axis: folds reach them first.
             corners
                 .iter()
@@ -99,12 +99,13 @@ impl Undistortion {
         }
         for _ in 0..BISECTIONS {
             let middle = (below + factor) / 2.0;
-            match fits(middle) {
-                true => factor = middle,
-                false => below = middle,
+            if fits(middle) {
+                factor = middle;
+            } else {
+                below = middle;
             }
         }
-        undistortion.pinhole = with_focal_factor(intrinsics, factor);
+        undistortion.pinhole = intrinsics.with_focal_factor(factor);
         let one_to_one = (border.iter()).all(|pixel| undistortion.is_before_fold(pixel));
         one_to_one.then_some(undistortion).ok_or(no_factor)
     }
@@ -245,15 +246,6 @@ impl Undistortion {
 
 /// In pixels: above the rounding of coordinates, below what can be seen.
 const ROUNDING: f64 = 1e-9;
-
-fn with_focal_factor(intrinsics: &Intrinsics, factor: f64) -> Intrinsics {
-    Intrinsics {
-        fx: intrinsics.fx * factor,
-        fy: intrinsics.fy * factor,
-        skew: intrinsics.skew * factor,
-        ..*intrinsics
-    }
-}
 
 /// Parts of a pixel in which [`bilinear`] counts: integers are twice as fast as
 /// floats here, and this is finer than [`MAX_NODE_ERROR`].
@@ -426,7 +418,7 @@ mod tests {
             };
             assert!(!outside(&undistortion, 0.01), "{lens:?}");
             let mut smaller = undistortion.clone();
-            smaller.pinhole = with_focal_factor(&INTRINSICS, factor * 0.999);
+            smaller.pinhole = INTRINSICS.with_focal_factor(factor * 0.999);
             assert!(
                 outside(&smaller, 0.0) || factor == FOCAL_FACTORS.0,
                 "{lens:?}"

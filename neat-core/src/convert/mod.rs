@@ -17,6 +17,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use tracing::info_span;
 
 /// For which programs a scene is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,6 +60,7 @@ pub const POINTS_FILE: &str = "sparse_points.ply";
 /// # Ok::<(), neat_core::SceneError>(())
 /// ```
 pub fn convert(scene: &Scene, format: SceneFormat, dir: &Path) -> Result<(), SceneError> {
+    let _span = info_span!("convert", ?format, dir = %dir.display()).entered();
     scene.validate()?;
     file::write_dir_atomically(dir, |dir| {
         // What can be refused comes before the images, which take long.

@@ -28,9 +28,10 @@ fn color(scene: &Scene, point: &SparsePoint) -> Result<[u8; 3], SceneError> {
     // Coordinates below zero become 0, beyond the image they find no pixel.
     let (column, row) = (index.x as u32, index.y as u32);
     let (width, height) = view.image.dimensions();
-    match column < width && row < height {
-        true => Ok(view.image.pixel(column, row)?.0),
-        false => Ok(GRAY),
+    if column < width && row < height {
+        Ok(view.image.pixel(column, row)?.0)
+    } else {
+        Ok(GRAY)
     }
 }
 

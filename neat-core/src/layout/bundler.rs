@@ -163,10 +163,7 @@ fn posed_image(camera: &Camera, image: PathBuf, size: (u32, u32)) -> PosedImage 
         name: file_stem(&image),
         image,
         intrinsics: Intrinsics::centered(camera.focal_length, size),
-        distortion: Distortion::Brown {
-            radial: [camera.k1, camera.k2, 0.0, 0.0, 0.0, 0.0],
-            tangential: [0.0; 2],
-        },
+        distortion: Distortion::brown(&[camera.k1, camera.k2], [0.0; 2]),
         world_from_camera: pose_of(&(flip * camera.rotation), &center),
         size: Some(size),
     }

@@ -108,7 +108,7 @@ fn parse(
 ///
 /// # Errors
 /// If the left 3×3 block is singular or a number is not finite.
-pub fn decompose_projection(
+fn decompose_projection(
     projection: &Matrix4<f64>,
 ) -> Result<(Intrinsics, Matrix4<f64>), CameraError> {
     if projection.iter().any(|x| !x.is_finite()) {

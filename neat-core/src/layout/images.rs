@@ -64,9 +64,10 @@ const REMEDY: &str = "put the image there or remove its pose";
 /// [`read_size`], and one pixel for an image that is not there: its view will be
 /// left out, or the scene refused.
 pub(super) fn size_of_posed(path: &Path) -> Result<(u32, u32), SceneError> {
-    match path.exists() {
-        true => read_size(path),
-        false => Ok((1, 1)),
+    if path.exists() {
+        read_size(path)
+    } else {
+        Ok((1, 1))
     }
 }
 
@@ -138,9 +139,10 @@ pub(super) fn locate(path: &Path, dirs: &[PathBuf], name: &str) -> Result<PathBu
             return Ok(image);
         }
     }
-    Ok(match is_from_elsewhere {
-        true => last_dir.join(file_name),
-        false => first_dir.join(parts.iter().collect::<PathBuf>()),
+    Ok(if is_from_elsewhere {
+        last_dir.join(file_name)
+    } else {
+        first_dir.join(parts.iter().collect::<PathBuf>())
     })
 }
 
@@ -172,10 +174,11 @@ pub(super) fn decode_rgb(
         return Err(SceneError::image(path, ImageError::IoError(error)));
     }
     let image = image_file::decode(bytes, path, u32::MAX)?;
-    if image.color().has_alpha() {
-        return Ok(blend(&image, background));
-    }
-    Ok(image.into_rgb8())
+    Ok(if image.color().has_alpha() {
+        blend(&image, background)
+    } else {
+        image.into_rgb8()
+    })
 }
 
 /// Whether a JPEG file goes on to its end marker (ITU-T T.81, annex B). What

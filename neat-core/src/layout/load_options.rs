@@ -2,7 +2,7 @@
 
 use super::poses::Poses;
 use super::{Layout, PixelCenter, PoseConvention};
-use crate::{Intrinsics, MemoryLimit, SphereChoice};
+use crate::{MemoryLimit, SphereChoice};
 use std::path::PathBuf;
 
 /// How [`crate::load_scene`] reads a scene.
@@ -75,14 +75,9 @@ impl LoadOptions {
         let focal_scale = scale * self.focal_scale.unwrap_or(1.0);
         for view in &mut poses.views {
             view.world_from_camera = convention.world_from_camera(&view.world_from_camera);
-            let stored = view.intrinsics;
-            view.intrinsics = Intrinsics {
-                fx: stored.fx * focal_scale,
-                fy: stored.fy * focal_scale,
-                cx: stored.cx * scale,
-                cy: stored.cy * scale,
-                skew: stored.skew * focal_scale,
-            };
+            view.intrinsics = view.intrinsics.with_focal_factor(focal_scale);
+            view.intrinsics.cx *= scale;
+            view.intrinsics.cy *= scale;
             if self.intrinsics_scale.is_some() {
                 // Saturates where the factor makes no sense.
                 let scaled = |pixels: u32| (f64::from(pixels) * scale).round() as u32;

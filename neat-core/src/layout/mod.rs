@@ -5,19 +5,19 @@
 
 pub mod abc;
 mod binary_reader;
-pub mod bundler;
-pub mod cameras_json;
-pub mod colmap;
-pub mod dtu;
+mod bundler;
+mod cameras_json;
+mod colmap;
+pub(crate) mod dtu;
 mod images;
 mod input_files;
 mod load;
 mod load_options;
 mod masks;
-pub mod meta_data_json;
-pub mod nvm;
-pub mod openmvg;
-pub mod openmvs;
+mod meta_data_json;
+mod nvm;
+mod openmvg;
+mod openmvs;
 mod photograph;
 mod pixel_center;
 mod point_files;
@@ -26,9 +26,9 @@ pub(crate) mod poses;
 mod reconstruction;
 mod rectify;
 mod sphere;
-pub mod strecha;
+mod strecha;
 mod text_lines;
-pub mod transforms_json;
+mod transforms_json;
 mod view_reader;
 mod warning;
 
@@ -54,31 +54,30 @@ pub enum Layout {
     Abc,
     /// `image/`, `hawp/`, and `cameras_sphere.npz` or `cameras.npz` with
     /// `world_mat_i` and `scale_mat_i`: DTU and BlendedMVS, as IDR, VolSDF and
-    /// NeuS store them. See [`dtu`].
+    /// NeuS store them.
     Dtu,
     /// `cameras.json` that names every image with its intrinsics and pose, and
-    /// `hawp/`. See [`cameras_json`].
+    /// `hawp/`.
     CamerasJson,
     /// `transforms.json` or `transforms_train.json` that names every image with
-    /// its pose, and `hawp/`: Blender's NeRF scenes, instant-ngp, nerfstudio. See
-    /// [`transforms_json`].
+    /// its pose, and `hawp/`: Blender's NeRF scenes, instant-ngp, nerfstudio.
     TransformsJson,
     /// `images/`, `hawp/`, and a COLMAP model in `sparse/0/`, `sparse/` or the
-    /// folder itself, binary or text. See [`colmap`].
+    /// folder itself, binary or text.
     Colmap,
     /// `meta_data.json` that names every image with its pose, and `hawp/`:
-    /// sdfstudio and EMAP. See [`meta_data_json`].
+    /// sdfstudio and EMAP.
     MetaDataJson,
-    /// `sfm_data.json` of OpenMVG, and `hawp/`. See [`openmvg`].
+    /// `sfm_data.json` of OpenMVG, and `hawp/`.
     OpenMvg,
-    /// A `.mvs` scene in OpenMVS's interface format, and `hawp/`. See [`openmvs`].
+    /// A `.mvs` scene in OpenMVS's interface format, and `hawp/`.
     OpenMvs,
-    /// A `.nvm` file of VisualSfM, and `hawp/`. See [`nvm`].
+    /// A `.nvm` file of VisualSfM, and `hawp/`.
     VisualSfm,
-    /// `bundle.out` and `list.txt` of Bundler, and `hawp/`. See [`bundler`].
+    /// `bundle.out` and `list.txt` of Bundler, and `hawp/`.
     Bundler,
     /// One `NAME.jpg.camera` per image, and `hawp/`: the benchmark of Strecha and
-    /// others. See [`strecha`].
+    /// others.
     Strecha,
 }
 

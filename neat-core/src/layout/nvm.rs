@@ -44,15 +44,6 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
     parse(&bytes, &path, &dirs, images::size_of_posed)
 }
 
-/// The calibration that all images share, if the first line gives one.
-#[derive(Clone, Copy)]
-struct FixedK {
-    fx: f64,
-    cx: f64,
-    fy: f64,
-    cy: f64,
-}
-
 /// How a camera's pose is written.
 #[derive(Clone, Copy, PartialEq)]
 enum PoseFormat {
@@ -62,7 +53,8 @@ enum PoseFormat {
 
 struct Header {
     pose_format: PoseFormat,
-    fixed: Option<FixedK>,
+    /// The calibration that all images share, if the first line gives one.
+    fixed: Option<Intrinsics>,
 }
 
 /// A model as the file has it.
@@ -172,7 +164,7 @@ fn header(mut line: Line) -> Result<Header, SceneError> {
     let [fx, cx, fy, cy] = line.numbers("FixedK fx cx fy cy")?;
     Ok(Header {
         pose_format,
-        fixed: Some(FixedK { fx, cx, fy, cy }),
+        fixed: Some(Intrinsics::new(fx, fy, cx, cy)),
     })
 }
 
@@ -251,19 +243,7 @@ fn posed_image(
     let image = images::locate(path, dirs, &image)?;
     let name = file_stem(&image);
     let (intrinsics, size) = match header.fixed {
-        Some(FixedK { fx, cx, fy, cy }) => {
-            let skew = 0.0;
-            (
-                Intrinsics {
-                    fx,
-                    fy,
-                    cx,
-                    cy,
-                    skew,
-                },
-                None,
-            )
-        }
+        Some(intrinsics) => (intrinsics, None),
         None => {
             let size = size_of(&image)?;
             (Intrinsics::centered(camera.focal_length, size), Some(size))

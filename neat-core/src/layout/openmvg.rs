@@ -238,31 +238,23 @@ impl Context<'_> {
     }
 
     fn lens(&self, camera: &Typed) -> Result<(Intrinsics, Distortion), SceneError> {
-        let brown = |radial: [f64; 3], tangential| {
-            let [k1, k2, k3] = radial;
-            Distortion::Brown {
-                radial: [k1, k2, k3, 0.0, 0.0, 0.0],
-                tangential,
-            }
-        };
         let distortion = match camera.class.as_deref().unwrap_or("without type") {
             "pinhole" => Distortion::None,
             "pinhole_radial_k1" => {
-                let [k1] = self.required("camera", camera, "disto_k1")?;
-                brown([k1, 0.0, 0.0], [0.0; 2])
+                let radial: [f64; 1] = self.required("camera", camera, "disto_k1")?;
+                Distortion::brown(&radial, [0.0; 2])
             }
-            "pinhole_radial_k3" => brown(self.required("camera", camera, "disto_k3")?, [0.0; 2]),
+            "pinhole_radial_k3" => {
+                let radial: [f64; 3] = self.required("camera", camera, "disto_k3")?;
+                Distortion::brown(&radial, [0.0; 2])
+            }
             "pinhole_brown_t2" => {
                 let [k1, k2, k3, t1, t2] = self.required("camera", camera, "disto_t2")?;
-                brown([k1, k2, k3], [t1, t2])
+                Distortion::brown(&[k1, k2, k3], [t1, t2])
             }
             "fisheye" => {
-                let [k1, k2, k3, k4] = self.required("camera", camera, "fisheye")?;
-                Distortion::Fisheye {
-                    radial: [k1, k2, k3, k4, 0.0, 0.0],
-                    tangential: [0.0; 2],
-                    thin_prism: [0.0; 4],
-                }
+                let radial: [f64; 4] = self.required("camera", camera, "fisheye")?;
+                Distortion::fisheye(&radial)
             }
             other => {
                 return Err(self.error(&format!(
@@ -271,16 +263,9 @@ impl Context<'_> {
                 )));
             }
         };
-        let focal_length = self.required("camera", camera, "focal_length")?;
+        let f = self.required("camera", camera, "focal_length")?;
         let [cx, cy] = self.required("camera", camera, "principal_point")?;
-        let intrinsics = Intrinsics {
-            fx: focal_length,
-            fy: focal_length,
-            cx,
-            cy,
-            skew: 0.0,
-        };
-        Ok((intrinsics, distortion))
+        Ok((Intrinsics::new(f, f, cx, cy), distortion))
     }
 
     fn required<T: DeserializeOwned>(

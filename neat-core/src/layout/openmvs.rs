@@ -40,9 +40,10 @@ const VERTEX_VIEW_BYTES: u64 = 8;
 /// The file of this layout in the folder `dir`, where there is one.
 pub(super) fn find(dir: &Path) -> Option<PathBuf> {
     let usual = dir.join(FILE_NAME);
-    match usual.is_file() {
-        true => Some(usual),
-        false => images::first_with_ending(dir, "mvs"),
+    if usual.is_file() {
+        Some(usual)
+    } else {
+        images::first_with_ending(dir, "mvs")
     }
 }
 

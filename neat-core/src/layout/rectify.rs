@@ -33,15 +33,10 @@ impl Rectification {
         max_image_size: Option<u32>,
     ) -> Result<Self, ViewError> {
         let size = (photograph.width, photograph.height);
-        let undistortion = match posed.distortion.is_none() {
-            true => None,
-            false => Some(Undistortion::new(
-                &photograph.intrinsics,
-                &posed.distortion,
-                size,
-                pixel_center,
-            )?),
-        };
+        let lens = (!posed.distortion.is_none()).then_some(&posed.distortion);
+        let undistortion = lens
+            .map(|lens| Undistortion::new(&photograph.intrinsics, lens, size, pixel_center))
+            .transpose()?;
         Ok(Self {
             photograph,
             distortion: posed.distortion,

@@ -34,13 +34,18 @@ impl<'a> Line<'a> {
             .map_err(|_| self.error(&format!("`{field}` cannot be {what}")))
     }
 
-    /// The next fields as numbers.
-    pub fn numbers<const N: usize>(&mut self, what: &str) -> Result<[f64; N], SceneError> {
+    /// The next fields as numbers, each with a name of its own.
+    pub fn named<const N: usize>(&mut self, names: [&str; N]) -> Result<[f64; N], SceneError> {
         let mut numbers = [0.0; N];
-        for number in &mut numbers {
-            *number = self.parse(what)?;
+        for (number, name) in numbers.iter_mut().zip(names) {
+            *number = self.parse(name)?;
         }
         Ok(numbers)
+    }
+
+    /// The next fields as numbers.
+    pub fn numbers<const N: usize>(&mut self, what: &str) -> Result<[f64; N], SceneError> {
+        self.named([what; N])
     }
 
     /// Whether all fields have been taken.

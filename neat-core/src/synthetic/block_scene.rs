@@ -177,23 +177,20 @@ impl BlockScene {
             if rng.random::<f64>() < 0.5 {
                 part = part.reversed();
             }
-            if rng.random::<f64>() < self.fragment_rate {
+            let is_fragmented = rng.random::<f64>() < self.fragment_rate;
+            let segments = if is_fragmented {
                 let gap = 0.3 + 0.4 * rng.random::<f64>();
                 let [before, after] = [-0.5, 0.5].map(|half| gap + half * FRAGMENT_GAP);
-                let fragments = [[0.0, before], [after, 1.0]];
-                for [from, to] in fragments.map(|ends| ends.map(|t| part.point_at(t))) {
-                    let source = BlockSource {
-                        edge: stretch.edge,
-                        segment: LineSegment3::new(from, to),
-                        is_whole: false,
-                    };
-                    found.push_true(&camera, source, self.noise_in_pixels, &mut rng);
-                }
+                let between = |from, to| LineSegment3::new(part.point_at(from), part.point_at(to));
+                vec![between(0.0, before), between(after, 1.0)]
             } else {
+                vec![part]
+            };
+            for segment in segments {
                 let source = BlockSource {
                     edge: stretch.edge,
-                    segment: part,
-                    is_whole: stretch.range == [0.0, 1.0],
+                    segment,
+                    is_whole: !is_fragmented && stretch.range == [0.0, 1.0],
                 };
                 found.push_true(&camera, source, self.noise_in_pixels, &mut rng);
             }

@@ -30,11 +30,7 @@ pub(super) fn detect(
 
     let (width, height) = config.size();
     let size = Vector2::new(f64::from(width), f64::from(height));
-    let mut wireframe = Wireframe2d {
-        width,
-        height,
-        ..Wireframe2d::default()
-    };
+    let mut wireframe = Wireframe2d::empty(width, height);
     let mut sources = Vec::new();
     let mut junction_vertices: Vec<(usize, usize)> = Vec::new();
 
@@ -51,7 +47,7 @@ pub(super) fn detect(
             }
             let noisy = exact + gaussian_pair(&mut noise) * config.noise_in_pixels;
             let inside = noisy.sup(&Vector2::zeros()).inf(&size);
-            let vertex = push_vertex(&mut wireframe, inside, high_score(score.random()));
+            let vertex = wireframe.push_vertex(inside, high_score(score.random()));
             junction_vertices.extend(junction.map(|junction| (junction, vertex)));
             vertex
         };
@@ -60,8 +56,7 @@ pub(super) fn detect(
             add_vertex(start, part.segment.start),
             add_vertex(end, part.segment.end),
         ];
-        wireframe.edges.push(edge);
-        wireframe.edge_scores.push(high_score(score.random()));
+        wireframe.push_edge(edge, high_score(score.random()));
         sources.push(Some(source));
     }
 
@@ -69,22 +64,15 @@ pub(super) fn detect(
         let edge = [(); 2].map(|()| {
             let [lower, upper] = bounds;
             let position = lower + (upper - lower).map(|extent| extent * clutter.random::<f64>());
-            push_vertex(&mut wireframe, position, low_score(clutter.random()))
+            wireframe.push_vertex(position, low_score(clutter.random()))
         });
-        wireframe.edges.push(edge);
-        wireframe.edge_scores.push(low_score(clutter.random()));
+        wireframe.push_edge(edge, low_score(clutter.random()));
         sources.push(None);
     }
     (wireframe, sources)
 }
 
 /// Adds a vertex and returns its index.
-fn push_vertex(wireframe: &mut Wireframe2d, position: Vector2<f64>, score: f64) -> usize {
-    wireframe.vertices.push(position);
-    wireframe.vertex_scores.push(score);
-    wireframe.vertices.len() - 1
-}
-
 /// From u in [0, 1) to a score in (0.06, 1], 0.94 in the median.
 fn high_score(u: f64) -> f64 {
     1.0 - (1.0 - MIN_SCORE) * u.powi(4)

@@ -39,7 +39,7 @@ pub(super) fn viewpoints(
 
 /// The camera at `center_in_world` with the origin in the middle of its image
 /// and the world's z axis upwards (the y axis, where z is nearly the view).
-fn looking_at_origin(center_in_world: Vector3<f64>, (width, height): (u32, u32)) -> Camera {
+fn looking_at_origin(center_in_world: Vector3<f64>, image_size: (u32, u32)) -> Camera {
     let forward = -center_in_world.normalize();
     let up = if forward.z.abs() < 0.99 {
         Vector3::z()
@@ -48,15 +48,10 @@ fn looking_at_origin(center_in_world: Vector3<f64>, (width, height): (u32, u32))
     };
     let right = forward.cross(&up).normalize();
     let down = forward.cross(&right);
-    let focal = FOCAL_PER_WIDTH * f64::from(width);
+    let (width, height) = image_size;
+    let focal_length = FOCAL_PER_WIDTH * f64::from(width);
     Camera {
-        intrinsics: Intrinsics {
-            fx: focal,
-            fy: focal,
-            cx: f64::from(width) / 2.0,
-            cy: f64::from(height) / 2.0,
-            skew: 0.0,
-        },
+        intrinsics: Intrinsics::centered(focal_length, image_size),
         world_from_camera: Matrix3::from_columns(&[right, down, forward]),
         center_in_world,
         width,

@@ -51,26 +51,25 @@ impl Wireframe2d {
             let Some((enter, leave)) = share_inside(&start, &end, &low, &high) else {
                 continue;
             };
-            let ends =
-                [(edge[0], enter), (edge[1], leave)].map(|(vertex, share)| match inside[vertex] {
-                    true => index[vertex],
-                    false => {
-                        let score = self.vertex_scores[vertex];
-                        clipped.push_vertex(start.lerp(&end, share), score)
-                    }
-                });
+            let ends = [(edge[0], enter), (edge[1], leave)].map(|(vertex, share)| {
+                if inside[vertex] {
+                    return index[vertex];
+                }
+                let score = self.vertex_scores[vertex];
+                clipped.push_vertex(start.lerp(&end, share), score)
+            });
             clipped.push_edge(ends, *score);
         }
         clipped
     }
 
-    fn push_vertex(&mut self, vertex: Vector2<f64>, score: f64) -> usize {
+    pub(crate) fn push_vertex(&mut self, vertex: Vector2<f64>, score: f64) -> usize {
         self.vertices.push(vertex);
         self.vertex_scores.push(score);
         self.vertices.len() - 1
     }
 
-    fn push_edge(&mut self, edge: [usize; 2], score: f64) {
+    pub(crate) fn push_edge(&mut self, edge: [usize; 2], score: f64) {
         self.edges.push(edge);
         self.edge_scores.push(score);
     }

@@ -1,5 +1,6 @@
 //! COLMAP's camera models: the meaning and order of their parameters.
 
+use crate::distortion::filled;
 use crate::{Distortion, Intrinsics};
 
 /// A camera model, by the order and meaning of its parameters.
@@ -104,14 +105,7 @@ impl CameraModel {
             }
             _ => return None,
         };
-        let intrinsics = Intrinsics {
-            fx,
-            fy,
-            cx,
-            cy,
-            skew: 0.0,
-        };
-        Some((intrinsics, bend.distortion(rest)))
+        Some((Intrinsics::new(fx, fy, cx, cy), bend.distortion(rest)))
     }
 }
 
@@ -120,19 +114,9 @@ impl Bend {
         match self {
             Brown => {
                 let [k1, k2, p1, p2, k3, k4, k5, k6] = filled(parameters);
-                Distortion::Brown {
-                    radial: [k1, k2, k3, k4, k5, k6],
-                    tangential: [p1, p2],
-                }
+                Distortion::brown(&[k1, k2, k3, k4, k5, k6], [p1, p2])
             }
-            Fisheye => {
-                let [k1, k2, k3, k4] = filled(parameters);
-                Distortion::Fisheye {
-                    radial: [k1, k2, k3, k4, 0.0, 0.0],
-                    tangential: [0.0; 2],
-                    thin_prism: [0.0; 4],
-                }
-            }
+            Fisheye => Distortion::fisheye(parameters),
             ThinPrismFisheye => {
                 let [k1, k2, p1, p2, k3, k4, s1, s2] = filled(parameters);
                 Distortion::ThinPrismFisheye {
@@ -165,15 +149,6 @@ impl Bend {
             }
         }
     }
-}
-
-/// The first parameters, and zero for those that a simpler model does not have.
-fn filled<const N: usize>(parameters: &[f64]) -> [f64; N] {
-    let mut all = [0.0; N];
-    for (number, parameter) in all.iter_mut().zip(parameters) {
-        *number = *parameter;
-    }
-    all
 }
 
 #[cfg(test)]

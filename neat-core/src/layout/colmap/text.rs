@@ -65,14 +65,8 @@ fn image(mut line: Line) -> Result<ColmapImage, SceneError> {
     }
     line.owner = Some(format!("view `{name}`"));
     let id = line.parse("IMAGE_ID")?;
-    let mut quaternion = [0.0; 4];
-    for (number, what) in quaternion.iter_mut().zip(["QW", "QX", "QY", "QZ"]) {
-        *number = line.parse(what)?;
-    }
-    let mut translation = [0.0; 3];
-    for (number, what) in translation.iter_mut().zip(["TX", "TY", "TZ"]) {
-        *number = line.parse(what)?;
-    }
+    let quaternion = line.named(["QW", "QX", "QY", "QZ"])?;
+    let translation = line.named(["TX", "TY", "TZ"])?;
     Ok(ColmapImage {
         id,
         name: name.into(),
@@ -109,7 +103,7 @@ pub(super) fn points(path: &Path, bytes: &[u8]) -> Result<Vec<ColmapPoint>, Scen
     let mut points = Vec::new();
     for mut line in records(path, bytes)? {
         let _id: u64 = line.parse("POINT3D_ID")?;
-        let position = [line.parse("X")?, line.parse("Y")?, line.parse("Z")?];
+        let position = line.named(["X", "Y", "Z"])?;
         for what in ["R", "G", "B"] {
             let _colour: u8 = line.parse(what)?;
         }

@@ -35,9 +35,10 @@ impl FrameContext<'_> {
             _ => self.first(|lens| lens.is_fisheye) == Some(true),
         };
         let [k1, k2, k3, k4, p1, p2] = self.coefficients()?;
-        let (unread, meaning) = match is_fisheye {
-            true => ([p1, p2], "tangential terms of a fisheye lens"),
-            false => ([k4, 0.0], "a fourth radial term of a perspective lens"),
+        let (unread, meaning) = if is_fisheye {
+            ([p1, p2], "tangential terms of a fisheye lens")
+        } else {
+            ([k4, 0.0], "a fourth radial term of a perspective lens")
         };
         if unread != [0.0; 2] {
             return Err(self.error(format_args!(
@@ -45,16 +46,10 @@ impl FrameContext<'_> {
                  undistort the images to pinhole cameras first"
             )));
         }
-        Ok(match is_fisheye {
-            true => Distortion::Fisheye {
-                radial: [k1, k2, k3, k4, 0.0, 0.0],
-                tangential: [0.0; 2],
-                thin_prism: [0.0; 4],
-            },
-            false => Distortion::Brown {
-                radial: [k1, k2, k3, 0.0, 0.0, 0.0],
-                tangential: [p1, p2],
-            },
+        Ok(if is_fisheye {
+            Distortion::fisheye(&[k1, k2, k3, k4])
+        } else {
+            Distortion::brown(&[k1, k2, k3], [p1, p2])
         })
     }
 
@@ -108,13 +103,8 @@ impl FrameContext<'_> {
         let fy = focal_y.map_or(Ok(fx), |focal| {
             self.pixels_of_focal("camera_angle_y", focal, height)
         })?;
-        Ok(Intrinsics {
-            fx,
-            fy,
-            cx: cx.unwrap_or(width / 2.0),
-            cy: cy.unwrap_or(height / 2.0),
-            skew: 0.0,
-        })
+        let (cx, cy) = (cx.unwrap_or(width / 2.0), cy.unwrap_or(height / 2.0));
+        Ok(Intrinsics::new(fx, fy, cx, cy))
     }
 
     fn pixels_of_focal(&self, key: &str, focal: Focal, extent: f64) -> Result<f64, SceneError> {
