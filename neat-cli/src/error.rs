@@ -1,8 +1,7 @@
 //! What ends a command early, and the exit code that tells scripts.
 
 use neat_batch::BatchError;
-use neat_core::synthetic::SyntheticError;
-use neat_core::{SceneError, with_causes};
+use neat_core::SceneError;
 use neat_eval::EvalError;
 use neat_lab::LabError;
 use neat_lab::compare_backends::CompareError;

@@ -17,7 +17,7 @@ mod scene_arguments;
 use clap::Parser;
 use commands::Cli;
 use error::CliError;
-use neat_pipeline::error::with_causes;
+use neat_core::with_causes;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

@@ -12,7 +12,7 @@ use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
 use neat_field::region_pixels::RegionPixels;
 use neat_pipeline::config::{Assembler, Choice, Config, apply_overrides};
 use neat_pipeline::distill::distill;
-use neat_pipeline::error::{PipelineError, with_causes};
+use neat_pipeline::error::PipelineError;
 use neat_pipeline::event::{Event, OnEvent, Stage, Warning, WarningKind};
 use neat_pipeline::reconstruct::{OpenedRun, RunOptions, open_run, reconstruct};
 use neat_pipeline::render::{every_nth_pixel, render_view};

@@ -182,7 +182,7 @@ fn fast(
     let views = ViewObservation::from_scene(scene, config.data.min_segment_score);
     let proposals = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f))?;
     let surface = field.surface_grid();
-    let result = fast_back_end::run(
+    let result = fast::run(
         &views,
         &proposals,
         &field.junctions(),

@@ -7,12 +7,10 @@ use crate::output;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use neat_core::file;
-use neat_core::ground_truth::GroundTruth;
 use neat_core::ply::read_points;
 use neat_eval::{
-    EdgeModel, EdgePointScores, EdgePoints, EditDistance, EvalError, EvaluationReport, GroundPlane,
-    LimapLength, NeatAbc, NeatSurface, ObservationMask, Protocol, ScannedSurface, Scores,
-    StructureScore, foreign,
+    EvalError, EvaluationInput, EvaluationOptions, EvaluationReport, GroundPlane, NeatAbc,
+    ObservationMask, Protocol, ScannedSurface, Scores, foreign,
 };
 use neat_pipeline::config::Preset;
 use neat_pipeline::resources::{Resources, default_limit};
@@ -127,22 +125,14 @@ fn protocol_parser() -> impl TypedValueParser<Value = Protocol> {
     PossibleValuesParser::new(values).try_map(|name| name.parse::<Protocol>())
 }
 
-/// What the protocols are given.
-struct Inputs {
-    predicted: EdgeModel,
-    before: Option<EdgeModel>,
-    truth: GroundTruth,
-    surface: ScannedSurface,
-}
-
 impl EvalArgs {
     pub fn run(self) -> Result<(), CliError> {
         let protocols = self.protocols();
         self.check(&protocols)?;
-        let inputs = self.read()?;
+        let (inputs, options) = (self.read()?, self.options());
         let mut reports = protocols
             .iter()
-            .map(|protocol| Ok(EvaluationReport::new(self.scores(*protocol, &inputs)?)))
+            .map(|protocol| Ok(EvaluationReport::new(protocol.evaluate(&inputs, &options)?)))
             .collect::<Result<Vec<_>, EvalError>>()?;
         if let Some(scene) = &self.scene {
             reports.push(self.supported_report(scene, &inputs)?);
@@ -253,7 +243,7 @@ impl EvalArgs {
         Ok(())
     }
 
-    fn read(&self) -> Result<Inputs, EvalError> {
+    fn read(&self) -> Result<EvaluationInput, EvalError> {
         let mut surface = ScannedSurface::default();
         if let Some(points) = &self.points {
             surface.points = read_points(points)?;
@@ -265,7 +255,7 @@ impl EvalArgs {
             surface.ground_plane = Some(GroundPlane::read(plane)?);
         }
         let truth = self.gt.as_deref().map(foreign::read_truth).transpose()?;
-        Ok(Inputs {
+        Ok(EvaluationInput {
             predicted: foreign::read(&self.pred)?,
             before: self.before.as_deref().map(foreign::read).transpose()?,
             truth: truth.unwrap_or_default(),
@@ -273,69 +263,21 @@ impl EvalArgs {
         })
     }
 
-    fn scores(&self, protocol: Protocol, inputs: &Inputs) -> Result<Scores, EvalError> {
-        let predicted = &inputs.predicted.wireframe;
-        let truth = &inputs.truth.wireframe;
-        Ok(match protocol {
-            Protocol::NeatAbc => {
-                let mut neat = NeatAbc::default();
-                replace(&mut neat.thresholds, &self.thresholds);
-                replace(&mut neat.matching, &self.matching.map(Matching::from));
-                let before = inputs.before.as_ref().map(|model| &model.wireframe);
-                Scores::NeatAbc(neat.evaluate(predicted, before, truth)?)
-            }
-            Protocol::NeatDtu => {
-                let neat = self.surface_protocol(NeatSurface::dtu());
-                Scores::NeatDtu(neat.evaluate(predicted, &inputs.surface)?)
-            }
-            Protocol::NeatBlendedMvs => {
-                let neat = self.surface_protocol(NeatSurface::blended_mvs());
-                // Not part of this protocol, even if given for another one.
-                let surface = ScannedSurface {
-                    points: inputs.surface.points.clone(),
-                    ..ScannedSurface::default()
-                };
-                Scores::NeatBlendedMvs(neat.evaluate(predicted, &surface)?)
-            }
-            Protocol::Emap => Scores::Emap(self.edge_points(EdgePoints::emap(), inputs)?),
-            Protocol::CurveGaussian => {
-                Scores::CurveGaussian(self.edge_points(EdgePoints::curve_gaussian(), inputs)?)
-            }
-            Protocol::EdgeGaussians => {
-                Scores::EdgeGaussians(self.edge_points(EdgePoints::edge_gaussians(), inputs)?)
-            }
-            Protocol::Nef => Scores::Nef(self.edge_points(EdgePoints::nef(), inputs)?),
-            Protocol::LimapHypersim | Protocol::LimapTnt => {
-                let is_hypersim = protocol == Protocol::LimapHypersim;
-                let mut limap = if is_hypersim {
-                    LimapLength::hypersim()
-                } else {
-                    LimapLength::tanks_and_temples()
-                };
-                replace(&mut limap.thresholds, &self.thresholds);
-                let scores = limap.evaluate(&predicted.segments(), &inputs.surface.points)?;
-                if is_hypersim {
-                    Scores::LimapHypersim(scores)
-                } else {
-                    Scores::LimapTnt(scores)
-                }
-            }
-            Protocol::Hss => {
-                let hss = StructureScore {
-                    seed: self.seed.unwrap_or_default(),
-                    ..StructureScore::default()
-                };
-                Scores::Hss(hss.evaluate(predicted, truth)?)
-            }
-            Protocol::Wed => Scores::Wed(EditDistance::default().evaluate(predicted, truth)?),
-        })
+    fn options(&self) -> EvaluationOptions {
+        EvaluationOptions {
+            thresholds: self.thresholds.clone(),
+            matching: self.matching.map(Matching::from),
+            max_distance: self.max_distance,
+            truth_scale: self.truth_scale,
+            seed: self.seed,
+        }
     }
 
     /// neat-abc against the part of the truth that the 2D wireframes of a scene support.
     fn supported_report(
         &self,
         scene: &Path,
-        inputs: &Inputs,
+        inputs: &EvaluationInput,
     ) -> Result<EvaluationReport, CliError> {
         let config = Preset::default().config();
         let cache = self.cache.open();
@@ -356,9 +298,11 @@ impl EvalArgs {
             &SupportedTruthConfig::default(),
         )
         .map(|point| prepared.scene.original_from_world.apply(point));
-        let mut neat = NeatAbc::default();
-        replace(&mut neat.thresholds, &self.thresholds);
-        replace(&mut neat.matching, &self.matching.map(Matching::from));
+        let published = NeatAbc::default();
+        let neat = NeatAbc {
+            thresholds: self.thresholds.clone().unwrap_or(published.thresholds),
+            matching: self.matching.map_or(published.matching, Matching::from),
+        };
         let smallest = neat
             .thresholds
             .iter()
@@ -376,30 +320,5 @@ impl EvalArgs {
             ),
             scores: Scores::NeatAbc(scores),
         })
-    }
-
-    fn surface_protocol(&self, published: NeatSurface) -> NeatSurface {
-        NeatSurface {
-            max_distance: self.max_distance.unwrap_or(published.max_distance),
-            seed: self.seed.unwrap_or_default(),
-            ..published
-        }
-    }
-
-    fn edge_points(
-        &self,
-        mut protocol: EdgePoints,
-        inputs: &Inputs,
-    ) -> Result<EdgePointScores, EvalError> {
-        replace(&mut protocol.thresholds, &self.thresholds);
-        replace(&mut protocol.truth_spacing_scale, &self.truth_scale);
-        protocol.evaluate(&inputs.predicted, &inputs.truth)
-    }
-}
-
-/// Puts a value that was given in the place of a published one.
-fn replace<T: Clone>(published: &mut T, given: &Option<T>) {
-    if let Some(given) = given {
-        published.clone_from(given);
     }
 }

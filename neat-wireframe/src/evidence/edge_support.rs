@@ -1,10 +1,6 @@
 //! In how many views a detection confirms an edge end by end.
 
-use crate::ViewObservation;
-use crate::projection::project_in_front;
-use nalgebra::Vector3;
 use neat_core::LineSegment2;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// When a view supports an edge, and how many views it takes.
@@ -76,69 +72,14 @@ pub struct SupportedEdge {
     pub visible_views: Option<usize>,
 }
 
-/// The support of each given edge, in the same order.
-///
-/// Edges that name a junction that does not exist have no support.
-pub fn edge_support(
-    views: &[ViewObservation],
-    junctions: &[Vector3<f64>],
-    edges: &[[usize; 2]],
-    config: &EdgeSupportConfig,
-) -> Vec<SupportedEdge> {
-    edges
-        .par_iter()
-        .map(|&[a, b]| SupportedEdge {
-            junctions: [a.min(b), a.max(b)],
-            support: views
-                .iter()
-                .filter(|view| {
-                    let project = |junction| project_in_front(&view.camera, junction);
-                    let projected = Option::zip(
-                        junctions.get(a).and_then(project),
-                        junctions.get(b).and_then(project),
-                    );
-                    projected.is_some_and(|(start, end)| {
-                        let edge = LineSegment2::new(start, end);
-                        view.segments.iter().any(|detection| {
-                            config.confirms(&edge, &detection.segment)
-                                || config.confirms(&edge, &detection.segment.reversed())
-                        })
-                    })
-                })
-                .count(),
-            visible_views: None,
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
 
     #[test]
     fn required_views_follow_the_recipe() {
         let config = EdgeSupportConfig::default();
         let required = [0, 1, 10, 12, 13, 20, 25, 100].map(|v| config.required_views(v));
         assert_eq!(required, [2, 2, 2, 2, 3, 4, 5, 5]);
-    }
-
-    #[test]
-    fn support_counts_the_views_with_a_detection_on_the_edge() {
-        let (junctions, edges) = cube();
-        let mut views = views_of_edges(&cameras_on_sphere(8), &junctions, &edges);
-        for view in &mut views[..3] {
-            view.segments.remove(0);
-        }
-        for view in &mut views[5..] {
-            view.segments[1].segment = view.segments[1].segment.reversed();
-        }
-        let config = EdgeSupportConfig::default();
-        let support = edge_support(&views, &junctions, &[edges[0], edges[1], [0, 7]], &config);
-        assert_eq!(support[0].support, 5);
-        assert_eq!(support[1].support, 8);
-        assert_eq!(support[2].support, 0);
-        let outside = edge_support(&views, &junctions, &[[0, 8]], &config);
-        assert_eq!(outside[0].support, 0);
     }
 }

@@ -3,8 +3,8 @@
 
 use neat_core::hawp_json;
 use neat_pipeline::config::Config;
+use neat_pipeline::config::Preset;
 use neat_pipeline::distill::paper_regions;
-use neat_pipeline::preset::Preset;
 use neat_tests::golden::Golden;
 use std::collections::BTreeSet;
 use std::path::Path;
