@@ -68,22 +68,30 @@ pub struct JunctionPerceiver {
 }
 
 impl PerceiverConfig {
+    /// The number of junctions, if there can be such a perceiver.
+    ///
+    /// # Errors
+    /// If the number is not decided, or there is no junction or no width.
+    pub fn validate(&self) -> Result<usize, NetworkSizeError> {
+        match self.junctions.fixed() {
+            None => Err("model.perceiver.junctions is not decided for this scene"),
+            Some(0) => Err("model.perceiver needs junctions"),
+            Some(_) if self.width == 0 => Err("model.perceiver needs a width"),
+            Some(junctions) => Ok(junctions),
+        }
+        .map_err(NetworkSizeError)
+    }
+
     /// Random latents and decoder.
     ///
     /// # Errors
-    /// If the number of junctions is not decided, or there is none.
+    /// As [`Self::validate`].
     pub fn init(
         &self,
         rng: &mut impl Rng,
         device: &Device,
     ) -> Result<JunctionPerceiver, NetworkSizeError> {
-        let junctions = match self.junctions.fixed() {
-            None => Err("model.perceiver.junctions is not decided for this scene"),
-            Some(0) => Err("model.perceiver needs junctions"),
-            Some(_) if self.width == 0 => Err("model.perceiver needs a width"),
-            Some(junctions) => Ok(junctions),
-        };
-        let junctions = junctions.map_err(NetworkSizeError)?;
+        let junctions = self.validate()?;
         let latents: Vec<f32> = (0..junctions * self.width)
             .map(|_| standard_normal(rng) as f32)
             .collect();

@@ -88,32 +88,42 @@ pub struct ImplicitNetwork {
 }
 
 impl ImplicitNetworkConfig {
+    /// Whether there can be such a network.
+    ///
+    /// # Errors
+    /// If there is no hidden layer, or a skip layer comes too late or leaves the layer
+    /// before it without outputs.
+    pub fn validate(&self) -> Result<(), NetworkSizeError> {
+        let encoded = 3 * (1 + 2 * self.octaves);
+        Err(NetworkSizeError(
+            if self.hidden_layers == 0 || self.width == 0 {
+                "model.implicit needs at least one hidden layer and a width above 0"
+            } else if self.skip_layer > 0 && self.skip_layer >= self.hidden_layers {
+                "model.implicit.skip_layer must come before the last hidden layer"
+            } else if self.skip_layer > 0 && self.width <= encoded {
+                "model.implicit.width must exceed the width of the encoding, 3 + 6 octaves, where a skip layer is used"
+            } else {
+                return Ok(());
+            },
+        ))
+    }
+
     /// A network that approximates a sphere (geometric initialisation, SAL,
     /// Atzmon & Lipman 2020, in the published variant: see `docs/parity.md`).
     ///
     /// # Errors
-    /// If there is no hidden layer, or a skip layer leaves the layer before it without
-    /// outputs.
+    /// As [`Self::validate`].
     pub fn init(
         &self,
         scene_radius: f64,
         rng: &mut impl Rng,
         device: &Device,
     ) -> Result<ImplicitNetwork, NetworkSizeError> {
-        if self.hidden_layers == 0 || self.width == 0 {
-            return Err(NetworkSizeError(
-                "model.implicit needs at least one hidden layer and a width above 0",
-            ));
-        }
+        self.validate()?;
         let encoding = PositionalEncoding {
             octaves: self.octaves,
         };
         let encoded = encoding.output_width(3);
-        if self.skip_layer > 0 && self.width <= encoded {
-            return Err(NetworkSizeError(
-                "model.implicit.width must exceed the width of the encoding, 3 + 6 octaves, where a skip layer is used",
-            ));
-        }
         let last = self.hidden_layers;
         let radius = self.initial_sphere * scene_radius;
         let mut layers = Vec::with_capacity(last + 1);

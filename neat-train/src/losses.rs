@@ -119,18 +119,18 @@ pub struct LossTerm {
     pub weight: fn(&LossConfig) -> f64,
     /// Its place among the logged values.
     pub value: fn(&mut Losses) -> &mut f64,
-    function: TermFunction,
+    mean_over: MeanOver,
+    function: fn(&TermInput<'_>) -> Option<Tensor<1>>,
 }
 
-/// What a term is computed from; `None` is a term that nothing was found for.
-#[derive(Clone, Copy, Debug)]
-enum TermFunction {
-    /// A mean over rays: that of a batch is the weighted mean of those of its parts.
-    OfRays(fn(&RayTerm<'_>) -> Option<Tensor<1>>),
-    /// A mean over gradients of the distance; parts of a batch add up likewise.
-    OfGradients(fn(&RayTerm<'_>) -> Option<Tensor<1>>),
-    /// Looks at all rays of a batch at once.
-    OfBatch(fn(&BatchTerm<'_>) -> Option<Tensor<1>>),
+/// What a term is a mean over: of rays and gradients, the mean over a batch is the
+/// weighted mean of those over its parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MeanOver {
+    Rays,
+    Gradients,
+    /// It looks at all rays of a batch at once.
+    Batch,
 }
 
 /// All terms, in the order in which they are added up and logged.
@@ -140,67 +140,73 @@ pub const LOSS_TERMS: [LossTerm; 7] = [
         what: "colour of rays, mean L1: `neat_sdf::losses::rgb_loss`",
         weight: |weights| weights.rgb,
         value: |losses| &mut losses.rgb,
-        function: TermFunction::OfRays(|rays| {
-            let rendered = rays.rendering.color.clone()?;
-            let observed = point_tensor(&rays.input.batch.colors, rays.device);
+        mean_over: MeanOver::Rays,
+        function: |rays| {
+            let rendered = rays.rendering?.color.clone()?;
+            let observed = point_tensor(&rays.step.batch.colors, rays.device);
             Some(rgb_loss(rendered, observed))
-        }),
+        },
     },
     LossTerm {
         name: "eikonal",
         what: "length of the distance's gradient: `neat_sdf::losses::eikonal_loss`",
         weight: |weights| weights.eikonal,
         value: |losses| &mut losses.eikonal,
-        function: TermFunction::OfGradients(|rays| rays.eikonal()),
+        mean_over: MeanOver::Gradients,
+        function: |rays| rays.eikonal(),
     },
     LossTerm {
         name: "mask",
         what: "silhouette on a black background: `neat_sdf::losses::mask_loss`",
         weight: |weights| weights.mask,
         value: |losses| &mut losses.mask,
-        function: TermFunction::OfRays(|rays| {
-            let silhouette = rays.input.batch.silhouette.clone();
-            let silhouette = TensorData::new(silhouette, [rays.input.batch.rays.len(), 1]);
+        mean_over: MeanOver::Rays,
+        function: |rays| {
             // Without a weight there is no black background, and no silhouette.
-            (rays.weights.mask > 0.0).then(|| {
-                let silhouette = Tensor::from_data(silhouette, rays.device);
-                mask_loss(rays.rendering.opacity.clone(), silhouette)
-            })
-        }),
+            let rendering = rays.rendering.filter(|_| rays.weights.mask > 0.0)?;
+            let silhouette = rays.step.batch.silhouette.clone();
+            let silhouette = TensorData::new(silhouette, [rays.step.batch.rays.len(), 1]);
+            let silhouette = Tensor::from_data(silhouette, rays.device);
+            Some(mask_loss(rendering.opacity.clone(), silhouette))
+        },
     },
     LossTerm {
         name: "segment",
         what: "3D segments in the image: `neat_field::segment_comparison::compare_segments`",
         weight: |weights| weights.segment,
         value: |losses| &mut losses.segment,
-        function: TermFunction::OfBatch(|batch| batch.segment.clone()),
+        mean_over: MeanOver::Batch,
+        function: |batch| batch.segment.clone(),
     },
     LossTerm {
         name: "junction_3d",
         what: "matched junctions in the world: `neat_gjp::junction_loss::JunctionMatching::loss`",
         weight: |weights| weights.junction_3d,
         value: |losses| &mut losses.junction_3d,
-        function: TermFunction::OfBatch(|batch| Some(batch.junctions.as_ref()?.in_world.clone())),
+        mean_over: MeanOver::Batch,
+        function: |batch| Some(batch.junctions.as_ref()?.in_world.clone()),
     },
     LossTerm {
         name: "junction_2d",
         what: "matched junctions in the image: `neat_gjp::junction_loss::JunctionMatching::loss`",
         weight: |weights| weights.junction_2d,
         value: |losses| &mut losses.junction_2d,
-        function: TermFunction::OfBatch(|batch| batch.junctions.as_ref()?.calibrated.clone()),
+        mean_over: MeanOver::Batch,
+        function: |batch| batch.junctions.as_ref()?.calibrated.clone(),
     },
     LossTerm {
         name: "points",
         what: "distance of sparse points: `neat_sdf::losses::point_loss`",
         weight: |weights| weights.points,
         value: |losses| &mut losses.points,
-        function: TermFunction::OfBatch(|batch| {
-            let points = batch.input.surface_points;
+        mean_over: MeanOver::Batch,
+        function: |batch| {
+            let points = batch.step.surface_points;
             (!points.is_empty()).then(|| {
                 let points = point_tensor(points, batch.device);
                 point_loss(batch.model.implicit_network.sdf_uncapped(points))
             })
-        }),
+        },
     },
 ];
 
@@ -224,20 +230,14 @@ pub struct StepInput<'a> {
     pub junctions_due: bool,
 }
 
-/// What the terms of some rays are made of.
-pub(crate) struct RayTerm<'a> {
+/// What terms are made of.
+pub(crate) struct TermInput<'a> {
     pub model: &'a NeatModel,
-    pub input: &'a StepInput<'a>,
-    pub rendering: &'a Rendering,
+    pub step: &'a StepInput<'a>,
     pub weights: &'a LossConfig,
     pub eikonal: &'a EikonalConfig,
-    pub device: &'a Device,
-}
-
-/// What the terms of a whole batch are made of.
-pub(crate) struct BatchTerm<'a> {
-    pub model: &'a NeatModel,
-    pub input: &'a StepInput<'a>,
+    /// For means over rays and gradients.
+    pub rendering: Option<&'a Rendering>,
     /// The segment loss, where it is not a sum over parts of the batch.
     pub segment: Option<Tensor<1>>,
     pub junctions: Option<JunctionLoss>,
@@ -247,18 +247,26 @@ pub(crate) struct BatchTerm<'a> {
 /// The value `[1]` of each term, as far as there is one, in the order of the table.
 pub(crate) type TermValues = [Option<Tensor<1>>; LOSS_TERMS.len()];
 
-impl RayTerm<'_> {
-    /// The terms that are means over these rays, or over gradients along them.
-    pub fn values(&self) -> TermValues {
-        LOSS_TERMS.map(|term| match term.function {
-            TermFunction::OfRays(f) | TermFunction::OfGradients(f) => f(self),
-            TermFunction::OfBatch(_) => None,
+impl TermInput<'_> {
+    /// All terms.
+    pub fn all_values(&self) -> TermValues {
+        LOSS_TERMS.map(|term| (term.function)(self))
+    }
+
+    /// The terms that parts of a batch have a share in, or those that they have none in;
+    /// the others are `None`.
+    pub fn values(&self, of_parts: bool) -> TermValues {
+        let wanted = |term: &LossTerm| (term.mean_over != MeanOver::Batch) == of_parts;
+        LOSS_TERMS.map(|term| {
+            Some(term)
+                .filter(wanted)
+                .and_then(|term| (term.function)(self))
         })
     }
 
     /// The eikonal term; `None` where no gradient is asked for.
     fn eikonal(&self) -> Option<Tensor<1>> {
-        let (input, rendering, device) = (self.input, self.rendering, self.device);
+        let (input, rendering, device) = (self.step, self.rendering?, self.device);
         let mut points = Vec::new();
         if !input.eikonal_points.is_empty() {
             points.push(point_tensor(input.eikonal_points, device));
@@ -291,25 +299,14 @@ impl RayTerm<'_> {
     }
 }
 
-impl BatchTerm<'_> {
-    /// Adds the terms that look at all rays at once to those of the rays.
-    pub fn add_values(&self, values: &mut TermValues) {
-        for (term, value) in LOSS_TERMS.iter().zip(values) {
-            if let TermFunction::OfBatch(f) = term.function {
-                *value = f(self);
-            }
-        }
-    }
-}
-
 impl LossTerm {
-    /// The share of the whole batch that a part of it has in this term, if that is a
-    /// mean over rays (`of_rays`) or gradients (`of_gradients`).
-    pub(crate) fn share(&self, of_rays: f64, of_gradients: f64) -> Option<f64> {
-        match self.function {
-            TermFunction::OfRays(_) => Some(of_rays),
-            TermFunction::OfGradients(_) => Some(of_gradients),
-            TermFunction::OfBatch(_) => None,
+    /// The share of a whole batch that a part of it has in this term, if it has shares:
+    /// those of rays and of gradients are given.
+    pub(crate) fn share(&self, [of_rays, of_gradients]: [f64; 2]) -> Option<f64> {
+        match self.mean_over {
+            MeanOver::Rays => Some(of_rays),
+            MeanOver::Gradients => Some(of_gradients),
+            MeanOver::Batch => None,
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::batch::Batch;
 use crate::config::TrainConfig;
 use crate::device_sampling::DeviceSampling;
 use crate::flops::StepRows;
-use crate::losses::{BatchTerm, LOSS_TERMS, LossConfig, Losses, RayTerm, StepInput, TermValues};
+use crate::losses::{LOSS_TERMS, Losses, StepInput, TermInput};
 use crate::model::{NeatModel, PlacedSamples, RenderRequest, Rendering};
 use burn::module::Module;
 use burn::optim::{GradientsAccumulator, GradientsParams};
@@ -374,14 +374,7 @@ pub fn step_loss(
     device: &Device,
 ) -> Result<StepLoss, AssignmentError> {
     let (rendering, rows) = render(model, input, beta, config, true, device);
-    let mut values = ray_values(model, input, &rendering, config, device);
-    let mut of_batch = BatchTerm {
-        model,
-        input,
-        segment: None,
-        junctions: None,
-        device,
-    };
+    let mut terms = term_input(model, input, config, Some(&rendering), device);
     let (mut rays, mut targets, mut assignment) = (Vec::new(), 0, Duration::ZERO);
     if let Some((ends, opacity)) = segments(&rendering) {
         let global = input.junctions_due.then(|| model.perceiver.junctions());
@@ -390,18 +383,16 @@ pub fn step_loss(
         let backend = model.kernels().of(&ends);
         let compared =
             compare_segments(backend, ends, opacity, &observed, counting, global.as_ref());
-        of_batch.segment = Some(compared.loss);
+        terms.segment = Some(compared.loss);
         rays = compared.rays;
         if let (Some(global), Some(in_world)) = (global, compared.also) {
             let start = Instant::now();
             let in_world: &[[f32; 3]] = in_world.as_chunks().0;
-            (targets, of_batch.junctions) =
-                match_junctions(&rays, global, in_world, input, config)?;
+            (targets, terms.junctions) = match_junctions(&rays, global, in_world, input, config)?;
             assignment = start.elapsed();
         }
     }
-    of_batch.add_values(&mut values);
-    let (total, terms) = config.loss.add_up(values, device);
+    let (total, terms) = config.loss.add_up(terms.all_values(), device);
     Ok(StepLoss {
         total,
         terms,
@@ -435,13 +426,7 @@ fn in_passes(
         segment: f64::from(compared.loss),
         ..Losses::default()
     };
-    let mut of_batch = BatchTerm {
-        model,
-        input,
-        segment: None,
-        junctions: None,
-        device,
-    };
+    let mut of_batch = term_input(model, input, config, None, device);
     let (mut targets, mut assignment) = (0, Duration::ZERO);
     if input.junctions_due && !compared.counted.is_empty() {
         let start = Instant::now();
@@ -451,7 +436,7 @@ fn in_passes(
         (targets, of_batch.junctions) = match_junctions(&rays, global, &in_world, input, config)?;
         assignment = start.elapsed();
     }
-    if let Some(loss) = add_batch_terms(&of_batch, &config.loss, &mut losses) {
+    if let Some(loss) = add_batch_terms(&of_batch, &mut losses) {
         sum.add(loss);
     }
 
@@ -467,9 +452,9 @@ fn in_passes(
         let of_rays = part.batch.rays.len() as f64 / input.batch.rays.len() as f64;
         let part_gradients = config.eikonal_rows(&part_rows);
         let of_gradients = part_gradients as f64 / gradient_rows.max(1) as f64;
-        let values = ray_values(model, &part_input, &rendering, config, device);
+        let of_part = term_input(model, &part_input, config, Some(&rendering), device);
         let shares = [of_rays, of_gradients];
-        let mut loss = add_shares(values, shares, &config.loss, &mut losses, device);
+        let mut loss = add_shares(&of_part, shares, &mut losses);
         if let Some((ends, _)) = segments(&rendering) {
             let gradient = of_ends.by_ref().take(ends.dims()[0]).flatten().copied();
             let linear = linear_in(ends, gradient.collect());
@@ -498,35 +483,25 @@ fn in_passes(
 }
 
 /// The terms that look at the whole batch: added to `losses`, and weighted and added up.
-fn add_batch_terms(
-    of_batch: &BatchTerm<'_>,
-    weights: &LossConfig,
-    losses: &mut Losses,
-) -> Option<Tensor<1>> {
-    let mut values = TermValues::default();
-    of_batch.add_values(&mut values);
+fn add_batch_terms(of_batch: &TermInput<'_>, losses: &mut Losses) -> Option<Tensor<1>> {
+    let values = of_batch.values(false);
     let weighted = LOSS_TERMS.iter().zip(values).filter_map(|(term, value)| {
         let value = value?;
         *(term.value)(losses) += f64::from(host_vec(value.clone())[0]);
-        Some(value.mul_scalar((term.weight)(weights)))
+        Some(value.mul_scalar((term.weight)(of_batch.weights)))
     });
     weighted.reduce(|sum, term| sum + term)
 }
 
 /// The terms of a part of a batch as their shares of those of the whole, of rays and of
 /// gradients: added to `losses`, and weighted and added up.
-fn add_shares(
-    values: TermValues,
-    [of_rays, of_gradients]: [f64; 2],
-    weights: &LossConfig,
-    losses: &mut Losses,
-    device: &Device,
-) -> Tensor<1> {
+fn add_shares(of_part: &TermInput<'_>, shares: [f64; 2], losses: &mut Losses) -> Tensor<1> {
+    let values = of_part.values(true);
     let weighted = LOSS_TERMS.iter().zip(values).filter_map(|(term, value)| {
-        let share = term.share(of_rays, of_gradients)?;
-        let value = value.unwrap_or_else(|| Tensor::zeros([1], device));
+        let share = term.share(shares)?;
+        let value = value.unwrap_or_else(|| Tensor::zeros([1], of_part.device));
         *(term.value)(losses) += f64::from(host_vec(value.clone())[0]) * share;
-        Some(value.mul_scalar((term.weight)(weights) * share))
+        Some(value.mul_scalar((term.weight)(of_part.weights) * share))
     });
     let total = weighted.reduce(|sum, term| sum + term);
     total.expect("some terms are means over rays")
@@ -651,23 +626,24 @@ fn render(
     (rendering, rows)
 }
 
-/// The terms that are means over the rays, or over gradients along them.
-fn ray_values(
-    model: &NeatModel,
-    input: &StepInput<'_>,
-    rendering: &Rendering,
-    config: &TrainConfig,
-    device: &Device,
-) -> TermValues {
-    let rays = RayTerm {
+/// What terms are made of, before segments and junctions are compared.
+fn term_input<'a>(
+    model: &'a NeatModel,
+    step: &'a StepInput<'a>,
+    config: &'a TrainConfig,
+    rendering: Option<&'a Rendering>,
+    device: &'a Device,
+) -> TermInput<'a> {
+    TermInput {
         model,
-        input,
-        rendering,
+        step,
         weights: &config.loss,
         eikonal: &config.eikonal,
+        rendering,
+        segment: None,
+        junctions: None,
         device,
-    };
-    rays.values()
+    }
 }
 
 /// Rendered ends `[R', 6]` and the accumulated weight `[R', 1]` of their rays, if any

@@ -24,20 +24,7 @@ impl TrainingConfig {
     pub fn validate(&self) -> Result<(), TrainError> {
         let refuse = |reason: &str| Err(TrainError::Config(reason.to_owned()));
         let (implicit, train) = (&self.model.implicit, &self.train);
-        let encoded = 3 * (1 + 2 * implicit.octaves);
-        if implicit.hidden_layers == 0 || implicit.width == 0 {
-            return refuse("model.implicit needs at least one hidden layer and a width above 0");
-        }
-        if implicit.skip_layer > 0 {
-            if implicit.skip_layer >= implicit.hidden_layers {
-                return refuse("model.implicit.skip_layer must come before the last hidden layer");
-            }
-            if implicit.width <= encoded {
-                return refuse(
-                    "model.implicit.width must exceed the width of the encoding, 3 + 6 octaves, where a skip layer is used",
-                );
-            }
-        }
+        implicit.validate()?;
         if implicit.octaves > 24 || self.model.attraction.octaves > 24 {
             return refuse("more than 24 octaves exceed what float32 resolves");
         }
@@ -63,14 +50,7 @@ impl TrainingConfig {
         if train.checkpoint_seconds.is_nan() || train.checkpoint_seconds <= 0.0 {
             return refuse("train.checkpoint_seconds must be positive");
         }
-        match self.model.perceiver.junctions.fixed() {
-            None => return refuse("model.perceiver.junctions is not decided for this scene"),
-            Some(0) => return refuse("model.perceiver needs junctions"),
-            Some(_) if self.model.perceiver.width == 0 => {
-                return refuse("model.perceiver needs a width");
-            }
-            Some(_) => {}
-        }
+        self.model.perceiver.validate()?;
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let density = &self.model.density;
         if !positive(density.initial_beta) || !positive(density.final_beta) {
@@ -118,6 +98,7 @@ fn sizes(config: &TrainingConfig) -> Vec<(&'static str, usize, usize)> {
     };
     let uniform_points = train.eikonal.uniform_points.unwrap_or(0);
     let junctions = model.perceiver.junctions.fixed().unwrap_or(0);
+    let (implicit, rendering, attraction) = (&model.implicit, &model.rendering, &model.attraction);
     vec![
         (what, train.rays.saturating_mul(samples.max(1)), MAX_SAMPLES),
         ("train.sampler.resolution", resolution, MAX_RESOLUTION),
@@ -125,27 +106,23 @@ fn sizes(config: &TrainingConfig) -> Vec<(&'static str, usize, usize)> {
         ("train.surface_points", train.surface_points, MAX_SAMPLES),
         ("model.perceiver.junctions", junctions, MAX_JUNCTIONS),
         ("model.perceiver.width", model.perceiver.width, MAX_WIDTH),
-        ("model.implicit.width", model.implicit.width, MAX_WIDTH),
-        (
-            "model.implicit.features",
-            model.implicit.features,
-            MAX_WIDTH,
-        ),
+        ("model.implicit.width", implicit.width, MAX_WIDTH),
+        ("model.implicit.features", implicit.features, MAX_WIDTH),
         (
             "model.implicit.hidden_layers",
-            model.implicit.hidden_layers,
+            implicit.hidden_layers,
             MAX_LAYERS,
         ),
-        ("model.rendering.width", model.rendering.width, MAX_WIDTH),
+        ("model.rendering.width", rendering.width, MAX_WIDTH),
         (
             "model.rendering.hidden_layers",
-            model.rendering.hidden_layers,
+            rendering.hidden_layers,
             MAX_LAYERS,
         ),
-        ("model.attraction.width", model.attraction.width, MAX_WIDTH),
+        ("model.attraction.width", attraction.width, MAX_WIDTH),
         (
             "model.attraction.hidden_layers",
-            model.attraction.hidden_layers,
+            attraction.hidden_layers,
             MAX_LAYERS,
         ),
     ]

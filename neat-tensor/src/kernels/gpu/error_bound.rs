@@ -349,18 +349,10 @@ pub(crate) fn refine(
     numbers: RefineNumbers,
 ) -> (CubeTensor, CubeTensor, CubeTensor) {
     let [samples, fresh, betas, control] = [samples, fresh, betas, control].map(into_contiguous);
-    let RefineNumbers {
-        len,
-        step,
-        rays,
-        bisections,
-        epsilon,
-        opaque,
-    } = numbers;
-    let empty = |rows| empty_of(&fresh, [rows, rays]);
-    let room = 2 * (len + step);
-    let [merged, scratch, next_z, state] = [room, room, step, 2].map(empty);
-    let (count, dim) = launch_size(rays);
+    let empty = |rows| empty_of(&fresh, [rows, numbers.rays]);
+    let room = 2 * (numbers.len + numbers.step);
+    let [merged, scratch, next_z, state] = [room, room, numbers.step, 2].map(empty);
+    let (count, dim) = launch_size(numbers.rays);
     refine_kernel::launch(
         &merged.client,
         count,
@@ -373,12 +365,12 @@ pub(crate) fn refine(
         scratch.into_tensor_arg(),
         next_z.clone().into_tensor_arg(),
         state.clone().into_tensor_arg(),
-        len,
-        step,
-        rays,
-        bisections,
-        epsilon,
-        opaque,
+        numbers.len,
+        numbers.step,
+        numbers.rays,
+        numbers.bisections,
+        numbers.epsilon,
+        numbers.opaque,
     );
     (merged, next_z, state)
 }
@@ -389,18 +381,9 @@ pub(crate) fn draw(
 ) -> CubeTensor {
     let [samples, betas, control, u, kept] =
         [samples, betas, control, u, kept].map(into_contiguous);
-    let DrawNumbers {
-        len,
-        step,
-        rays,
-        drawn,
-        extras,
-        near,
-        far,
-    } = numbers;
-    let cdf = empty_of(&samples, [len, rays]);
-    let out = empty_of(&samples, [rays, drawn + extras + 2]);
-    let (count, dim) = launch_size(rays);
+    let cdf = empty_of(&samples, [numbers.len, numbers.rays]);
+    let out = empty_of(&samples, [numbers.rays, numbers.drawn + numbers.extras + 2]);
+    let (count, dim) = launch_size(numbers.rays);
     draw_kernel::launch(
         &out.client,
         count,
@@ -412,13 +395,13 @@ pub(crate) fn draw(
         kept.into_tensor_arg(),
         cdf.into_tensor_arg(),
         out.clone().into_tensor_arg(),
-        len,
-        step,
-        rays,
-        drawn,
-        extras,
-        near,
-        far,
+        numbers.len,
+        numbers.step,
+        numbers.rays,
+        numbers.drawn,
+        numbers.extras,
+        numbers.near,
+        numbers.far,
     );
     out
 }

@@ -156,19 +156,10 @@ pub(crate) fn sample(
     numbers: GridNumbers,
 ) -> (CubeTensor, CubeTensor) {
     let [ray_columns, grid, beta, noise] = [ray_columns, grid, beta, noise].map(into_contiguous);
-    let GridNumbers {
-        rays,
-        nodes,
-        lookups,
-        drawn,
-        even,
-        radius,
-        min_beta,
-        weight_floor,
-    } = numbers;
-    let edges = empty_of(&noise, [2 * (lookups + 1), rays]);
-    let [out, deltas] = std::array::from_fn(|_| empty_of(&noise, [rays, drawn + even]));
-    let (count, dim) = launch_size(rays);
+    let edges = empty_of(&noise, [2 * (numbers.lookups + 1), numbers.rays]);
+    let [out, deltas] =
+        std::array::from_fn(|_| empty_of(&noise, [numbers.rays, numbers.drawn + numbers.even]));
+    let (count, dim) = launch_size(numbers.rays);
     grid_kernel::launch(
         &out.client,
         count,
@@ -180,14 +171,14 @@ pub(crate) fn sample(
         edges.into_tensor_arg(),
         out.clone().into_tensor_arg(),
         deltas.clone().into_tensor_arg(),
-        rays,
-        nodes,
-        lookups,
-        drawn,
-        even,
-        radius,
-        min_beta,
-        weight_floor,
+        numbers.rays,
+        numbers.nodes,
+        numbers.lookups,
+        numbers.drawn,
+        numbers.even,
+        numbers.radius,
+        numbers.min_beta,
+        numbers.weight_floor,
     );
     (out, deltas)
 }
