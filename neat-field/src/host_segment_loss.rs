@@ -67,10 +67,12 @@ impl RayCamera {
             .rotation
             .map(|row| row[0] * relative[0] + row[1] * relative[1] + row[2] * relative[2]);
         // Pushed off zero on its own side, as the published projection does.
-        let z = match z.abs() < MIN_DEPTH {
-            true if z < 0.0 => z - MIN_DEPTH,
-            true => z + MIN_DEPTH,
-            false => z,
+        let z = if z.abs() >= MIN_DEPTH || z.is_nan() {
+            z
+        } else if z < 0.0 {
+            z - MIN_DEPTH
+        } else {
+            z + MIN_DEPTH
         };
         Projection {
             point: [x / z, y / z],
@@ -163,9 +165,10 @@ pub fn host_segment_loss(
             result.gradient[6 * ray + 3 * end..][..3].copy_from_slice(&pulled);
         }
     }
-    let rays_in_mean = match config.mean_over_all_rays {
-        true => rays,
-        false => result.counted.iter().filter(|counted| **counted).count(),
+    let rays_in_mean = if config.mean_over_all_rays {
+        rays
+    } else {
+        result.counted.iter().filter(|counted| **counted).count()
     };
     let scale = 1.0 / (rays_in_mean.max(1) as f32);
     result.loss *= scale;

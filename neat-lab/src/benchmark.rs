@@ -11,7 +11,7 @@ use neat_pipeline::config::Preset;
 use neat_pipeline::plan::{Machine, settle};
 use neat_pipeline::scene::scaled_for;
 use neat_sdf::ImplicitNetwork;
-use neat_tensor::backend::software_driver;
+use neat_tensor::backend::{gpu_name, software_driver};
 use neat_tensor::random::{Purpose, stream};
 use neat_tensor::{Backend, Kernels};
 use neat_train::TrainError;
@@ -292,17 +292,13 @@ impl Run {
 /// The name of a GPU, else of the CPU where the system tells (Linux), else of its
 /// kind.
 fn device_name(device: &Device) -> String {
-    #[cfg(feature = "wgpu")]
-    if let Some(identity) = device.identity() {
-        return identity.name;
-    }
-    let _ = device;
-    let name = || {
+    let of_cpu = || {
         let info = std::fs::read_to_string("/proc/cpuinfo").ok()?;
         let line = info.lines().find(|line| line.starts_with("model name"))?;
         Some(line.split_once(':')?.1.trim().to_owned())
     };
-    name().unwrap_or_else(|| std::env::consts::ARCH.to_owned())
+    let name = gpu_name(device).or_else(of_cpu);
+    name.unwrap_or_else(|| std::env::consts::ARCH.to_owned())
 }
 
 fn random_matrix(rows: usize, columns: usize, device: &Device) -> Tensor<2> {

@@ -139,6 +139,19 @@ pub fn is_on_host(device: &Device) -> bool {
     }
 }
 
+/// The name of a GPU; a CPU has none here.
+pub fn gpu_name(device: &Device) -> Option<String> {
+    #[cfg(feature = "wgpu")]
+    {
+        device.identity().map(|identity| identity.name)
+    }
+    #[cfg(not(feature = "wgpu"))]
+    {
+        let _ = device;
+        None
+    }
+}
+
 /// The name of the software driver that `device` computes through, if it does:
 /// right, but many times slower than the CPU backends. [`Backend::Auto`] never
 /// picks one.

@@ -1,7 +1,7 @@
 //! The CPU's side of [`NeatBackend`].
 
+use crate::fused::{self, ReluRequest, SoftplusRequest};
 use crate::kernels::cpu::KeptMemory;
-use crate::kernels::cpu::operations::{self, ReluRequest, SoftplusRequest};
 use crate::kernels::cpu::relu_network::{PartShape, ReluShape};
 use crate::kernels::cpu::softplus_network::SoftplusShape;
 use crate::linear::{Linear, flat_parameters, layer_shapes};
@@ -52,7 +52,7 @@ impl NeatBackend for Cpu {
             memory: self.memory.clone(),
         };
         let parameters = flat_parameters(network.layers);
-        let (first, gradient, others) = operations::softplus_network(points, parameters, request);
+        let (first, gradient, others) = fused::softplus_network(points, parameters, request);
         Some(Field {
             first,
             gradient,
@@ -85,7 +85,7 @@ impl NeatBackend for Cpu {
             },
             memory: self.memory.clone(),
         };
-        Some(operations::relu_network(
+        Some(fused::relu_network(
             inputs.rays,
             inputs.gradients,
             inputs.features,

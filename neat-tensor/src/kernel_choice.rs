@@ -29,7 +29,7 @@ impl Default for Kernels {
 impl Kernels {
     /// Kernels where there are any. Activations that wait for a later pass take a half of
     /// `memory_limit` (bytes) or 2 GiB, whichever is less; what has no room is computed
-    /// again, with the same result.
+    /// again.
     pub fn within(memory_limit: Option<u64>) -> Self {
         let half = memory_limit.map_or(MAX_KEPT_BYTES, |bytes| bytes / 2);
         Self {

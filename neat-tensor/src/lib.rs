@@ -28,6 +28,7 @@ pub mod checkpoint;
 mod coordinate_mlp;
 mod cpu_backend;
 mod encoding;
+mod fused;
 #[cfg(feature = "wgpu")]
 mod gpu_backend;
 pub mod host;

@@ -310,9 +310,12 @@ impl NeatModel {
             if segment_rows == 0 {
                 return Tensor::zeros([request.segment_rays, 6], device);
             }
-            let head = |t: Tensor<2>| match t.dims()[0] == segment_rows {
-                true => t,
-                false => t.narrow(0, 0, segment_rows),
+            let head = |t: Tensor<2>| {
+                if t.dims()[0] == segment_rows {
+                    t
+                } else {
+                    t.narrow(0, 0, segment_rows)
+                }
             };
             let ends = self.attraction_network.forward(
                 head(ray_columns),

@@ -14,6 +14,7 @@ use crate::scene::{PreparedScene, examine_quickly, prepare_scene};
 use burn::tensor::Device;
 use neat_core::{Scene, SceneError, file, hawp_json};
 use neat_tensor::Backend;
+use neat_tensor::backend::gpu_name;
 use neat_train::TrainError;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -209,7 +210,7 @@ fn begun_now(
         command_line: options.command_line.clone(),
         preset: options.preset.clone(),
         backend: backend.to_string(),
-        device: device_name(device),
+        device: gpu_name(device).unwrap_or_else(|| "CPU".to_owned()),
         threads: rayon::current_num_threads(),
         seed: options.seed,
         scene: absolute(&options.scene)?,
@@ -269,9 +270,9 @@ fn prepare(
 /// Tells what computes if that was open, and what is wrong with it.
 fn tell_of_device(asked: Backend, backend: Backend, device: &Device, on_event: OnEvent<'_>) {
     if asked == Backend::Auto {
-        let reason = match backend {
-            Backend::Wgpu => format!("as there is a GPU, {}", device_name(device)),
-            _ => "as there is no GPU".to_owned(),
+        let reason = match gpu_name(device) {
+            Some(name) => format!("as there is a GPU, {name}"),
+            None => "as there is no GPU".to_owned(),
         };
         on_event(Event::Decided(Decision {
             setting: "backend".to_owned(),
@@ -329,17 +330,4 @@ fn absolute(path: &Path) -> Result<PathBuf, SceneError> {
         path: path.into(),
         source,
     })
-}
-
-/// The name of a GPU; only those have one.
-#[cfg(feature = "wgpu")]
-fn device_name(device: &Device) -> String {
-    let identity = device.identity();
-    identity.map_or_else(|| "CPU".to_owned(), |identity| identity.name)
-}
-
-/// Without GPU backends everything is computed by the CPU.
-#[cfg(not(feature = "wgpu"))]
-fn device_name(_: &Device) -> String {
-    "CPU".to_owned()
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Memory for activations that wait for a later pass; beyond it they are computed
-/// again, which changes no result. Clones share it.
+/// again. Clones share it.
 #[derive(Clone, Debug)]
 pub struct KeptMemory(Arc<Account>);
 
@@ -25,7 +25,7 @@ impl KeptMemory {
     }
 
     /// `bytes` more, if they fit.
-    pub(super) fn book(&self, bytes: usize) -> Option<Booking> {
+    pub(crate) fn book(&self, bytes: usize) -> Option<Booking> {
         let most = self.0.most;
         let fits = |used: usize| used.checked_add(bytes).filter(|sum| *sum <= most);
         let booked = (self.0.used).fetch_update(Ordering::Relaxed, Ordering::Relaxed, fits);
@@ -38,7 +38,7 @@ impl KeptMemory {
 
 /// A share of the memory, given back when it is dropped.
 #[derive(Debug)]
-pub(super) struct Booking {
+pub(crate) struct Booking {
     memory: KeptMemory,
     bytes: usize,
 }
@@ -51,7 +51,7 @@ impl Drop for Booking {
 
 /// The activations of a forward pass, taken by its backward pass.
 #[derive(Debug)]
-pub(super) struct Tape<T>(Arc<Mutex<Option<(T, Booking)>>>);
+pub(crate) struct Tape<T>(Arc<Mutex<Option<(T, Booking)>>>);
 
 impl<T> Clone for Tape<T> {
     fn clone(&self) -> Self {
@@ -60,11 +60,11 @@ impl<T> Clone for Tape<T> {
 }
 
 impl<T> Tape<T> {
-    pub(super) fn new(tape: Option<T>, booking: Option<Booking>) -> Self {
+    pub(crate) fn new(tape: Option<T>, booking: Option<Booking>) -> Self {
         Self(Arc::new(Mutex::new(tape.zip(booking))))
     }
 
-    pub(super) fn take(&self) -> Option<T> {
+    pub(crate) fn take(&self) -> Option<T> {
         let mut tape = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         tape.take().map(|(tape, _)| tape)
     }
@@ -100,7 +100,7 @@ pub struct KnownRows {
 }
 
 impl KnownRows {
-    pub(super) fn as_known(&self) -> Known<'_> {
+    pub(crate) fn as_known(&self) -> Known<'_> {
         Known {
             pass: &self.pass.pass,
             rows: &self.rows,

@@ -12,16 +12,15 @@
 pub mod arena;
 pub mod block;
 pub mod density;
-mod derivatives;
 pub mod gemm;
 mod kept;
 pub mod layers;
-pub(crate) mod operations;
 pub mod relu_network;
 pub mod simd_math;
 pub mod softplus_network;
 pub mod weight_gradient;
 
+pub(crate) use kept::Tape;
 pub use kept::{KeptMemory, KnownPass, KnownRows};
 pub use pulp::Arch;
 

@@ -1,12 +1,12 @@
-//! Derivatives of the operations in `operations.rs`, by hand-written backward passes.
+//! Derivatives of the operations in `fused.rs`, by hand-written backward passes.
 
-use super::kept::{KnownRows, Tape};
-use super::operations::{
+use super::{
     FusedNetworks, ReluRequest, SoftplusRequest, SoftplusTensors, read, relu_forward, slice,
     softplus_forward, write,
 };
-use super::relu_network::{self, ReluNetwork, ReluShape};
-use super::softplus_network::{self, SoftplusAdjoint, SoftplusNetwork};
+use crate::kernels::cpu::relu_network::{self, ReluNetwork, ReluShape};
+use crate::kernels::cpu::softplus_network::{self, SoftplusAdjoint, SoftplusNetwork};
+use crate::kernels::cpu::{KnownRows, Tape};
 use burn::backend::tensor::{Device as BackendDevice, FloatTensor};
 use burn::backend::{Backend, TensorMetadata};
 use burn::tensor::TensorData;

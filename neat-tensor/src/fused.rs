@@ -1,13 +1,17 @@
 //! Whole networks as single operations of burn's CPU backends, over plain slices.
 //!
 //! burn reaches the tensors of a backend through an extension trait; its derivatives are
-//! in `derivatives.rs`.
+//! in `fused/derivatives.rs`. The kernels know nothing of burn.
 
 #![allow(deprecated)] // ndarray is still one of the backends that neat promises
 
-use super::kept::{KeptMemory, KnownRows};
-use super::relu_network::{self, ReluNetwork, ReluShape};
-use super::softplus_network::{self, Known, SoftplusNetwork, SoftplusOutput, SoftplusShape};
+mod derivatives;
+
+use crate::kernels::cpu::relu_network::{self, ReluNetwork, ReluShape};
+use crate::kernels::cpu::softplus_network::{
+    self, Known, SoftplusNetwork, SoftplusOutput, SoftplusShape,
+};
+use crate::kernels::cpu::{KeptMemory, KnownRows};
 use burn::backend::tensor::{Device as BackendDevice, FloatTensor};
 use burn::backend::{Backend, TensorMetadata, backend_extension};
 use burn::tensor::{Tensor, TensorData};
@@ -73,7 +77,7 @@ pub trait FusedNetworks: Backend {
 }
 
 /// The host's copy of a tensor of a CPU backend.
-pub(super) fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
+fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
     use std::task::{Context, Poll, Waker};
     let future = std::pin::pin!(B::float_into_data(tensor));
     match future.poll(&mut Context::from_waker(Waker::noop())) {
@@ -82,11 +86,11 @@ pub(super) fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
     }
 }
 
-pub(super) fn slice(data: &TensorData) -> &[f32] {
+fn slice(data: &TensorData) -> &[f32] {
     data.as_slice().expect("fused: networks are float32 here")
 }
 
-pub(super) fn write<B: Backend>(
+fn write<B: Backend>(
     values: Vec<f32>,
     shape: impl Into<Vec<usize>>,
     device: &BackendDevice<B>,
@@ -97,7 +101,7 @@ pub(super) fn write<B: Backend>(
 /// What a softplus network says, as tensors.
 pub type SoftplusTensors<B> = (FloatTensor<B>, FloatTensor<B>, Option<FloatTensor<B>>);
 
-pub(super) fn softplus_forward<B: Backend>(
+fn softplus_forward<B: Backend>(
     points: FloatTensor<B>,
     parameters: FloatTensor<B>,
     request: &SoftplusRequest,
@@ -133,7 +137,7 @@ pub(super) fn softplus_forward<B: Backend>(
     (tensors, tape)
 }
 
-pub(super) fn relu_forward<B: Backend>(
+fn relu_forward<B: Backend>(
     inputs: [FloatTensor<B>; 3],
     parameters: FloatTensor<B>,
     shape: &ReluShape,
