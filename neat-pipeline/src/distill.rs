@@ -12,14 +12,14 @@ use neat_train::model::host_vec;
 use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::curved_rims::curved_chains;
 use neat_wireframe::export::WireframeDocument;
-use neat_wireframe::fast;
-use neat_wireframe::line_tracks;
+use neat_wireframe::fast::{self, FastBackEndReport};
+use neat_wireframe::line_tracks::{self, LineTracksReport};
 use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
-use neat_wireframe::paper::{self, PaperBackEndError};
-use neat_wireframe::proposals::{RobustSegmentConfig, WeightedSegment, robust_segment};
+use neat_wireframe::paper::{PaperBackEndCounts, PaperBackEndError, SupportedSegment};
+use neat_wireframe::proposals::{WeightedSegment, robust_segment};
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation};
-use serde_json::json;
+use serde::{Deserialize, Serialize};
 pub use thin_regions::paper_regions;
 use thin_regions::{Query, spread_query};
 
@@ -56,7 +56,32 @@ pub struct Distilled {
     /// How sure every junction and edge is, and by which 2D segments.
     pub confidence: Confidence,
     /// What each step kept and removed.
-    pub report: serde_json::Value,
+    pub report: AssemblerReport,
+}
+
+/// What each step of a back end kept and removed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "back_end", rename_all = "snake_case")]
+pub enum AssemblerReport {
+    /// Of the paper's.
+    Paper {
+        /// How many things entered and left its steps.
+        steps: PaperBackEndCounts,
+    },
+    /// Of the fast one.
+    Fast {
+        /// 3D segments that the field proposes.
+        proposals: usize,
+        /// What its steps kept.
+        steps: FastBackEndReport,
+    },
+    /// Of the line tracks.
+    Tracks {
+        /// 3D segments that the field proposes, which break ties.
+        priors: usize,
+        /// What its steps kept.
+        steps: LineTracksReport,
+    },
 }
 
 impl Distilled {
@@ -90,31 +115,63 @@ pub fn distill(
     plan: &Plan,
     progress: OnProgress<'_>,
 ) -> Result<Distilled, DistillError> {
-    let config = plan.config();
-    match plan.assembler() {
-        Assembler::Paper => paper(scene, field, config, progress),
-        Assembler::Fast => fast(scene, field, config, progress),
-        Assembler::Tracks => tracks(scene, field, config, progress),
-    }
-}
-
-/// A wireframe with what the observations say about it. `surface` tells where
-/// edges are hidden.
-fn assessed(
-    wireframe: Wireframe3d,
-    views: &[ViewObservation],
-    surface: Option<&dyn SignedDistance>,
-    scene_radius: f64,
-    config: &Config,
-    report: serde_json::Value,
-) -> Result<Distilled, DistillError> {
-    let config = &config.distill.confidence;
-    let confidence = assess(&wireframe, views, surface, scene_radius, config)?;
+    let (config, assembler) = (plan.config(), plan.assembler());
+    let distill = &config.distill;
+    let min_score = match assembler {
+        Assembler::Paper => distill.paper.neat_lines.min_segment_score,
+        Assembler::Fast | Assembler::Tracks => config.data.min_segment_score,
+    };
+    let views = ViewObservation::from_scene(scene, min_score);
+    let (wireframe, report, surface) = if assembler == Assembler::Paper {
+        let (wireframe, report) = paper(scene, field, config, &views, progress)?;
+        (wireframe, report, field.surface_grid())
+    } else {
+        let on_proposals = &mut |share| progress(0.7 * share);
+        let proposals = propose_segments(scene, field, config, &views, on_proposals)?;
+        let surface = field.surface_grid();
+        let (wireframe, report) = from_proposals(field, plan, &views, &proposals, &surface);
+        progress(0.9)?;
+        (wireframe, report, surface)
+    };
+    // A learned surface of a photograph is too coarse to hide edges behind.
+    let hides = assembler != Assembler::Tracks || distill.tracks.occlusion_test;
+    let hiding = hides.then_some(&surface as &dyn SignedDistance);
+    let radius = field.scene_radius;
+    let confidence = assess(&wireframe, &views, hiding, radius, &distill.confidence)?;
     Ok(Distilled {
         wireframe,
         confidence,
         report,
     })
+}
+
+/// The back ends that take one proposal per 2D segment.
+fn from_proposals(
+    field: &TrainedField,
+    plan: &Plan,
+    views: &[ViewObservation],
+    proposals: &[SegmentProposal],
+    surface: &dyn SignedDistance,
+) -> (Wireframe3d, AssemblerReport) {
+    let radius = field.scene_radius;
+    let distill = &plan.config().distill;
+    if plan.assembler() == Assembler::Tracks {
+        let tracks = &distill.tracks;
+        let built = line_tracks::run(views, proposals, Some(surface), radius, tracks);
+        let report = AssemblerReport::Tracks {
+            priors: proposals.len(),
+            steps: built.report,
+        };
+        return (built.wireframe, report);
+    }
+    let junctions = field.junctions();
+    let fast = &distill.fast;
+    let built = fast::run(views, proposals, &junctions, surface, radius, fast);
+    let report = AssemblerReport::Fast {
+        proposals: proposals.len(),
+        steps: built.report,
+    };
+    (built.wireframe, report)
 }
 
 /// How well a wireframe in the scene's world agrees with the 2D segments and the
@@ -173,63 +230,6 @@ fn render_rays(field: &TrainedField, rays: &RayBundle) -> Vec<RenderedRay> {
     rendered
 }
 
-fn fast(
-    scene: &Scene,
-    field: &TrainedField,
-    config: &Config,
-    progress: OnProgress<'_>,
-) -> Result<Distilled, DistillError> {
-    let views = ViewObservation::from_scene(scene, config.data.min_segment_score);
-    let proposals = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f))?;
-    let surface = field.surface_grid();
-    let result = fast::run(
-        &views,
-        &proposals,
-        &field.junctions(),
-        &surface,
-        field.scene_radius,
-        &config.distill.fast,
-    );
-    progress(0.9)?;
-    let report = json!({
-        "back_end": "fast",
-        "proposals": proposals.len(),
-        "steps": result.report,
-    });
-    let surface: Option<&dyn SignedDistance> = Some(&surface);
-    let radius = field.scene_radius;
-    assessed(result.wireframe, &views, surface, radius, config, report)
-}
-
-fn tracks(
-    scene: &Scene,
-    field: &TrainedField,
-    config: &Config,
-    progress: OnProgress<'_>,
-) -> Result<Distilled, DistillError> {
-    let views = ViewObservation::from_scene(scene, config.data.min_segment_score);
-    let priors = propose_segments(scene, field, config, &views, &mut |f| progress(0.7 * f))?;
-    let surface = field.surface_grid();
-    let result = line_tracks::run(
-        &views,
-        &priors,
-        Some(&surface),
-        field.scene_radius,
-        &config.distill.tracks,
-    );
-    progress(0.9)?;
-    let report = json!({
-        "back_end": "tracks",
-        "priors": priors.len(),
-        "steps": result.report,
-    });
-    // A learned surface of a photograph is too coarse to hide edges behind.
-    let hides = config.distill.tracks.occlusion_test;
-    let surface = hides.then_some(&surface as &dyn SignedDistance);
-    let radius = field.scene_radius;
-    assessed(result.wireframe, &views, surface, radius, config, report)
-}
-
 /// One robust 3D segment for every detected 2D segment that the field answers.
 ///
 /// # Errors
@@ -241,7 +241,6 @@ pub fn propose_segments(
     views: &[ViewObservation],
     progress: OnProgress<'_>,
 ) -> Result<Vec<SegmentProposal>, Cancelled> {
-    let robust = RobustSegmentConfig::default();
     let mut proposals = Vec::new();
     for (view, observation) in views.iter().enumerate() {
         let query = spread_query(
@@ -261,21 +260,21 @@ pub fn propose_segments(
             of_segment
                 .iter()
                 .enumerate()
-                .filter_map(|(segment, rays)| robust_segment(views, view, segment, rays, &robust)),
+                .filter_map(|(segment, rays)| robust_segment(views, view, segment, rays)),
         );
         progress((view + 1) as f64 / views.len() as f64)?;
     }
     Ok(proposals)
 }
 
+/// The paper's back end, which takes every ray of the thin regions.
 fn paper(
     scene: &Scene,
     field: &TrainedField,
     config: &Config,
+    views: &[ViewObservation],
     progress: OnProgress<'_>,
-) -> Result<Distilled, DistillError> {
-    let paper = &config.distill.paper;
-    let views = ViewObservation::from_scene(scene, paper.neat_lines.min_segment_score);
+) -> Result<(Wireframe3d, AssemblerReport), DistillError> {
     let mut rays_by_view = Vec::with_capacity(views.len());
     for (index, view) in scene.views.iter().enumerate() {
         let regions = paper_regions(&view.wireframe, scene.pixel_center, config);
@@ -290,7 +289,7 @@ fn paper(
             .iter()
             .zip(surface)
             .enumerate()
-            .map(|(i, (ray, (_, gradient)))| paper::SupportedSegment {
+            .map(|(i, (ray, (_, gradient)))| SupportedSegment {
                 segment: ray.segment,
                 support_point: support_point(
                     &Vector3::from(query.feet.origins[i]).map(f64::from),
@@ -303,12 +302,12 @@ fn paper(
         rays_by_view.push(rays);
         progress(0.95 * (index + 1) as f64 / views.len() as f64)?;
     }
-    let result = paper.run(&field.junctions(), &views, &rays_by_view, field)?;
-    let report = json!({ "back_end": "paper", "steps": result.counts });
-    let surface = field.surface_grid();
-    let surface: Option<&dyn SignedDistance> = Some(&surface);
-    let radius = field.scene_radius;
-    assessed(result.wireframe, &views, surface, radius, config, report)
+    let paper = &config.distill.paper;
+    let built = paper.run(&field.junctions(), views, &rays_by_view, field)?;
+    let report = AssemblerReport::Paper {
+        steps: built.counts,
+    };
+    Ok((built.wireframe, report))
 }
 
 /// Where the ray through the foot meets the tangent plane at the rendered point

@@ -10,6 +10,7 @@ mod training;
 pub use opened::{OpenedRun, open_run, software_warning};
 
 use crate::config::Config;
+use crate::distill::AssemblerReport;
 use crate::error::PipelineError;
 use crate::event::{OnEvent, Stage};
 use crate::run_dir::{Existing, RunDir};
@@ -64,8 +65,8 @@ pub struct Reconstruction {
     pub wireframe: Wireframe3d,
     /// How well it agrees with the images.
     pub agreement: Option<ImageEvidence>,
-    /// Numbers of every step of the distillation.
-    pub report: serde_json::Value,
+    /// Numbers of every step of the distillation; `None` if another version wrote them.
+    pub report: Option<AssemblerReport>,
 }
 
 /// Trains on a scene and leaves a run folder with checkpoints.

@@ -13,7 +13,7 @@ use neat_core::{LineSegment2, LoadOptions, Scene, Wireframe3d, load_scene};
 use neat_detect::{DetectorConfig, detect};
 use neat_report::{FactGroup, PhotographConfig, Report};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::evidence::EdgeSupportConfig;
+use neat_wireframe::evidence::confirms;
 use neat_wireframe::export::{SupportingSegment, WireframeDocument, read_json};
 use neat_wireframe::line_tracks::{LineTracksConfig, run};
 use rayon::prelude::*;
@@ -81,7 +81,6 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// The wireframe in the frame of the files, with the 2D segments that lie on its
 /// edges end on end.
 fn document(scene: &Scene, views: &[ViewObservation], in_world: &Wireframe3d) -> WireframeDocument {
-    let config = EdgeSupportConfig::default();
     let supporting = |edge: usize| -> Vec<SupportingSegment> {
         let segment = in_world.segment(edge);
         let in_view = |(index, view): (usize, &ViewObservation)| {
@@ -92,7 +91,7 @@ fn document(scene: &Scene, views: &[ViewObservation], in_world: &Wireframe3d) ->
             let projected = LineSegment2::new(ends[0].pixel, ends[1].pixel);
             let on_it = (view.segments.iter())
                 .map(|scored| projected.with_nearest_order(&scored.segment))
-                .filter(|observed| config.confirms(&projected, observed));
+                .filter(|observed| confirms(&projected, observed));
             let residual = |observed: &LineSegment2| {
                 let distances = projected.end_distances(observed);
                 (distances.iter().map(|d| d * d).sum::<f64>() / 2.0).sqrt()

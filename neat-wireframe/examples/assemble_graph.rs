@@ -14,7 +14,7 @@
 use nalgebra::{Vector2, Vector3};
 use neat_core::{LineSegment3, Wireframe3d};
 use neat_wireframe::fast::SegmentEnd;
-use neat_wireframe::fast::{JunctionModesConfig, junction_modes};
+use neat_wireframe::fast::junction_modes;
 use neat_wireframe::paper::{AttractionConfig, attract};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             pixel: Vector2::zeros(),
         })
         .collect();
-    let junctions = junction_modes(&ends, &JunctionModesConfig::default());
+    let junctions = junction_modes(&ends);
     let edges = attract(&segments, &junctions, &AttractionConfig::default());
     let graph = Wireframe3d { junctions, edges };
 

@@ -2,7 +2,6 @@
 
 use crate::{SegmentProposal, ViewObservation};
 use nalgebra::{Vector2, Vector3};
-use serde::{Deserialize, Serialize};
 
 /// One end of a proposal with the 2D end it was rendered for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,35 +16,16 @@ pub struct SegmentEnd {
     pub weight: f64,
 }
 
-/// Which ends count, and how much; see [`segment_ends`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SegmentEndConfig {
-    /// Ends must project closer than this to their 2D end.
-    pub max_error_in_pixels: f64,
-    /// Rays must agree on the end better than this, in world units.
-    pub max_spread: f64,
-    /// Error at which the weight has fallen to 1/e.
-    pub error_scale_in_pixels: f64,
-}
-
-impl Default for SegmentEndConfig {
-    fn default() -> Self {
-        Self {
-            max_error_in_pixels: 12.0,
-            max_spread: 0.05,
-            error_scale_in_pixels: 6.0,
-        }
-    }
-}
+/// Ends must project closer than this to their 2D end.
+const MAX_ERROR_IN_PIXELS: f64 = 12.0;
+/// Rays must agree on the end better than this, in world units.
+const MAX_SPREAD: f64 = 0.05;
+/// Error at which the weight has fallen to 1/e.
+const ERROR_SCALE_IN_PIXELS: f64 = 6.0;
 
 /// The ends that reproject well and on which the rays agree, in the order of the
 /// proposals. Proposals that name no observed segment are passed over.
-pub fn segment_ends(
-    views: &[ViewObservation],
-    proposals: &[SegmentProposal],
-    config: &SegmentEndConfig,
-) -> Vec<SegmentEnd> {
+pub fn segment_ends(views: &[ViewObservation], proposals: &[SegmentProposal]) -> Vec<SegmentEnd> {
     let mut ends = Vec::new();
     for proposal in proposals {
         let Some(detection) = views
@@ -58,8 +38,8 @@ pub fn segment_ends(
         let pixels = detection.segment.ends();
         for side in 0..2 {
             let error = proposal.end_error_in_pixels[side];
-            if error < config.max_error_in_pixels && proposal.end_spread[side] < config.max_spread {
-                let relative_error = error / config.error_scale_in_pixels;
+            if error < MAX_ERROR_IN_PIXELS && proposal.end_spread[side] < MAX_SPREAD {
+                let relative_error = error / ERROR_SCALE_IN_PIXELS;
                 ends.push(SegmentEnd {
                     position: positions[side],
                     view: proposal.view,
@@ -98,7 +78,7 @@ mod tests {
                 ..proposal([0.0; 2], [0.0; 2])
             },
         ];
-        let ends = segment_ends(&views, &proposals, &SegmentEndConfig::default());
+        let ends = segment_ends(&views, &proposals);
         assert_eq!(ends.len(), 2);
         assert_eq!(ends[0].position, junctions[0]);
         assert_eq!(ends[0].pixel, views[0].segments[0].segment.start);

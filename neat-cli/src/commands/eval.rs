@@ -16,7 +16,7 @@ use neat_pipeline::config::Preset;
 use neat_pipeline::resources::{Resources, default_limit};
 use neat_pipeline::scene::prepare_scene;
 use neat_wireframe::ViewObservation;
-use neat_wireframe::evidence::EdgeSupportConfig;
+use neat_wireframe::evidence::required_views;
 use neat_wireframe::metrics::Matching;
 use neat_wireframe::metrics::{SupportedTruthConfig, supported_truth, without_curves};
 use std::path::{Path, PathBuf};
@@ -288,7 +288,7 @@ impl EvalArgs {
         };
         let prepared = prepare_scene(scene, &config, None, resources, &mut |_| ())?;
         let views = ViewObservation::from_scene(&prepared.scene, config.data.min_segment_score);
-        let required = EdgeSupportConfig::default().required_views(views.len());
+        let required = required_views(views.len());
         let world_from_original = prepared.scene.original_from_world.inverse();
         let truth = &inputs.truth.wireframe;
         let supported = supported_truth(

@@ -48,7 +48,7 @@ impl Session<'_> {
             run: self.dir.clone(),
             wireframe: document.wireframe(),
             agreement: serde_json::from_value(of(AGREEMENT)).ok()?,
-            report: of(REPORT),
+            report: serde_json::from_value(of(REPORT)).ok(),
         })
     }
 
@@ -96,7 +96,7 @@ impl Session<'_> {
             run: self.dir.clone(),
             wireframe,
             agreement,
-            report: distilled.report,
+            report: Some(distilled.report),
         })
     }
 
@@ -165,7 +165,7 @@ impl Session<'_> {
             ("steps", json!(self.manifest.steps)),
             // `neat distill` may have chosen others than those of config.toml.
             ("distill", json!(self.plan.config().distill)),
-            (REPORT, distilled.report.clone()),
+            (REPORT, json!(distilled.report)),
             (AGREEMENT, json!(agreement)),
         ]
         .map(|(key, value)| (key.to_owned(), value))

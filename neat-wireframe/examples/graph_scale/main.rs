@@ -18,6 +18,7 @@ mod score;
 
 use field::{BlockSurface, observations, proposals, supported_truth};
 use neat_core::synthetic::{BlockScene, SyntheticError};
+use neat_wireframe::evidence::required_views;
 use neat_wireframe::fast::StepChange;
 use neat_wireframe::fast::{FastBackEndConfig, run_observed};
 use score::Score;
@@ -94,7 +95,7 @@ impl Runs {
         let data = scene.generate()?;
         let observations = observations(&data);
         let proposals = proposals(&data, scene.seed);
-        let truth = supported_truth(&data, config.support.required_views(views));
+        let truth = supported_truth(&data, required_views(views));
         let surface = BlockSurface(&data.blocks);
         let mut peak_memory = None;
         let variants = configurations(config)

@@ -1,26 +1,71 @@
 //! Settings of the assessment.
 
-use crate::evidence::occlusion::OcclusionConfig;
 use serde::{Deserialize, Serialize};
 
-/// Settings of [`super::assess`].
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// What of [`super::assess`] there is a reason to change.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ConfidenceConfig {
-    /// Which 2D segments support an edge.
-    pub provenance: ProvenanceConfig,
-    /// What the 2D segments say about positions.
-    pub covariance: CovarianceConfig,
-    /// What speaks for the existence of an edge.
-    pub existence: ExistenceConfig,
-    /// Where the surface hides an edge, in a scene whose ball has radius 1.
-    pub occlusion: OcclusionConfig,
+    /// Both ends of a supporting segment lie this near to the projected edge's
+    /// line.
+    pub tolerance_in_pixels: f64,
+    /// A view shows an edge if its segments cover this share of what of the edge
+    /// lies in the image.
+    pub min_covered_share: f64,
+    /// What is taken for the noise of a detector where too few observations tell.
+    pub usual_noise_in_pixels: f64,
+    /// A junction is not determined if its largest standard deviation exceeds this
+    /// share of the scene radius.
+    pub max_relative_sigma: f64,
+    /// Share of the edges that is expected to be true before any is looked at.
+    pub prior: f64,
+    /// Share of the views that show a true edge, before any is looked at; counts
+    /// as much as ten views.
+    pub usual_detection_rate: f64,
+}
+
+impl Default for ConfidenceConfig {
+    fn default() -> Self {
+        Self {
+            tolerance_in_pixels: 4.0,
+            min_covered_share: 0.5,
+            usual_noise_in_pixels: 0.7,
+            max_relative_sigma: 0.1,
+            prior: 0.8,
+            usual_detection_rate: 0.6,
+        }
+    }
+}
+
+impl ConfidenceConfig {
+    pub(super) fn provenance(&self) -> ProvenanceConfig {
+        ProvenanceConfig {
+            tolerance_in_pixels: self.tolerance_in_pixels,
+            min_covered_share: self.min_covered_share,
+            ..Default::default()
+        }
+    }
+
+    pub(super) fn covariance(&self) -> CovarianceConfig {
+        CovarianceConfig {
+            usual_noise_in_pixels: self.usual_noise_in_pixels,
+            max_relative_sigma: self.max_relative_sigma,
+            ..Default::default()
+        }
+    }
+
+    pub(super) fn existence(&self) -> ExistenceConfig {
+        ExistenceConfig {
+            prior: self.prior,
+            usual_detection_rate: self.usual_detection_rate,
+            ..Default::default()
+        }
+    }
 }
 
 /// Which 2D segments support an edge, and which views ought to show it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ProvenanceConfig {
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ProvenanceConfig {
     /// Both ends of a supporting segment lie this near to the projected edge's
     /// line …
     pub tolerance_in_pixels: f64,
@@ -52,9 +97,8 @@ impl Default for ProvenanceConfig {
 }
 
 /// What the 2D segments say about positions.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct CovarianceConfig {
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct CovarianceConfig {
     /// An end of a supporting segment shows the edge's junction if it lies this
     /// near to its projection; farther ends lie anywhere on the edge. Generous,
     /// because a narrow limit would cut off the noise that it is to measure.
@@ -96,9 +140,8 @@ impl Default for CovarianceConfig {
 }
 
 /// What speaks for the existence of an edge.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ExistenceConfig {
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ExistenceConfig {
     /// Share of the edges that is expected to be true before any is looked at …
     pub prior: f64,
     /// … which counts as much as this many edges of the scene.

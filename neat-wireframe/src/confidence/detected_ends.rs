@@ -127,7 +127,7 @@ impl Gathered {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::confidence::ProvenanceConfig;
+    use crate::confidence::config::ProvenanceConfig;
     use crate::confidence::provenance::{IndexedView, provenance};
     use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
     use neat_core::{LineSegment2, LineSegment3, ScoredSegment2};

@@ -1,6 +1,6 @@
 //! The views that ought to show an edge.
 
-use super::config::{ConfidenceConfig, ProvenanceConfig};
+use super::config::ProvenanceConfig;
 use crate::evidence::occlusion::{OcclusionConfig, views_that_see};
 use crate::metrics::visible_projection;
 use crate::{SignedDistance, ViewObservation};
@@ -18,17 +18,14 @@ pub(super) struct Occluder<'a> {
 
 impl<'a> Occluder<'a> {
     /// For a scene whose ball has this radius.
-    pub(super) fn new(
-        surface: &'a dyn SignedDistance,
-        scene_radius: f64,
-        config: &ConfidenceConfig,
-    ) -> Self {
+    pub(super) fn new(surface: &'a dyn SignedDistance, scene_radius: f64) -> Self {
+        let usual = OcclusionConfig::default();
         let config = OcclusionConfig {
-            start_distance: config.occlusion.start_distance * scene_radius,
-            end_distance: config.occlusion.end_distance * scene_radius,
-            min_sdf: config.occlusion.min_sdf * scene_radius,
-            ball_radius: config.occlusion.ball_radius * scene_radius,
-            ..config.occlusion.clone()
+            start_distance: usual.start_distance * scene_radius,
+            end_distance: usual.end_distance * scene_radius,
+            min_sdf: usual.min_sdf * scene_radius,
+            ball_radius: usual.ball_radius * scene_radius,
+            ..usual
         };
         Self { surface, config }
     }
@@ -105,15 +102,14 @@ mod tests {
         }
         observations[3].camera.intrinsics.cx = 5000.0;
         observations[4].camera.intrinsics.fx = f64::NAN;
-        let config = ConfidenceConfig::default();
+        let config = ProvenanceConfig::default();
         let edge = LineSegment3::new(3.0 * junctions[0], 3.0 * junctions[1]);
-        let expected =
-            |occluder| expected_views(&observations, &edge, occluder, &config.provenance);
+        let expected = |occluder| expected_views(&observations, &edge, occluder, &config);
         let unhidden = expected(None);
         assert_eq!(unhidden.len(), 10);
         assert!(!unhidden.contains(&3) && !unhidden.contains(&4));
 
-        let visible = expected(Some(&Occluder::new(&Cube, 3.0, &config)));
+        let visible = expected(Some(&Occluder::new(&Cube, 3.0)));
         // The edge y = z = -0.5 is seen from below or from one side.
         let outside = |view: &usize| {
             let center = observations[*view].camera.center_in_world;

@@ -36,13 +36,14 @@ mod noise;
 mod provenance;
 mod view_correlation;
 
-pub use config::{ConfidenceConfig, CovarianceConfig, ExistenceConfig, ProvenanceConfig};
+pub use config::ConfidenceConfig;
 pub use document::transformed_covariance;
 pub use noise::DetectionNoise;
 pub use provenance::EdgeSupport;
 
 use crate::validity::{WireframeFlaw, check_wireframe};
 use crate::{SignedDistance, ViewObservation, Wireframe3d};
+use config::ProvenanceConfig;
 use decoys::decoys;
 use detected_ends::detected_ends;
 use existence::{ExistenceModel, ViewCount};
@@ -51,6 +52,7 @@ use nalgebra::Matrix3;
 use neat_core::LineSegment3;
 use provenance::{EdgeProvenance, IndexedView, provenance};
 use rayon::prelude::*;
+use tracing::debug;
 
 /// How sure a wireframe is.
 #[derive(Clone, Debug, PartialEq)]
@@ -124,43 +126,53 @@ pub fn assess(
     config: &ConfidenceConfig,
 ) -> Result<Confidence, WireframeFlaw> {
     check_wireframe(&wireframe.junctions, &wireframe.edges)?;
+    let _span = tracing::debug_span!("confidence").entered();
     let radius = Some(scene_radius).filter(|radius| radius.is_normal() && *radius > 0.0);
     let views: Vec<Option<IndexedView>> = observations.par_iter().map(IndexedView::new).collect();
     let segments = wireframe.segments();
-    let found = provenance(&views, &segments, &config.provenance);
+    let (rules, existence, covariances) =
+        (config.provenance(), config.existence(), config.covariance());
+    let found = provenance(&views, &segments, &rules);
 
-    let occluder = Option::zip(surface, radius)
-        .map(|(surface, radius)| Occluder::new(surface, radius, config));
+    let occluder =
+        Option::zip(surface, radius).map(|(surface, radius)| Occluder::new(surface, radius));
     let count = |edges: &[LineSegment3], found: &[EdgeProvenance]| -> Vec<ViewCount> {
-        let count = |(edge, found)| view_count(observations, edge, found, &occluder, config);
+        let count = |(edge, found)| view_count(observations, edge, found, &occluder, &rules);
         // The surface answers in batches of its own; one edge after the other.
         edges.iter().zip(found).map(count).collect()
     };
     let counts = count(&segments, &found);
-    let decoys = decoys(&segments, config.existence.max_decoys);
+    let decoys = decoys(&segments, existence.max_decoys);
     let mut with_decoys = segments.clone();
     with_decoys.extend(&decoys);
     // Decoys compete with the edges for segments, as false edges would.
-    let found_decoys =
-        provenance(&views, &with_decoys, &config.provenance).split_off(segments.len());
+    let found_decoys = provenance(&views, &with_decoys, &rules).split_off(segments.len());
     let decoy_counts = count(&decoys, &found_decoys);
     let usable_views = views.iter().flatten().count();
-    let least = config.existence.least_expected_views(usable_views);
-    let model = ExistenceModel::fit(&counts, &decoy_counts, least, &config.existence);
+    let least = existence.least_expected_views(usable_views);
+    let model = ExistenceModel::fit(&counts, &decoy_counts, least, &existence);
 
     let ends = detected_ends(
         observations,
         &wireframe.junctions,
         &wireframe.edges,
         &found,
-        &config.covariance,
+        &covariances,
     );
     let estimate = covariance::estimate(
         observations,
         &wireframe.junctions,
         &ends,
         radius,
-        &config.covariance,
+        &covariances,
+    );
+    debug!(
+        views = usable_views,
+        edges = segments.len(),
+        decoys = decoys.len(),
+        detected_ends = ends.len(),
+        noise = ?estimate.noise,
+        "assessed"
     );
     let views_of_junctions = views_of_junctions(wireframe, &found);
     Ok(Confidence {
@@ -172,7 +184,7 @@ pub fn assess(
             .collect(),
         noise: estimate.noise,
         scene_radius,
-        tolerance_in_pixels: config.provenance.tolerance_in_pixels,
+        tolerance_in_pixels: config.tolerance_in_pixels,
     })
 }
 
@@ -181,9 +193,9 @@ fn view_count(
     edge: &LineSegment3,
     found: &EdgeProvenance,
     occluder: &Option<Occluder>,
-    config: &ConfidenceConfig,
+    rules: &ProvenanceConfig,
 ) -> ViewCount {
-    let expected = expected_views(observations, edge, occluder.as_ref(), &config.provenance);
+    let expected = expected_views(observations, edge, occluder.as_ref(), rules);
     let unexpected = (found.showing_views.iter())
         .filter(|view| expected.binary_search(view).is_err())
         .count();

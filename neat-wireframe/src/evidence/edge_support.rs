@@ -1,63 +1,38 @@
 //! In how many views a detection confirms an edge end by end.
 
 use neat_core::LineSegment2;
-use serde::{Deserialize, Serialize};
 
-/// When a view supports an edge, and how many views it takes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EdgeSupportConfig {
-    /// Both ends of a detection must be closer than this to the projected ends.
-    pub max_end_distance_in_pixels: f64,
-    /// The same limit as a share of the projected edge's length.
-    pub max_relative_end_distance: f64,
-    /// Share of the views that must support an edge …
-    pub required_share_of_views: f64,
-    /// … but at least this number …
-    pub min_required_views: usize,
-    /// … and never more than this.
-    pub max_required_views: usize,
-    /// Share of an edge's supporting views in which a detection must fit it
-    /// better than any other edge.
-    pub min_exclusive_share: f64,
+/// Both ends of a detection must be closer than this to the projected ends.
+pub(crate) const MAX_END_DISTANCE_IN_PIXELS: f64 = 4.0;
+/// The same limit as a share of the projected edge's length.
+const MAX_RELATIVE_END_DISTANCE: f64 = 0.15;
+/// Share of the views that must support an edge …
+const REQUIRED_SHARE_OF_VIEWS: f64 = 0.2;
+/// … but at least this number …
+const MIN_REQUIRED_VIEWS: usize = 2;
+/// … and never more than this.
+const MAX_REQUIRED_VIEWS: usize = 5;
+
+/// The number of supporting views that an edge needs in a scene of `views`
+/// views: `clip(round(0.2 V), 2, 5)`.
+pub fn required_views(views: usize) -> usize {
+    let share = (REQUIRED_SHARE_OF_VIEWS * views as f64).round_ties_even();
+    (share as usize)
+        .max(MIN_REQUIRED_VIEWS)
+        .min(MAX_REQUIRED_VIEWS)
 }
 
-impl Default for EdgeSupportConfig {
-    fn default() -> Self {
-        Self {
-            max_end_distance_in_pixels: 4.0,
-            max_relative_end_distance: 0.15,
-            required_share_of_views: 0.2,
-            min_required_views: 2,
-            max_required_views: 5,
-            min_exclusive_share: 0.5,
-        }
-    }
+/// Largest distance between a detection's ends and those of an edge of this
+/// projected length; the limit itself is too far.
+fn end_tolerance(projected_length: f64) -> f64 {
+    (MAX_RELATIVE_END_DISTANCE * projected_length).min(MAX_END_DISTANCE_IN_PIXELS)
 }
 
-impl EdgeSupportConfig {
-    /// The number of supporting views that an edge needs in a scene of `views`
-    /// views: `clip(round(0.2 V), 2, 5)` by default.
-    pub fn required_views(&self, views: usize) -> usize {
-        let share = (self.required_share_of_views * views as f64).round_ties_even();
-        // Saturating: a negative or NaN share becomes 0.
-        (share as usize)
-            .max(self.min_required_views)
-            .min(self.max_required_views)
-    }
-
-    /// Largest distance between a detection's ends and those of an edge of this
-    /// projected length; the limit itself is too far.
-    pub fn end_tolerance(&self, projected_length: f64) -> f64 {
-        (self.max_relative_end_distance * projected_length).min(self.max_end_distance_in_pixels)
-    }
-
-    /// Whether a detection lies on a projected edge, end on end in this order.
-    pub fn confirms(&self, edge: &LineSegment2, detection: &LineSegment2) -> bool {
-        let tolerance = self.end_tolerance(edge.length());
-        let [start, end] = edge.end_distances(detection);
-        start < tolerance && end < tolerance
-    }
+/// Whether a detection lies on a projected edge, end on end in this order.
+pub fn confirms(edge: &LineSegment2, detection: &LineSegment2) -> bool {
+    let tolerance = end_tolerance(edge.length());
+    let [start, end] = edge.end_distances(detection);
+    start < tolerance && end < tolerance
 }
 
 /// A pair of junctions with the views that speak for an edge between them.
@@ -72,14 +47,77 @@ pub struct SupportedEdge {
     pub visible_views: Option<usize>,
 }
 
+/// What faster ways to count are held against.
+#[cfg(test)]
+pub(crate) mod oracle {
+    use super::{SupportedEdge, confirms};
+    use crate::ViewObservation;
+    use crate::projection::project_in_front;
+    use nalgebra::Vector3;
+    use neat_core::LineSegment2;
+
+    /// The support of each given edge, in the same order.
+    ///
+    /// Edges that name a junction that does not exist have no support.
+    pub(crate) fn edge_support(
+        views: &[ViewObservation],
+        junctions: &[Vector3<f64>],
+        edges: &[[usize; 2]],
+    ) -> Vec<SupportedEdge> {
+        edges
+            .iter()
+            .map(|&[a, b]| SupportedEdge {
+                junctions: [a.min(b), a.max(b)],
+                support: views
+                    .iter()
+                    .filter(|view| {
+                        let project = |junction| project_in_front(&view.camera, junction);
+                        let projected = Option::zip(
+                            junctions.get(a).and_then(project),
+                            junctions.get(b).and_then(project),
+                        );
+                        projected.is_some_and(|(start, end)| {
+                            let edge = LineSegment2::new(start, end);
+                            view.segments.iter().any(|detection| {
+                                confirms(&edge, &detection.segment)
+                                    || confirms(&edge, &detection.segment.reversed())
+                            })
+                        })
+                    })
+                    .count(),
+                visible_views: None,
+            })
+            .collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::oracle::edge_support;
     use super::*;
+    use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
 
     #[test]
     fn required_views_follow_the_recipe() {
-        let config = EdgeSupportConfig::default();
-        let required = [0, 1, 10, 12, 13, 20, 25, 100].map(|v| config.required_views(v));
+        let required = [0, 1, 10, 12, 13, 20, 25, 100].map(required_views);
         assert_eq!(required, [2, 2, 2, 2, 3, 4, 5, 5]);
+    }
+
+    #[test]
+    fn support_counts_the_views_with_a_detection_on_the_edge() {
+        let (junctions, edges) = cube();
+        let mut views = views_of_edges(&cameras_on_sphere(8), &junctions, &edges);
+        for view in &mut views[..3] {
+            view.segments.remove(0);
+        }
+        for view in &mut views[5..] {
+            view.segments[1].segment = view.segments[1].segment.reversed();
+        }
+        let support = edge_support(&views, &junctions, &[edges[0], edges[1], [0, 7]]);
+        assert_eq!(support[0].support, 5);
+        assert_eq!(support[1].support, 8);
+        assert_eq!(support[2].support, 0);
+        let outside = edge_support(&views, &junctions, &[[0, 8]]);
+        assert_eq!(outside[0].support, 0);
     }
 }

@@ -4,5 +4,5 @@
 pub(crate) mod edge_support;
 pub(crate) mod occlusion;
 
-pub use edge_support::EdgeSupportConfig;
+pub use edge_support::{confirms, required_views};
 pub use occlusion::OcclusionConfig;

@@ -3,7 +3,6 @@
 use crate::{SignedDistance, ViewObservation};
 use nalgebra::Vector3;
 use neat_core::{Camera, LineSegment3};
-use serde::{Deserialize, Serialize};
 
 /// Sight lines are followed in this many rounds of interleaved samples.
 const ROUNDS: usize = 8;
@@ -13,8 +12,7 @@ const POINTS_PER_BATCH: usize = 1 << 16;
 
 /// Settings of [`visible_views`] and of the test that uses it. Lengths are in
 /// the unit of a scene whose ball has radius 1.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct OcclusionConfig {
     /// Points of an edge whose sight lines are followed.
     pub points_per_edge: usize,

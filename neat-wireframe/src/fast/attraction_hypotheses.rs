@@ -3,30 +3,14 @@
 use crate::SegmentProposal;
 use crate::index::PointIndex;
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// When a proposal suggests an edge; see [`attraction_hypotheses`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct AttractionHypothesesConfig {
-    /// Both ends must be closer than this to their junctions, in world units.
-    pub max_distance: f64,
-    /// The same limit as a share of the proposal's length.
-    pub max_relative_distance: f64,
-    /// Proposals that must suggest the same edge.
-    pub min_proposals: usize,
-}
-
-impl Default for AttractionHypothesesConfig {
-    fn default() -> Self {
-        Self {
-            max_distance: 0.15,
-            max_relative_distance: 0.3,
-            min_proposals: 3,
-        }
-    }
-}
+/// Both ends must be closer than this to their junctions, in world units.
+const MAX_DISTANCE: f64 = 0.15;
+/// The same limit as a share of the proposal's length.
+const MAX_RELATIVE_DISTANCE: f64 = 0.3;
+/// Proposals that must suggest the same edge.
+const MIN_PROPOSALS: usize = 3;
 
 /// The pairs `[a, b]`, a < b, of junctions nearest to the ends of enough
 /// proposals, sorted.
@@ -36,13 +20,11 @@ impl Default for AttractionHypothesesConfig {
 pub fn attraction_hypotheses(
     junctions: &[Vector3<f64>],
     proposals: &[SegmentProposal],
-    config: &AttractionHypothesesConfig,
 ) -> Vec<[usize; 2]> {
     let index = PointIndex::new(junctions.to_vec());
     let mut votes = BTreeMap::new();
     for proposal in proposals {
-        let limit =
-            (config.max_relative_distance * proposal.segment.length()).min(config.max_distance);
+        let limit = (MAX_RELATIVE_DISTANCE * proposal.segment.length()).min(MAX_DISTANCE);
         let [start, end] = proposal.segment.ends().map(|end| {
             index
                 .nearest_within(&end, limit)
@@ -57,7 +39,7 @@ pub fn attraction_hypotheses(
     }
     votes
         .into_iter()
-        .filter(|(_, votes)| *votes >= config.min_proposals)
+        .filter(|(_, votes)| *votes >= MIN_PROPOSALS)
         .map(|(pair, _)| pair)
         .collect()
 }
@@ -82,11 +64,10 @@ mod tests {
         let reversed = proposal(at(1.0, 0.1), at(0.0, -0.1));
         let far = proposal(at(0.0, 0.2), at(1.0, 0.0));
         let loop_at_one_junction = proposal(at(0.0, 0.0), at(0.01, 0.0));
-        let config = AttractionHypothesesConfig::default();
-        let hypotheses = |proposals: &[_]| attraction_hypotheses(&junctions, proposals, &config);
+        let hypotheses = |proposals: &[_]| attraction_hypotheses(&junctions, proposals);
         assert_eq!(hypotheses(&[near, reversed, near]), [[0, 1]]);
         assert!(hypotheses(&[near, reversed, far]).is_empty());
         assert!(hypotheses(&[loop_at_one_junction; 3]).is_empty());
-        assert!(attraction_hypotheses(&[], &[near; 3], &config).is_empty());
+        assert!(attraction_hypotheses(&[], &[near; 3]).is_empty());
     }
 }

@@ -6,31 +6,16 @@ use crate::index::{GrowingPointGrid, PointIndex};
 use crate::used_junctions::UsedJunctions;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
-use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Settings of [`clean_up`]; lengths in world units.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct CleanupConfig {
-    /// Junctions closer than this become one.
-    pub merge_distance: f64,
-    /// A junction closer than this to the inside of an edge lies on it.
-    pub collinear_distance: f64,
-    /// The inside of an edge excludes this share of it at both ends.
-    pub end_margin: f64,
-}
-
-impl Default for CleanupConfig {
-    fn default() -> Self {
-        Self {
-            merge_distance: 0.015,
-            collinear_distance: 0.006,
-            end_margin: 0.02,
-        }
-    }
-}
+// Lengths are shares of the scene's radius.
+/// Junctions closer than this become one.
+const MERGE_DISTANCE: f64 = 0.015;
+/// A junction closer than this to the inside of an edge lies on it.
+const COLLINEAR_DISTANCE: f64 = 0.006;
+/// The inside of an edge excludes this share of it at both ends.
+const END_MARGIN: f64 = 0.02;
 
 /// The edges by their pair of junctions.
 type EdgesByPair = BTreeMap<[usize; 2], SupportedEdge>;
@@ -48,11 +33,10 @@ pub fn clean_up(
     junctions: &[Vector3<f64>],
     edges: &[SupportedEdge],
     told_apart: &BTreeSet<[usize; 2]>,
-    config: &CleanupConfig,
 ) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
-    let merging = Merging::new(junctions, edges, told_apart, config.merge_distance);
+    let merging = Merging::new(junctions, edges, told_apart, MERGE_DISTANCE);
     let mut by_pair = merging.apply(edges);
-    resolve_collinear(&mut by_pair, junctions, &merging.kept, config);
+    resolve_collinear(&mut by_pair, junctions, &merging.kept, COLLINEAR_DISTANCE);
     drop_isolated(junctions, by_pair.into_values())
 }
 
@@ -136,7 +120,7 @@ fn resolve_collinear(
     edges: &mut EdgesByPair,
     junctions: &[Vector3<f64>],
     candidates: &[usize],
-    config: &CleanupConfig,
+    collinear_distance: f64,
 ) {
     let segment = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
     let index = PointIndex::new(candidates.iter().map(|c| junctions[*c]).collect());
@@ -151,12 +135,12 @@ fn resolve_collinear(
     for pair in longest_first {
         let [a, b] = pair;
         let long = segment(pair);
-        for c in near_segment(&long, &index, config.collinear_distance) {
+        for c in near_segment(&long, &index, collinear_distance) {
             let c = candidates[c];
             let Some(long_support) = edges.get(&pair).map(|edge| edge.support) else {
                 break;
             };
-            if c == a || c == b || !lies_inside(&long, &junctions[c], config) {
+            if c == a || c == b || !lies_inside(&long, &junctions[c], collinear_distance) {
                 continue;
             }
             let parts = [[a.min(c), a.max(c)], [b.min(c), b.max(c)]];
@@ -205,11 +189,9 @@ pub(crate) fn near_segment(
     near
 }
 
-fn lies_inside(edge: &LineSegment3, point: &Vector3<f64>, config: &CleanupConfig) -> bool {
+fn lies_inside(edge: &LineSegment3, point: &Vector3<f64>, collinear_distance: f64) -> bool {
     let t = edge.line_parameter(point);
-    t > config.end_margin
-        && t < 1.0 - config.end_margin
-        && (edge.point_at(t) - point).norm() < config.collinear_distance
+    t > END_MARGIN && t < 1.0 - END_MARGIN && (edge.point_at(t) - point).norm() < collinear_distance
 }
 
 /// The junctions that have edges, with edges that name them by their new index.
@@ -249,12 +231,7 @@ mod tests {
     type Graph = (Vec<Vector3<f64>>, Vec<([usize; 2], usize)>);
 
     fn cleaned(junctions: &[Vector3<f64>], edges: &[SupportedEdge]) -> Graph {
-        let (junctions, edges) = clean_up(
-            junctions,
-            edges,
-            &BTreeSet::new(),
-            &CleanupConfig::default(),
-        );
+        let (junctions, edges) = clean_up(junctions, edges, &BTreeSet::new());
         let edges = edges.iter().map(|e| (e.junctions, e.support)).collect();
         (junctions, edges)
     }
@@ -302,7 +279,7 @@ mod tests {
         edges: &mut EdgesByPair,
         junctions: &[Vector3<f64>],
         candidates: &[usize],
-        config: &CleanupConfig,
+        collinear_distance: f64,
     ) {
         let segment = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
         let mut longest_first: Vec<[usize; 2]> = edges.keys().copied().collect();
@@ -313,7 +290,10 @@ mod tests {
                 let Some(long_support) = edges.get(&pair).map(|edge| edge.support) else {
                     break;
                 };
-                if c == a || c == b || !lies_inside(&segment(pair), &junctions[c], config) {
+                if c == a
+                    || c == b
+                    || !lies_inside(&segment(pair), &junctions[c], collinear_distance)
+                {
                     continue;
                 }
                 let parts = [[a.min(c), a.max(c)], [b.min(c), b.max(c)]];
@@ -352,13 +332,10 @@ mod tests {
             .map(|edge| (edge.junctions, edge))
             .collect();
         let candidates: Vec<usize> = (0..150).rev().filter(|i| i % 7 != 0).collect();
-        let config = CleanupConfig {
-            collinear_distance: 0.03,
-            ..CleanupConfig::default()
-        };
+        let distance = 0.03;
         let (mut fast, mut scanned) = (edges.clone(), edges.clone());
-        resolve_collinear(&mut fast, &junctions, &candidates, &config);
-        resolve_by_scan(&mut scanned, &junctions, &candidates, &config);
+        resolve_collinear(&mut fast, &junctions, &candidates, distance);
+        resolve_by_scan(&mut scanned, &junctions, &candidates, distance);
         assert_eq!(fast, scanned);
         assert!(fast.len() + 30 < edges.len());
     }

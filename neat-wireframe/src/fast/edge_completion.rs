@@ -2,7 +2,7 @@
 //! them or not.
 
 use crate::ViewObservation;
-use crate::evidence::edge_support::{EdgeSupportConfig, SupportedEdge};
+use crate::evidence::edge_support::{MAX_END_DISTANCE_IN_PIXELS, SupportedEdge, confirms};
 use crate::index::PointIndex;
 use crate::projection::project_in_front;
 use nalgebra::Vector3;
@@ -20,11 +20,10 @@ pub fn complete_edges(
     views: &[ViewObservation],
     junctions: &[Vector3<f64>],
     required_views: usize,
-    config: &EdgeSupportConfig,
 ) -> Vec<SupportedEdge> {
     let pairs_of_views: Vec<BTreeSet<[usize; 2]>> = views
         .par_iter()
-        .map(|view| supported_pairs(view, junctions, config))
+        .map(|view| supported_pairs(view, junctions))
         .collect();
     let mut support = BTreeMap::new();
     for pair in pairs_of_views.into_iter().flatten() {
@@ -42,11 +41,7 @@ pub fn complete_edges(
 }
 
 /// The pairs `[a, b]`, a < b, that some detection of the view lies on.
-fn supported_pairs(
-    view: &ViewObservation,
-    junctions: &[Vector3<f64>],
-    config: &EdgeSupportConfig,
-) -> BTreeSet<[usize; 2]> {
+fn supported_pairs(view: &ViewObservation, junctions: &[Vector3<f64>]) -> BTreeSet<[usize; 2]> {
     let (indices, pixels): (Vec<_>, Vec<_>) = junctions
         .iter()
         .enumerate()
@@ -58,11 +53,11 @@ fn supported_pairs(
         let [near_start, near_end] = detection
             .segment
             .ends()
-            .map(|end| index.within(&end, config.max_end_distance_in_pixels));
+            .map(|end| index.within(&end, MAX_END_DISTANCE_IN_PIXELS));
         for start in &near_start {
             for end in &near_end {
                 let edge = LineSegment2::new(pixels[start.index], pixels[end.index]);
-                if start.index != end.index && config.confirms(&edge, &detection.segment) {
+                if start.index != end.index && confirms(&edge, &detection.segment) {
                     let (a, b) = (indices[start.index], indices[end.index]);
                     pairs.insert([a.min(b), a.max(b)]);
                 }
@@ -75,62 +70,8 @@ fn supported_pairs(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::evidence::edge_support::oracle::edge_support;
     use crate::test_scenes::{Noise, cameras_on_sphere, cube, views_of_edges};
-    use rayon::prelude::*;
-
-    /// The support of each given edge, in the same order.
-    ///
-    /// Edges that name a junction that does not exist have no support.
-    fn edge_support(
-        views: &[ViewObservation],
-        junctions: &[Vector3<f64>],
-        edges: &[[usize; 2]],
-        config: &EdgeSupportConfig,
-    ) -> Vec<SupportedEdge> {
-        edges
-            .par_iter()
-            .map(|&[a, b]| SupportedEdge {
-                junctions: [a.min(b), a.max(b)],
-                support: views
-                    .iter()
-                    .filter(|view| {
-                        let project = |junction| project_in_front(&view.camera, junction);
-                        let projected = Option::zip(
-                            junctions.get(a).and_then(project),
-                            junctions.get(b).and_then(project),
-                        );
-                        projected.is_some_and(|(start, end)| {
-                            let edge = LineSegment2::new(start, end);
-                            view.segments.iter().any(|detection| {
-                                config.confirms(&edge, &detection.segment)
-                                    || config.confirms(&edge, &detection.segment.reversed())
-                            })
-                        })
-                    })
-                    .count(),
-                visible_views: None,
-            })
-            .collect()
-    }
-
-    #[test]
-    fn support_counts_the_views_with_a_detection_on_the_edge() {
-        let (junctions, edges) = cube();
-        let mut views = views_of_edges(&cameras_on_sphere(8), &junctions, &edges);
-        for view in &mut views[..3] {
-            view.segments.remove(0);
-        }
-        for view in &mut views[5..] {
-            view.segments[1].segment = view.segments[1].segment.reversed();
-        }
-        let config = EdgeSupportConfig::default();
-        let support = edge_support(&views, &junctions, &[edges[0], edges[1], [0, 7]], &config);
-        assert_eq!(support[0].support, 5);
-        assert_eq!(support[1].support, 8);
-        assert_eq!(support[2].support, 0);
-        let outside = edge_support(&views, &junctions, &[[0, 8]], &config);
-        assert_eq!(outside[0].support, 0);
-    }
 
     #[test]
     fn the_result_is_that_of_all_pairs() {
@@ -149,24 +90,22 @@ mod tests {
         }
         // A camera inside the object has junctions behind it.
         views[0].camera.center_in_world = Vector3::new(0.1, 0.0, 0.2);
-        let config = EdgeSupportConfig::default();
         let all_pairs: Vec<_> = (0..60)
             .flat_map(|a| (a + 1..60).map(move |b| [a, b]))
             .collect();
         for required in 1..5 {
-            let mut expected = edge_support(&views, &junctions, &all_pairs, &config);
+            let mut expected = edge_support(&views, &junctions, &all_pairs);
             expected.retain(|edge| edge.support >= required);
             assert!(!expected.is_empty());
-            let completed = complete_edges(&views, &junctions, required, &config);
+            let completed = complete_edges(&views, &junctions, required);
             assert_eq!(completed, expected);
         }
     }
 
     #[test]
     fn nothing_comes_from_nothing() {
-        let config = EdgeSupportConfig::default();
-        assert!(complete_edges(&[], &[Vector3::zeros(); 2], 1, &config).is_empty());
+        assert!(complete_edges(&[], &[Vector3::zeros(); 2], 1).is_empty());
         let views = views_of_edges(&cameras_on_sphere(2), &[], &[]);
-        assert!(complete_edges(&views, &[], 1, &config).is_empty());
+        assert!(complete_edges(&views, &[], 1).is_empty());
     }
 }

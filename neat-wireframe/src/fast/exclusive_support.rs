@@ -5,27 +5,30 @@
 //! them, and so every edge of the one seems to be an edge of the other, too.
 
 use crate::ViewObservation;
-use crate::evidence::edge_support::{EdgeSupportConfig, SupportedEdge};
+use crate::evidence::edge_support::{MAX_END_DISTANCE_IN_PIXELS, SupportedEdge, confirms};
 use crate::index::PointIndex;
 use crate::projection::project_in_front;
 use nalgebra::{Vector2, Vector3};
 use neat_core::LineSegment2;
 use rayon::prelude::*;
 
+/// Share of an edge's supporting views in which a detection must fit it better than
+/// any other edge.
+const MIN_EXCLUSIVE_SHARE: f64 = 0.5;
+
 /// The edges, as they are, that win enough views when every detection counts for one
 /// edge only: of those it confirms, the one with the smallest squared distance of
 /// the ends, the first of equals. Enough are `required_views`, and
-/// [`EdgeSupportConfig::min_exclusive_share`] of the views that support the edge.
+/// [`MIN_EXCLUSIVE_SHARE`] of the views that support the edge.
 pub fn exclusively_supported(
     views: &[ViewObservation],
     junctions: &[Vector3<f64>],
     edges: &[SupportedEdge],
     required_views: usize,
-    config: &EdgeSupportConfig,
 ) -> Vec<SupportedEdge> {
     let won_in_views: Vec<Vec<usize>> = views
         .par_iter()
-        .map(|view| edges_with_a_detection(view, junctions, edges, config))
+        .map(|view| edges_with_a_detection(view, junctions, edges))
         .collect();
     let mut support = vec![0; edges.len()];
     for edge in won_in_views.into_iter().flatten() {
@@ -35,7 +38,7 @@ pub fn exclusively_supported(
         .iter()
         .zip(support)
         .filter(|(edge, support)| {
-            let share = (config.min_exclusive_share * edge.support as f64).ceil() as usize;
+            let share = (MIN_EXCLUSIVE_SHARE * edge.support as f64).ceil() as usize;
             *support >= required_views.max(share)
         })
         .map(|(edge, _)| *edge)
@@ -47,7 +50,6 @@ fn edges_with_a_detection(
     view: &ViewObservation,
     junctions: &[Vector3<f64>],
     edges: &[SupportedEdge],
-    config: &EdgeSupportConfig,
 ) -> Vec<usize> {
     let pixels: Vec<Option<Vector2<f64>>> = junctions
         .iter()
@@ -68,10 +70,10 @@ fn edges_with_a_detection(
         .iter()
         .filter_map(|detection| {
             let middle = detection.segment.point_at(0.5);
-            let near = middles.within(&middle, config.max_end_distance_in_pixels);
+            let near = middles.within(&middle, MAX_END_DISTANCE_IN_PIXELS);
             near.iter()
                 .filter_map(|near| {
-                    let misfit = misfit(&projected[near.index], &detection.segment, config)?;
+                    let misfit = misfit(&projected[near.index], &detection.segment)?;
                     Some((misfit, indices[near.index]))
                 })
                 .min_by(|a, b| a.0.total_cmp(&b.0))
@@ -84,14 +86,10 @@ fn edges_with_a_detection(
 }
 
 /// Sum of the squared distances of the ends, if the detection confirms the edge.
-fn misfit(
-    edge: &LineSegment2,
-    detection: &LineSegment2,
-    config: &EdgeSupportConfig,
-) -> Option<f64> {
+fn misfit(edge: &LineSegment2, detection: &LineSegment2) -> Option<f64> {
     [*detection, detection.reversed()]
         .iter()
-        .filter(|detection| config.confirms(edge, detection))
+        .filter(|detection| confirms(edge, detection))
         .map(|detection| {
             let [start, end] = edge.end_distances(detection);
             start * start + end * end
@@ -119,9 +117,8 @@ mod tests {
             detection.segment.start += noise_in_pixels * noise.vector().xy();
             detection.segment.end += noise_in_pixels * noise.vector().xy();
         }
-        let config = EdgeSupportConfig::default();
-        let all = complete_edges(&views, junctions, REQUIRED, &config);
-        let exclusive = exclusively_supported(&views, junctions, &all, REQUIRED, &config);
+        let all = complete_edges(&views, junctions, REQUIRED);
+        let exclusive = exclusively_supported(&views, junctions, &all, REQUIRED);
         [all, exclusive].map(|edges| edges.iter().map(|edge| edge.junctions).collect())
     }
 
@@ -149,10 +146,9 @@ mod tests {
     fn edges_without_rivals_keep_their_support() {
         let (junctions, truth) = cube();
         let views = views_of_edges(&cameras_on_sphere(10), &junctions, &truth);
-        let config = EdgeSupportConfig::default();
-        let all = complete_edges(&views, &junctions, REQUIRED, &config);
-        let exclusive = exclusively_supported(&views, &junctions, &all, REQUIRED, &config);
+        let all = complete_edges(&views, &junctions, REQUIRED);
+        let exclusive = exclusively_supported(&views, &junctions, &all, REQUIRED);
         assert_eq!(exclusive, all);
-        assert!(exclusively_supported(&[], &junctions, &all, 1, &config).is_empty());
+        assert!(exclusively_supported(&[], &junctions, &all, 1).is_empty());
     }
 }

@@ -5,7 +5,6 @@ use crate::index::{GrowingPointGrid, PointGrid, PointIndex, one_per_cell};
 use crate::segment_ends::SegmentEnd;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 /// Ends farther than this many sigmas from a point weigh less than 0.0004 of a
 /// near one: leaving them out makes the search near-linear.
@@ -15,51 +14,32 @@ const KERNEL_RADIUS_IN_SIGMAS: f64 = 4.0;
 /// same hill, and the time would grow with the square of the number of views.
 const START_CELL_IN_SIGMAS: f64 = 1.0;
 
-/// Settings of [`junction_modes`] and [`supported_junctions`]; lengths in world
-/// units.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct JunctionModesConfig {
-    /// Standard deviation of the Gaussian kernel.
-    pub sigma: f64,
-    /// Candidates keep more than this distance from each other.
-    pub separation: f64,
-    /// A mode needs more kernel-weighted mass than this: about two good ends.
-    pub min_mass: f64,
-    /// Mean shift steps of every search.
-    pub iterations: usize,
-    /// A perceived junction is supported by the ends closer than this.
-    pub perceived_radius: f64,
-    /// A perceived junction needs more mass of ends than this.
-    pub perceived_min_mass: f64,
-}
-
-impl Default for JunctionModesConfig {
-    fn default() -> Self {
-        Self {
-            sigma: 0.02,
-            separation: 0.04,
-            min_mass: 1.0,
-            iterations: 10,
-            perceived_radius: 0.03,
-            perceived_min_mass: 1.0,
-        }
-    }
-}
+/// Standard deviation of the Gaussian kernel.
+const SIGMA: f64 = 0.02;
+/// Candidates keep more than this distance from each other.
+const SEPARATION: f64 = 0.04;
+/// A mode needs more kernel-weighted mass than this: about two good ends.
+const MIN_MASS: f64 = 1.0;
+/// Mean shift steps of every search.
+const ITERATIONS: usize = 10;
+/// A perceived junction is supported by the ends closer than this.
+const PERCEIVED_RADIUS: f64 = 0.03;
+/// A perceived junction needs more mass of ends than this.
+const PERCEIVED_MIN_MASS: f64 = 1.0;
 
 /// The modes of the weighted density of `ends`, heaviest first.
 ///
 /// Mean shift from ends in all places; of modes closer than the separation the
 /// heaviest stays.
-pub fn junction_modes(ends: &[SegmentEnd], config: &JunctionModesConfig) -> Vec<Vector3<f64>> {
+pub fn junction_modes(ends: &[SegmentEnd]) -> Vec<Vector3<f64>> {
     let positions = ends.iter().map(|end| end.position);
-    let grid = PointGrid::new(positions.clone(), KERNEL_RADIUS_IN_SIGMAS * config.sigma);
-    let starts = one_per_cell(positions, START_CELL_IN_SIGMAS * config.sigma);
+    let grid = PointGrid::new(positions.clone(), KERNEL_RADIUS_IN_SIGMAS * SIGMA);
+    let starts = one_per_cell(positions, START_CELL_IN_SIGMAS * SIGMA);
     let modes = starts
         .par_iter()
-        .map(|start| climb(*start, ends, &grid, config))
+        .map(|start| climb(*start, ends, &grid))
         .collect();
-    separated(modes, config.min_mass, config.separation, &[])
+    separated(modes, MIN_MASS, SEPARATION, &[])
 }
 
 /// The perceived junctions (NEAT, global junction perceiving) that enough segment
@@ -69,38 +49,27 @@ pub fn supported_junctions(
     perceived: &[Vector3<f64>],
     ends: &[SegmentEnd],
     present: &[Vector3<f64>],
-    config: &JunctionModesConfig,
 ) -> Vec<Vector3<f64>> {
     let index = PointIndex::new(ends.iter().map(|end| end.position).collect());
     let candidates = perceived
         .iter()
         .filter(|position| position.iter().all(|x| x.is_finite()))
         .map(|position| {
-            let near = index.within(position, config.perceived_radius);
+            let near = index.within(position, PERCEIVED_RADIUS);
             let mass = near
                 .iter()
-                .filter(|neighbour| neighbour.distance < config.perceived_radius)
+                .filter(|neighbour| neighbour.distance < PERCEIVED_RADIUS)
                 .map(|neighbour| ends[neighbour.index].weight)
                 .sum();
             (*position, mass)
         })
         .collect();
-    separated(
-        candidates,
-        config.perceived_min_mass,
-        config.separation,
-        present,
-    )
+    separated(candidates, PERCEIVED_MIN_MASS, SEPARATION, present)
 }
 
 /// Follows the mean shift from `start`; the mode with its mass.
-fn climb(
-    start: Vector3<f64>,
-    ends: &[SegmentEnd],
-    grid: &PointGrid,
-    config: &JunctionModesConfig,
-) -> (Vector3<f64>, f64) {
-    let by_squared_distance = -0.5 / (config.sigma * config.sigma);
+fn climb(start: Vector3<f64>, ends: &[SegmentEnd], grid: &PointGrid) -> (Vector3<f64>, f64) {
+    let by_squared_distance = -0.5 / (SIGMA * SIGMA);
     let kernel_sums = |at: &Vector3<f64>| {
         let mut mass = 0.0;
         let mut weighted_sum = Vector3::zeros();
@@ -112,7 +81,7 @@ fn climb(
         (mass, weighted_sum)
     };
     let mut mode = start;
-    for _ in 0..config.iterations {
+    for _ in 0..ITERATIONS {
         let (mass, weighted_sum) = kernel_sums(&mode);
         if mass > 0.0 {
             mode = weighted_sum / mass;
@@ -182,31 +151,30 @@ mod tests {
     }
 
     /// The definition: every end pulls on every start.
-    fn all_pairs_modes(ends: &[SegmentEnd], config: &JunctionModesConfig) -> Vec<Vector3<f64>> {
+    fn all_pairs_modes(ends: &[SegmentEnd]) -> Vec<Vector3<f64>> {
         let kernel = |end: &SegmentEnd, at: &Vector3<f64>| {
             let squared = (end.position - at).norm_squared();
-            end.weight * (-squared / (2.0 * config.sigma * config.sigma)).exp()
+            end.weight * (-squared / (2.0 * SIGMA * SIGMA)).exp()
         };
         let modes = ends
             .iter()
             .map(|start| {
                 let mut x = start.position;
-                for _ in 0..config.iterations {
+                for _ in 0..ITERATIONS {
                     let sum: Vector3<f64> = ends.iter().map(|e| kernel(e, &x) * e.position).sum();
                     x = sum / ends.iter().map(|e| kernel(e, &x)).sum::<f64>();
                 }
                 (x, ends.iter().map(|e| kernel(e, &x)).sum())
             })
             .collect();
-        separated(modes, config.min_mass, config.separation, &[])
+        separated(modes, MIN_MASS, SEPARATION, &[])
     }
 
     #[test]
     fn modes_are_those_of_the_all_pairs_form() {
         let (centers, ends) = noisy_clusters(15);
-        let config = JunctionModesConfig::default();
-        let modes = junction_modes(&ends, &config);
-        let oracle = all_pairs_modes(&ends, &config);
+        let modes = junction_modes(&ends);
+        let oracle = all_pairs_modes(&ends);
         assert_eq!(modes.len(), centers.len());
         assert_eq!(modes.len(), oracle.len());
         for (mode, expected) in modes.iter().zip(&oracle) {
@@ -219,16 +187,14 @@ mod tests {
 
     #[test]
     fn a_lone_end_is_no_mode() {
-        let config = JunctionModesConfig::default();
         let lone = end(Vector3::new(0.3, 0.0, 0.0), 1.0);
-        assert!(junction_modes(&[lone], &config).is_empty());
-        assert!(junction_modes(&[], &config).is_empty());
-        assert_eq!(junction_modes(&[lone, lone], &config), [lone.position]);
+        assert!(junction_modes(&[lone]).is_empty());
+        assert!(junction_modes(&[]).is_empty());
+        assert_eq!(junction_modes(&[lone, lone]), [lone.position]);
     }
 
     #[test]
     fn perceived_junctions_need_support_and_distance() {
-        let config = JunctionModesConfig::default();
         let at = |x: f64| Vector3::new(x, 0.0, 0.0);
         let ends: Vec<_> = [0.0, 0.001, 0.5, 0.5, 0.51, 0.9]
             .iter()
@@ -237,11 +203,11 @@ mod tests {
         let perceived = [at(0.01), at(0.49), at(0.52), at(0.9), at(f64::NAN)];
         // 0.49 wins over 0.52: first of equal masses. 0.9 has one end only.
         assert_eq!(
-            supported_junctions(&perceived, &ends, &[], &config),
+            supported_junctions(&perceived, &ends, &[]),
             [at(0.49), at(0.01)]
         );
         assert_eq!(
-            supported_junctions(&perceived, &ends, &[at(0.0)], &config),
+            supported_junctions(&perceived, &ends, &[at(0.0)]),
             [at(0.49)]
         );
     }

@@ -18,45 +18,24 @@ use crate::triangulation::{JunctionObservation, TriangulationConfig, triangulate
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::Camera;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// Settings of [`split_junctions`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct JunctionSplittingConfig {
-    /// Pairs of ends that are triangulated to find a point.
-    pub hypotheses: usize,
-    /// Points of one mode at most.
-    pub max_junctions: usize,
-    /// An end agrees with a point within this multiple of the scene's noise …
-    pub inlier_radius_in_sigmas: f64,
-    /// … but at least this …
-    pub min_inlier_radius_in_pixels: f64,
-    /// … and at most this.
-    pub max_inlier_radius_in_pixels: f64,
-    /// Two points of a mode project this many radii apart, in the median view …
-    pub min_separation_in_radii: f64,
-    /// … and the rarer is seen in this share of the views of the other.
-    pub min_share_of_views: f64,
-    /// Cosine of the angle between two sight lines that fix a point, at most.
-    pub max_cosine: f64,
-}
-
-impl Default for JunctionSplittingConfig {
-    fn default() -> Self {
-        Self {
-            hypotheses: 200,
-            max_junctions: 4,
-            inlier_radius_in_sigmas: 4.0,
-            min_inlier_radius_in_pixels: 0.5,
-            max_inlier_radius_in_pixels: 2.0,
-            min_separation_in_radii: 3.0,
-            min_share_of_views: 0.25,
-            max_cosine: 0.98,
-        }
-    }
-}
+/// Pairs of ends that are triangulated to find a point.
+const HYPOTHESES: usize = 200;
+/// Points of one mode at most.
+const MAX_JUNCTIONS: usize = 4;
+/// An end agrees with a point within this multiple of the scene's noise …
+const INLIER_RADIUS_IN_SIGMAS: f64 = 4.0;
+/// … but at least this …
+const MIN_INLIER_RADIUS_IN_PIXELS: f64 = 0.5;
+/// … and at most this.
+const MAX_INLIER_RADIUS_IN_PIXELS: f64 = 2.0;
+/// Two points of a mode project this many radii apart, in the median view …
+const MIN_SEPARATION_IN_RADII: f64 = 3.0;
+/// … and the rarer is seen in this share of the views of the other.
+const MIN_SHARE_OF_VIEWS: f64 = 0.25;
+/// Cosine of the angle between two sight lines that fix a point, at most.
+const MAX_COSINE: f64 = 0.98;
 
 /// The junctions after splitting.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -84,18 +63,14 @@ pub fn split_junctions(
     views: &[ViewObservation],
     required_views: usize,
     triangulation: &TriangulationConfig,
-    config: &JunctionSplittingConfig,
 ) -> SplitJunctions {
     let sigma = noise_in_pixels(junctions, observations, views);
     let splitter = Splitter {
         views,
         required_views: required_views.max(2),
-        inlier_radius: (config.inlier_radius_in_sigmas * sigma).clamp(
-            config.min_inlier_radius_in_pixels,
-            config.max_inlier_radius_in_pixels,
-        ),
+        inlier_radius: (INLIER_RADIUS_IN_SIGMAS * sigma)
+            .clamp(MIN_INLIER_RADIUS_IN_PIXELS, MAX_INLIER_RADIUS_IN_PIXELS),
         triangulation,
-        config,
     };
     let index = PointIndex::new(junctions.to_vec());
     let points: Vec<Vec<Vector3<f64>>> = (0..junctions.len())
@@ -171,7 +146,6 @@ struct Splitter<'a> {
     required_views: usize,
     inlier_radius: f64,
     triangulation: &'a TriangulationConfig,
-    config: &'a JunctionSplittingConfig,
 }
 
 impl Splitter<'_> {
@@ -184,7 +158,7 @@ impl Splitter<'_> {
     ) -> Vec<Vector3<f64>> {
         let mut left = observations.to_vec();
         let mut points: Vec<Vector3<f64>> = Vec::new();
-        for _ in 0..self.config.max_junctions {
+        for _ in 0..MAX_JUNCTIONS {
             let Some(point) = self.consensus(&left) else {
                 break;
             };
@@ -203,7 +177,7 @@ impl Splitter<'_> {
     /// The point that most views agree on, refined; `None` if too few do.
     fn consensus(&self, observations: &[JunctionObservation]) -> Option<Vector3<f64>> {
         let mut best: Option<(usize, Vector3<f64>)> = None;
-        for [a, b] in spread_pairs(observations.len(), self.config.hypotheses) {
+        for [a, b] in spread_pairs(observations.len(), HYPOTHESES) {
             let (a, b) = (&observations[a], &observations[b]);
             let Some(point) = self.intersect(a, b) else {
                 continue;
@@ -268,10 +242,10 @@ impl Splitter<'_> {
             .collect();
         separations.sort_by(f64::total_cmp);
         let median = separations.get(separations.len() / 2);
-        let limit = self.config.min_separation_in_radii * self.inlier_radius;
+        let limit = MIN_SEPARATION_IN_RADII * self.inlier_radius;
         let (few, many) = (views_of_a.min(views_of_b), views_of_a.max(views_of_b));
         median.is_some_and(|median| *median > limit)
-            && few as f64 >= self.config.min_share_of_views * many as f64
+            && few as f64 >= MIN_SHARE_OF_VIEWS * many as f64
     }
 
     fn camera(&self, observation: &JunctionObservation) -> &Camera {
@@ -290,7 +264,7 @@ impl Splitter<'_> {
             (camera.center_in_world, direction(camera, &seen.pixel))
         };
         let ((origin_a, a), (origin_b, b)) = (sight_line(a), sight_line(b));
-        if a.dot(&b).abs() > self.config.max_cosine {
+        if a.dot(&b).abs() > MAX_COSINE {
             return None;
         }
         let off_line = |d: &Vector3<f64>| Matrix3::identity() - d * d.transpose();
@@ -379,7 +353,6 @@ mod tests {
             views,
             5,
             &TriangulationConfig::default(),
-            &JunctionSplittingConfig::default(),
         )
     }
 
@@ -396,7 +369,6 @@ mod tests {
             &views,
             5,
             &TriangulationConfig::default(),
-            &JunctionSplittingConfig::default(),
         );
         assert_eq!(found.told_apart, BTreeSet::from([[1, 3]]));
         assert_eq!([found.junctions[0], found.junctions[2]], others);
@@ -433,7 +405,6 @@ mod tests {
             &views,
             5,
             &TriangulationConfig::default(),
-            &JunctionSplittingConfig::default(),
         );
         assert_eq!(found.junctions.len(), 2);
         assert_eq!(found.junctions, corners);

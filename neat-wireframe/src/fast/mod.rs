@@ -8,172 +8,47 @@
 //! from the surface, which tells where an edge ought to be seen.
 //!
 //! All steps work in a world whose scene ball is the unit ball around the
-//! origin, so every length in the configuration is a share of the scene's radius.
+//! origin, so every length among the constants is a share of the scene's radius. The
+//! constants stand beside their use; unless a comment says so, none has been
+//! measured on its own.
 
 mod attraction_hypotheses;
 mod cleanup;
+mod config;
 mod edge_completion;
 mod exclusive_support;
 mod junction_modes;
 mod junction_splitting;
+mod report;
 mod step_report;
 mod touching_edges;
 mod usable_input;
 
 pub use crate::segment_ends::SegmentEnd;
-pub use junction_modes::{JunctionModesConfig, junction_modes};
+pub use config::FastBackEndConfig;
+pub use junction_modes::junction_modes;
+pub use report::{EdgeEvidence, FastBackEndReport, FastBackEndResult};
 pub use step_report::{Step, StepChange};
 
 use crate::bundle_adjustment::{BundleAdjustmentConfig, bundle_adjust};
-use crate::evidence::edge_support::{EdgeSupportConfig, SupportedEdge};
+use crate::evidence::edge_support::{SupportedEdge, required_views};
 use crate::evidence::occlusion::{OcclusionConfig, visible_views};
-use crate::segment_ends::{SegmentEndConfig, segment_ends};
+use crate::segment_ends::segment_ends;
 use crate::signed_distance::UnitBallSurface;
 use crate::triangulation::{TriangulationConfig, associate, retriangulate};
 use crate::{SegmentProposal, SignedDistance, ViewObservation};
-use attraction_hypotheses::{AttractionHypothesesConfig, attraction_hypotheses};
-use cleanup::{CleanupConfig, clean_up};
+use attraction_hypotheses::attraction_hypotheses;
+use cleanup::clean_up;
 use edge_completion::complete_edges;
 use exclusive_support::exclusively_supported;
 use junction_modes::supported_junctions;
-use junction_splitting::{JunctionSplittingConfig, SplitJunctions, split_junctions};
+use junction_splitting::{SplitJunctions, split_junctions};
 use nalgebra::Vector3;
 use neat_core::Wireframe3d;
-use serde::{Deserialize, Serialize};
 use step_report::GraphSize;
-use touching_edges::{TouchingEdgesConfig, split_touching_edges};
+use touching_edges::split_touching_edges;
+use tracing::debug;
 use usable_input::UsableInput;
-
-/// Switches and constants of [`run`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FastBackEndConfig {
-    /// Take the modes of the segment ends as junctions.
-    pub use_junction_modes: bool,
-    /// Take the perceived junctions that segment ends support.
-    pub use_perceived_junctions: bool,
-    /// Re-estimate the junctions from the 2D ends.
-    pub retriangulation: bool,
-    /// Split junctions that the images tell apart.
-    pub junction_splitting: bool,
-    /// Test all pairs of junctions as edges; off: those that proposals suggest.
-    pub edge_completion: bool,
-    /// Count every detection for the edge that it fits best, not for all.
-    pub exclusive_support: bool,
-    /// Move all junctions until the projected edges lie on the detections.
-    pub bundle_adjustment: bool,
-    /// Drop edges supported in too few of the views in which they are visible.
-    pub occlusion_test: bool,
-    /// Merge near junctions and collinear edges, drop isolated junctions.
-    pub cleanup: bool,
-    /// Split edges where others end on them or cross them.
-    pub edge_splitting: bool,
-    /// Which segment ends count, and how much.
-    pub ends: SegmentEndConfig,
-    /// Constants of the junction candidates.
-    pub modes: JunctionModesConfig,
-    /// Constants of the re-triangulation.
-    pub triangulation: TriangulationConfig,
-    /// Constants of the splitting.
-    pub splitting: JunctionSplittingConfig,
-    /// Constants of the edges that proposals suggest.
-    pub attraction: AttractionHypothesesConfig,
-    /// When views support an edge.
-    pub support: EdgeSupportConfig,
-    /// Constants of the bundle adjustment.
-    pub adjustment: BundleAdjustmentConfig,
-    /// Constants of the occlusion test.
-    pub occlusion: OcclusionConfig,
-    /// Constants of the clean-up.
-    pub merging: CleanupConfig,
-    /// Constants of the splitting of edges.
-    pub crossings: TouchingEdgesConfig,
-}
-
-impl Default for FastBackEndConfig {
-    fn default() -> Self {
-        Self {
-            use_junction_modes: true,
-            use_perceived_junctions: true,
-            retriangulation: true,
-            junction_splitting: true,
-            edge_completion: true,
-            exclusive_support: true,
-            bundle_adjustment: true,
-            occlusion_test: true,
-            cleanup: true,
-            edge_splitting: true,
-            ends: SegmentEndConfig::default(),
-            modes: JunctionModesConfig::default(),
-            triangulation: TriangulationConfig::default(),
-            splitting: JunctionSplittingConfig::default(),
-            attraction: AttractionHypothesesConfig::default(),
-            support: EdgeSupportConfig::default(),
-            adjustment: BundleAdjustmentConfig::default(),
-            occlusion: OcclusionConfig::default(),
-            merging: CleanupConfig::default(),
-            crossings: TouchingEdgesConfig::default(),
-        }
-    }
-}
-
-/// A wireframe with the evidence for each of its edges.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct FastBackEndResult {
-    /// Junctions in lexicographic order of their coordinates; edges `[a, b]`,
-    /// a < b, sorted.
-    pub wireframe: Wireframe3d,
-    /// One entry per edge of the wireframe.
-    pub edges: Vec<EdgeEvidence>,
-    /// What each step kept.
-    pub report: FastBackEndReport,
-}
-
-/// What speaks for an edge, as counted when it was chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct EdgeEvidence {
-    /// Number of views with a detection on the edge.
-    pub support: usize,
-    /// Number of views in which the surface leaves it visible; `None` without
-    /// the occlusion test.
-    pub visible_views: Option<usize>,
-    /// Support divided by visible views, see
-    /// [`OcclusionConfig::support_ratio`].
-    pub support_ratio: Option<f64>,
-}
-
-/// How many things each step of [`run`] kept, in the order of the steps.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FastBackEndReport {
-    /// Views with a finite camera and at least one finite segment.
-    pub usable_views: usize,
-    /// Finite proposals for a segment of such a view.
-    pub usable_proposals: usize,
-    /// Views that must support an edge.
-    pub required_views: usize,
-    /// Proposal ends that reproject well and on which the rays agree.
-    pub segment_ends: usize,
-    /// Junction candidates that are modes of these ends.
-    pub junction_modes: usize,
-    /// Perceived junctions that the ends support and no mode stands for.
-    pub added_perceived_junctions: usize,
-    /// Junctions after re-triangulation.
-    pub triangulated_junctions: usize,
-    /// Junctions split off from these.
-    pub split_junctions: usize,
-    /// Edges with enough support before any bundle adjustment.
-    pub supported_edges: usize,
-    /// Edges with enough support after it.
-    pub supported_edges_after_adjustment: usize,
-    /// Edges left by the occlusion test.
-    pub unoccluded_edges: usize,
-    /// Junctions of the result.
-    pub junctions: usize,
-    /// Edges of the result.
-    pub edges: usize,
-    /// What each step that ran added and removed, in their order.
-    pub steps: Vec<StepChange>,
-}
 
 /// Builds the wireframe.
 ///
@@ -184,7 +59,7 @@ pub struct FastBackEndReport {
 /// - `perceived_junctions`: further candidates, from global junction perceiving.
 /// - `surface`: asked for distances in the world of the cameras.
 /// - `scene_radius`: radius of the ball around the world's origin in which
-///   `surface` means something. Lengths in `config` are shares of it.
+///   `surface` means something.
 ///
 /// The result is empty where nothing can be built: no usable proposals, a
 /// radius that is not a positive number. It does not depend on the number of
@@ -221,20 +96,30 @@ pub fn run_observed(
     if !(scene_radius.is_normal() && scene_radius > 0.0) {
         return FastBackEndResult::default();
     }
+    let _span = tracing::debug_span!("fast", views = observations.len()).entered();
     let UsableInput { views, proposals } =
         UsableInput::new(observations, proposals, scene_radius.recip());
+    debug!(
+        views = views.len(),
+        proposals = proposals.len(),
+        perceived_junctions = perceived_junctions.len(),
+        "usable input"
+    );
     let perceived: Vec<_> = perceived_junctions
         .iter()
         .map(|junction| junction / scene_radius)
         .collect();
     let back_end = BackEnd {
-        required_views: config.support.required_views(views.len()),
+        required_views: required_views(views.len()),
         surface: UnitBallSurface {
             surface,
             scene_radius,
         },
         views: &views,
         proposals: &proposals,
+        triangulation: TriangulationConfig::default(),
+        adjustment: BundleAdjustmentConfig::default(),
+        occlusion: OcclusionConfig::default(),
         config,
     };
     let mut record = Record {
@@ -270,6 +155,15 @@ struct Record<'a> {
 
 impl Record<'_> {
     fn push(&mut self, step: StepChange) {
+        debug!(
+            step = ?step.step,
+            junctions = step.junctions,
+            edges = step.edges,
+            added_junctions = step.added_junctions,
+            removed_junctions = step.removed_junctions,
+            added_edges = step.added_edges,
+            removed_edges = step.removed_edges,
+        );
         (self.on_step)(&step);
         self.report.steps.push(step);
     }
@@ -302,6 +196,9 @@ struct BackEnd<'a> {
     proposals: &'a [SegmentProposal],
     surface: UnitBallSurface<'a>,
     required_views: usize,
+    triangulation: TriangulationConfig,
+    adjustment: BundleAdjustmentConfig,
+    occlusion: OcclusionConfig,
     config: &'a FastBackEndConfig,
 }
 
@@ -309,18 +206,18 @@ impl BackEnd<'_> {
     /// Candidates from the proposals' ends, re-triangulated.
     fn find_junctions(&self, perceived: &[Vector3<f64>], record: &mut Record) -> SplitJunctions {
         let config = self.config;
-        let ends = segment_ends(self.views, self.proposals, &config.ends);
+        let ends = segment_ends(self.views, self.proposals);
         record.report.segment_ends = ends.len();
 
         let mut junctions = Vec::new();
         if config.use_junction_modes {
-            junctions = junction_modes(&ends, &config.modes);
+            junctions = junction_modes(&ends);
             record.push_junctions(Step::JunctionModes, 0, junctions.len());
         }
         record.report.junction_modes = junctions.len();
         if config.use_perceived_junctions {
             let before = junctions.len();
-            let added = supported_junctions(perceived, &ends, &junctions, &config.modes);
+            let added = supported_junctions(perceived, &ends, &junctions);
             record.report.added_perceived_junctions = added.len();
             junctions.extend(added);
             record.push_junctions(Step::PerceivedJunctions, before, junctions.len());
@@ -332,7 +229,7 @@ impl BackEnd<'_> {
                 &ends,
                 self.views,
                 self.required_views,
-                &config.triangulation,
+                &self.triangulation,
             );
             record.push_junctions(Step::Retriangulation, before, junctions.len());
         }
@@ -341,10 +238,8 @@ impl BackEnd<'_> {
             junctions,
             ..SplitJunctions::default()
         };
-        if let (true, Some(round)) = (
-            config.junction_splitting,
-            config.triangulation.rounds.first(),
-        ) {
+        if let (true, Some(round)) = (config.junction_splitting, self.triangulation.rounds.first())
+        {
             let before = split.junctions.len();
             let observations = associate(&split.junctions, &ends, self.views, round);
             split = split_junctions(
@@ -352,8 +247,7 @@ impl BackEnd<'_> {
                 &observations,
                 self.views,
                 self.required_views,
-                &config.triangulation,
-                &config.splitting,
+                &self.triangulation,
             );
             let after = split.junctions.len();
             record.report.split_junctions = after - before;
@@ -373,14 +267,14 @@ impl BackEnd<'_> {
         record: &mut Record,
     ) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
         let config = self.config;
-        let hypotheses = (!config.edge_completion)
-            .then(|| attraction_hypotheses(&junctions, self.proposals, &config.attraction));
+        let hypotheses =
+            (!config.edge_completion).then(|| attraction_hypotheses(&junctions, self.proposals));
         let mut edges = self.supported_edges(&junctions, hypotheses.as_deref());
         record.report.supported_edges = edges.len();
         record.push_edges(Step::Edges, junctions.len(), &[], &edges);
 
         if config.bundle_adjustment {
-            for association in &config.adjustment.association_in_pixels {
+            for association in &self.adjustment.association_in_pixels {
                 junctions = self.adjust(&junctions, &edges, *association);
             }
             record.push_edges(Step::BundleAdjustment, junctions.len(), &edges, &edges);
@@ -401,18 +295,18 @@ impl BackEnd<'_> {
 
         if config.cleanup {
             let before = size_of(&junctions, &edges);
-            (junctions, edges) = clean_up(&junctions, &edges, &told_apart, &config.merging);
+            (junctions, edges) = clean_up(&junctions, &edges, &told_apart);
             let after = size_of(&junctions, &edges);
             record.push(StepChange::from_sizes(Step::CleanUp, before, after));
         }
         if config.bundle_adjustment {
-            let association = config.adjustment.final_association_in_pixels;
+            let association = self.adjustment.final_association_in_pixels;
             junctions = self.adjust(&junctions, &edges, association);
             record.push_edges(Step::FinalAdjustment, junctions.len(), &edges, &edges);
         }
         if config.edge_splitting {
             let before = size_of(&junctions, &edges);
-            (junctions, edges) = split_touching_edges(&junctions, &edges, &config.crossings);
+            (junctions, edges) = split_touching_edges(&junctions, &edges);
             let after = size_of(&junctions, &edges);
             record.push(StepChange::from_sizes(Step::EdgeSplitting, before, after));
         }
@@ -426,14 +320,13 @@ impl BackEnd<'_> {
         junctions: &[Vector3<f64>],
         hypotheses: Option<&[[usize; 2]]>,
     ) -> Vec<SupportedEdge> {
-        let config = &self.config.support;
         let required = self.required_views;
-        let mut edges = complete_edges(self.views, junctions, required, config);
+        let mut edges = complete_edges(self.views, junctions, required);
         if let Some(hypotheses) = hypotheses {
             edges.retain(|edge| hypotheses.binary_search(&edge.junctions).is_ok());
         }
         if self.config.exclusive_support {
-            exclusively_supported(self.views, junctions, &edges, required, config)
+            exclusively_supported(self.views, junctions, &edges, required)
         } else {
             edges
         }
@@ -450,7 +343,7 @@ impl BackEnd<'_> {
             junctions,
             &pairs_of(edges),
             association_in_pixels,
-            &self.config.adjustment,
+            &self.adjustment,
         )
         .junctions
     }
@@ -461,7 +354,7 @@ impl BackEnd<'_> {
         junctions: &[Vector3<f64>],
         edges: &[SupportedEdge],
     ) -> Vec<SupportedEdge> {
-        let config = &self.config.occlusion;
+        let config = &self.occlusion;
         let visible = visible_views(
             self.views,
             junctions,
@@ -485,7 +378,7 @@ impl BackEnd<'_> {
 
     fn evidence(&self, edge: &SupportedEdge) -> EdgeEvidence {
         let ratio = |visible| {
-            let config = &self.config.occlusion;
+            let config = &self.occlusion;
             config.support_ratio(edge.support, visible, self.views.len())
         };
         EdgeEvidence {
@@ -534,24 +427,6 @@ fn canonical_order(
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_configuration_names_only_what_it_changes_and_nothing_unknown() {
-        let config: FastBackEndConfig =
-            serde_json::from_str(r#"{"cleanup": false, "modes": {"sigma": 0.01}}"#).unwrap();
-        let mut expected = FastBackEndConfig {
-            cleanup: false,
-            ..Default::default()
-        };
-        expected.modes.sigma = 0.01;
-        assert_eq!(config, expected);
-        let text = serde_json::to_string(&config).unwrap();
-        let again: FastBackEndConfig = serde_json::from_str(&text).unwrap();
-        assert_eq!(again, config);
-        for unknown in [r#"{"clean": true}"#, r#"{"support": {"pixels": 4.0}}"#] {
-            assert!(serde_json::from_str::<FastBackEndConfig>(unknown).is_err());
-        }
-    }
 
     #[test]
     fn canonical_order_renames_the_junctions_of_the_edges() {

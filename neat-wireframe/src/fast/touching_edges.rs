@@ -9,30 +9,14 @@ use crate::evidence::edge_support::SupportedEdge;
 use crate::index::PointIndex;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Settings of [`split_touching_edges`]; lengths in world units.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct TouchingEdgesConfig {
-    /// Junctions and edges closer than this to an edge touch it.
-    pub touch_distance: f64,
-    /// Parts shorter than this are not cut off.
-    pub min_length: f64,
-    /// Sine of the angle between edges that cross, at least.
-    pub min_sine: f64,
-}
-
-impl Default for TouchingEdgesConfig {
-    fn default() -> Self {
-        Self {
-            touch_distance: 0.004,
-            min_length: 0.02,
-            min_sine: 0.2,
-        }
-    }
-}
+/// Junctions and edges closer than this to an edge touch it.
+const TOUCH_DISTANCE: f64 = 0.004;
+/// Parts shorter than this are not cut off.
+const MIN_LENGTH: f64 = 0.02;
+/// Sine of the angle between edges that cross, at least.
+const MIN_SINE: f64 = 0.2;
 
 /// Splits edges at the junctions that lie on their insides and at their mutual
 /// crossings, which become junctions, appended to the given ones. Parts inherit
@@ -43,7 +27,6 @@ impl Default for TouchingEdgesConfig {
 pub fn split_touching_edges(
     junctions: &[Vector3<f64>],
     edges: &[SupportedEdge],
-    config: &TouchingEdgesConfig,
 ) -> (Vec<Vector3<f64>>, Vec<SupportedEdge>) {
     let mut junctions = junctions.to_vec();
     let segments: Vec<LineSegment3> = edges
@@ -55,16 +38,15 @@ pub fn split_touching_edges(
     let mut cuts: Vec<Vec<(f64, usize)>> = segments
         .iter()
         .zip(edges)
-        .map(|(segment, edge)| junctions_inside(segment, edge, &junctions, &index, config))
+        .map(|(segment, edge)| junctions_inside(segment, edge, &junctions, &index))
         .collect();
-    for [a, b] in overlapping_boxes(&segments, config.touch_distance) {
-        let Some([t, u]) = crossing(&segments[a], &segments[b], config) else {
+    for [a, b] in overlapping_boxes(&segments, TOUCH_DISTANCE) {
+        let Some([t, u]) = crossing(&segments[a], &segments[b]) else {
             continue;
         };
         let cut_near = |edge: usize, place: f64| {
-            let near = |cut: &&(f64, usize)| {
-                (cut.0 - place).abs() * segments[edge].length() < config.min_length
-            };
+            let near =
+                |cut: &&(f64, usize)| (cut.0 - place).abs() * segments[edge].length() < MIN_LENGTH;
             cuts[edge].iter().find(near).map(|cut| cut.1)
         };
         match (cut_near(a, t), cut_near(b, u)) {
@@ -77,25 +59,11 @@ pub fn split_touching_edges(
             (Some(_), Some(_)) => {}
             // A third edge has made a junction here already, on one of the two.
             (Some(junction), None) => {
-                let cut = cut_at(
-                    &segments[b],
-                    &edges[b],
-                    &cuts[b],
-                    junction,
-                    &junctions,
-                    config,
-                );
+                let cut = cut_at(&segments[b], &edges[b], &cuts[b], junction, &junctions);
                 cuts[b].extend(cut);
             }
             (None, Some(junction)) => {
-                let cut = cut_at(
-                    &segments[a],
-                    &edges[a],
-                    &cuts[a],
-                    junction,
-                    &junctions,
-                    config,
-                );
+                let cut = cut_at(&segments[a], &edges[a], &cuts[a], junction, &junctions);
                 cuts[a].extend(cut);
             }
         }
@@ -132,22 +100,17 @@ fn cut_at(
     cuts: &[(f64, usize)],
     junction: usize,
     junctions: &[Vector3<f64>],
-    config: &TouchingEdgesConfig,
 ) -> Option<(f64, usize)> {
     let is_new = !edge.junctions.contains(&junction) && cuts.iter().all(|cut| cut.1 != junction);
-    let place = place_inside(segment, &junctions[junction], config);
+    let place = place_inside(segment, &junctions[junction]);
     place.filter(|_| is_new).map(|place| (place, junction))
 }
 
 /// Where a point touches the inside of a segment.
-fn place_inside(
-    segment: &LineSegment3,
-    point: &Vector3<f64>,
-    config: &TouchingEdgesConfig,
-) -> Option<f64> {
-    let margin = config.min_length / segment.length();
+fn place_inside(segment: &LineSegment3, point: &Vector3<f64>) -> Option<f64> {
+    let margin = MIN_LENGTH / segment.length();
     let place = segment.line_parameter(point);
-    let touches = (segment.point_at(place) - point).norm() < config.touch_distance;
+    let touches = (segment.point_at(place) - point).norm() < TOUCH_DISTANCE;
     (touches && place > margin && place < 1.0 - margin).then_some(place)
 }
 
@@ -158,18 +121,12 @@ fn junctions_inside(
     edge: &SupportedEdge,
     junctions: &[Vector3<f64>],
     index: &PointIndex<3>,
-    config: &TouchingEdgesConfig,
 ) -> Vec<(f64, usize)> {
-    let margin = config.min_length / segment.length();
-    let mut inside: Vec<(f64, usize)> = near_segment(segment, index, config.touch_distance)
+    let margin = MIN_LENGTH / segment.length();
+    let mut inside: Vec<(f64, usize)> = near_segment(segment, index, TOUCH_DISTANCE)
         .into_iter()
         .filter(|junction| !edge.junctions.contains(junction))
-        .filter_map(|junction| {
-            Some((
-                place_inside(segment, &junctions[junction], config)?,
-                junction,
-            ))
-        })
+        .filter_map(|junction| Some((place_inside(segment, &junctions[junction])?, junction)))
         .collect();
     inside.sort_by(|a, b| a.0.total_cmp(&b.0));
     inside.dedup_by(|later, earlier| later.0 - earlier.0 < margin);
@@ -178,21 +135,21 @@ fn junctions_inside(
 
 /// Where two edges touch, as places on each, if both are inside and the edges
 /// are not nearly parallel.
-fn crossing(a: &LineSegment3, b: &LineSegment3, config: &TouchingEdgesConfig) -> Option<[f64; 2]> {
+fn crossing(a: &LineSegment3, b: &LineSegment3) -> Option<[f64; 2]> {
     let (along_a, along_b) = (a.end - a.start, b.end - b.start);
     let normal = along_a.cross(&along_b);
     let squared_norm = normal.norm_squared();
-    if squared_norm <= (config.min_sine * along_a.norm() * along_b.norm()).powi(2) {
+    if squared_norm <= (MIN_SINE * along_a.norm() * along_b.norm()).powi(2) {
         return None;
     }
     let between = b.start - a.start;
     let t = between.cross(&along_b).dot(&normal) / squared_norm;
     let u = between.cross(&along_a).dot(&normal) / squared_norm;
     let inside = |place: f64, along: &Vector3<f64>| {
-        let margin = config.min_length / along.norm();
+        let margin = MIN_LENGTH / along.norm();
         place > margin && place < 1.0 - margin
     };
-    let touch = (a.point_at(t) - b.point_at(u)).norm() < config.touch_distance;
+    let touch = (a.point_at(t) - b.point_at(u)).norm() < TOUCH_DISTANCE;
     (touch && inside(t, &along_a) && inside(u, &along_b)).then_some([t, u])
 }
 
@@ -246,8 +203,7 @@ mod tests {
     }
 
     fn split(junctions: &[Vector3<f64>], edges: &[SupportedEdge]) -> Split {
-        let (junctions, edges) =
-            split_touching_edges(junctions, edges, &TouchingEdgesConfig::default());
+        let (junctions, edges) = split_touching_edges(junctions, edges);
         let edges = edges.iter().map(|e| (e.junctions, e.support)).collect();
         (junctions, edges)
     }

@@ -9,30 +9,14 @@ use super::line_refinement::{LineRefinementConfig, covered_parts, refine_line, s
 use super::projected_line::ProjectedLine;
 use super::view_segments::{SegmentId, TrackView, segment_of};
 use neat_core::LineSegment3;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// Settings of the tracks.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ClusteringConfig {
-    /// Both ends of a member lie within this distance of the projected line.
-    pub tolerance_in_pixels: f64,
-    /// A member shows at least this share of the shorter of itself and the track.
-    pub min_overlap: f64,
-    /// Sine of the angle between a member and the projected line at most.
-    pub max_sine: f64,
-}
-
-impl Default for ClusteringConfig {
-    fn default() -> Self {
-        Self {
-            tolerance_in_pixels: 2.0,
-            min_overlap: 0.3,
-            max_sine: 0.15,
-        }
-    }
-}
+/// Both ends of a member lie within this distance of the projected line.
+const TOLERANCE_IN_PIXELS: f64 = 2.0;
+/// A member shows at least this share of the shorter of itself and the track.
+const MIN_OVERLAP: f64 = 0.3;
+/// Sine of the angle between a member and the projected line at most.
+const MAX_SINE: f64 = 0.15;
 
 /// A 3D segment and the 2D segments that show it.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +45,6 @@ pub(super) fn grow_tracks(
     views: &[TrackView],
     consensus: &[Vec<Option<Consensus>>],
     min_views: usize,
-    config: &ClusteringConfig,
     refinement: &LineRefinementConfig,
 ) -> Vec<Track> {
     let links = symmetric_links(views, consensus);
@@ -88,7 +71,7 @@ pub(super) fn grow_tracks(
         let mut members = vec![seed];
         // Once on the seed's line, once on the line of all.
         for _ in 0..2 {
-            members = grow(views, &links, &free, seed, &line, config);
+            members = grow(views, &links, &free, seed, &line);
             if view_count(&members) < min_views {
                 break;
             }
@@ -136,7 +119,6 @@ fn grow(
     free: &[Vec<bool>],
     seed: SegmentId,
     line: &LineSegment3,
-    config: &ClusteringConfig,
 ) -> Vec<SegmentId> {
     let mut seen = BTreeSet::from([seed]);
     let mut members = vec![seed];
@@ -146,7 +128,7 @@ fn grow(
         for &partner in &links[member.view][member.segment] {
             if free[partner.view][partner.segment]
                 && !seen.contains(&partner)
-                && lies_on(views, partner, line, config)
+                && lies_on(views, partner, line)
             {
                 seen.insert(partner);
                 members.push(partner);
@@ -157,22 +139,17 @@ fn grow(
 }
 
 /// Whether a 2D segment shows a part of a 3D segment.
-pub(super) fn lies_on(
-    views: &[TrackView],
-    id: SegmentId,
-    line: &LineSegment3,
-    config: &ClusteringConfig,
-) -> bool {
+pub(super) fn lies_on(views: &[TrackView], id: SegmentId, line: &LineSegment3) -> bool {
     let segment = &segment_of(views, id).segment;
     let Some(projected) = ProjectedLine::new(&views[id.view].camera, line) else {
         return false;
     };
     let [start, end] = segment.ends().map(|end| projected.distance(&end));
-    let near = start.abs().max(end.abs()) <= config.tolerance_in_pixels
-        && (start - end).abs() <= config.max_sine * segment.length();
+    let near = start.abs().max(end.abs()) <= TOLERANCE_IN_PIXELS
+        && (start - end).abs() <= MAX_SINE * segment.length();
     near && shown_interval(views, id, line).is_some_and(|[low, high]| {
         let common = high.min(1.0) - low.max(0.0);
-        common >= config.min_overlap * (high - low).min(1.0)
+        common >= MIN_OVERLAP * (high - low).min(1.0)
     })
 }
 
@@ -211,26 +188,17 @@ pub(super) fn split_by_cover(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::line_tracks::consensus::{ConsensusConfig, find_consensus};
-    use crate::line_tracks::epipolar_matching::EpipolarMatchingConfig;
-    use crate::line_tracks::hypothesis_scoring::{HypothesisScoringConfig, score_hypotheses};
-    use crate::line_tracks::neighbours::{NeighboursConfig, neighbours};
+    use crate::line_tracks::consensus::find_consensus;
+    use crate::line_tracks::hypothesis_scoring::{Scoring, score_hypotheses};
+    use crate::line_tracks::neighbours::neighbours;
     use crate::line_tracks::test_tracks::{cube_edge, cube_views, end_distance};
 
     #[test]
     fn matching_consensus_and_growth_find_the_edges_of_a_cube() {
         let views = cube_views(20);
-        let neighbours = neighbours(&views, 1.2, &NeighboursConfig::default());
-        let alternatives = score_hypotheses(
-            &views,
-            &neighbours,
-            &[],
-            1.2,
-            3,
-            &EpipolarMatchingConfig::default(),
-            &HypothesisScoringConfig::default(),
-        );
-        let consensus = find_consensus(&views, &alternatives, 3, &ConsensusConfig::default());
+        let neighbours = neighbours(&views, 1.2, 10);
+        let alternatives = score_hypotheses(&views, &neighbours, &[], 1.2, 3, &Scoring::default());
+        let consensus = find_consensus(&views, &alternatives, 3);
         // The choice of nearly every segment is the true one.
         let mut right = 0;
         for (view, choices) in consensus.iter().enumerate() {
@@ -244,10 +212,8 @@ mod tests {
             }
         }
         assert!(right >= 220, "{right} of 240");
-
-        let config = ClusteringConfig::default();
         let refinement = LineRefinementConfig::default();
-        let tracks = grow_tracks(&views, &consensus, 3, &config, &refinement);
+        let tracks = grow_tracks(&views, &consensus, 3, &refinement);
         for edge in 0..12 {
             let found = tracks
                 .iter()
@@ -261,16 +227,15 @@ mod tests {
     #[test]
     fn segments_beside_or_beyond_a_line_do_not_lie_on_it() {
         let views = cube_views(3);
-        let config = ClusteringConfig::default();
         let id = SegmentId {
             view: 0,
             segment: 4,
         };
         let truth = cube_edge(4);
-        assert!(lies_on(&views, id, &truth, &config));
+        assert!(lies_on(&views, id, &truth));
         let beside = truth.map(|end| end + nalgebra::Vector3::repeat(0.03));
-        assert!(!lies_on(&views, id, &beside, &config));
+        assert!(!lies_on(&views, id, &beside));
         let beyond = LineSegment3::new(truth.point_at(1.1), truth.point_at(2.0));
-        assert!(!lies_on(&views, id, &beyond, &config));
+        assert!(!lies_on(&views, id, &beyond));
     }
 }

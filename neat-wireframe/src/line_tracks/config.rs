@@ -1,24 +1,9 @@
 //! Configuration of the line-track back end.
 
-use super::clustering::ClusteringConfig;
-use super::consensus::ConsensusConfig;
-use super::edge_confirmation::EdgeConfirmationConfig;
-use super::edge_splitting::EdgeSplittingConfig;
-use super::epipolar_matching::EpipolarMatchingConfig;
-use super::free_ends::FreeEndsConfig;
-use super::graph_adjustment::GraphAdjustmentConfig;
-use super::hypothesis_scoring::HypothesisScoringConfig;
-use super::isolated_edges::IsolatedEdgesConfig;
-use super::junction_graph::JunctionGraphConfig;
-use super::line_refinement::LineRefinementConfig;
-use super::neighbours::NeighboursConfig;
-use super::parallel_edges::ParallelEdgesConfig;
-use super::straight_junctions::StraightJunctionsConfig;
-use super::track_merging::TrackMergingConfig;
-use crate::evidence::occlusion::OcclusionConfig;
 use serde::{Deserialize, Serialize};
 
-/// Switches and constants of [`super::run`].
+/// What of [`super::run`] there is a reason to change. The constants of its steps
+/// stand beside them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LineTracksConfig {
@@ -28,41 +13,21 @@ pub struct LineTracksConfig {
     pub min_segment_length_in_pixels: f64,
     /// Structure lies within the scene ball times this.
     pub ball_margin: f64,
-    /// Which views are compared.
-    pub neighbours: NeighboursConfig,
-    /// Which segments are compared.
-    pub matching: EpipolarMatchingConfig,
-    /// What speaks for a 3D position.
-    pub scoring: HypothesisScoringConfig,
-    /// How segments choose among their positions.
-    pub consensus: ConsensusConfig,
-    /// When a segment belongs to a track.
-    pub clustering: ClusteringConfig,
-    /// How a track's line is found.
-    pub refinement: LineRefinementConfig,
-    /// Which tracks are one.
-    pub merging: TrackMergingConfig,
-    /// Which ends of tracks are one junction.
-    pub junctions: JunctionGraphConfig,
-    /// Which junctions are none.
-    pub straight: StraightJunctionsConfig,
-    /// Bundle adjustment of the graph.
-    pub adjustment: GraphAdjustmentConfig,
-    /// The final test of every edge.
-    pub confirmation: EdgeConfirmationConfig,
-    /// Which edges float alone.
-    pub isolation: IsolatedEdgesConfig,
-    /// Which edges are copies or pieces of others.
-    pub parallel: ParallelEdgesConfig,
-    /// Which free ends meet something.
-    pub free_ends: FreeEndsConfig,
-    /// Which junctions cut an edge.
-    pub splitting: EdgeSplittingConfig,
+    /// Views that each view is compared with, at most.
+    pub neighbours: usize,
+    /// What a proposal of the field that fully agrees adds, where a view adds 1.
+    pub prior_weight: f64,
+    /// Drop edges that are copies of others, and merge pieces.
+    pub parallel_edges: bool,
+    /// Join free ends with what they meet.
+    pub free_ends: bool,
+    /// Edges that cross on the inside of both share a junction.
+    pub edge_crossings: bool,
+    /// Junctions on the inside of an edge cut it.
+    pub edge_splitting: bool,
     /// Drop edges supported in too few of the views in which the surface leaves
     /// them visible; without a surface it says nothing.
     pub occlusion_test: bool,
-    /// Constants of the occlusion test.
-    pub occlusion: OcclusionConfig,
 }
 
 impl Default for LineTracksConfig {
@@ -71,23 +36,13 @@ impl Default for LineTracksConfig {
             min_views: 3,
             min_segment_length_in_pixels: 8.0,
             ball_margin: 1.5,
-            neighbours: NeighboursConfig::default(),
-            matching: EpipolarMatchingConfig::default(),
-            scoring: HypothesisScoringConfig::default(),
-            consensus: ConsensusConfig::default(),
-            clustering: ClusteringConfig::default(),
-            refinement: LineRefinementConfig::default(),
-            merging: TrackMergingConfig::default(),
-            junctions: JunctionGraphConfig::default(),
-            straight: StraightJunctionsConfig::default(),
-            adjustment: GraphAdjustmentConfig::default(),
-            confirmation: EdgeConfirmationConfig::default(),
-            isolation: IsolatedEdgesConfig::default(),
-            parallel: ParallelEdgesConfig::default(),
-            free_ends: FreeEndsConfig::default(),
-            splitting: EdgeSplittingConfig::default(),
+            neighbours: 10,
+            prior_weight: 1.0,
+            parallel_edges: true,
+            free_ends: true,
+            edge_crossings: true,
+            edge_splitting: true,
             occlusion_test: false,
-            occlusion: OcclusionConfig::default(),
         }
     }
 }
@@ -98,13 +53,13 @@ mod tests {
 
     #[test]
     fn a_configuration_names_only_what_it_changes_and_nothing_unknown() {
-        let text = r#"{"min_views": 4, "clustering": {"tolerance_in_pixels": 1.5}}"#;
+        let text = r#"{"min_views": 4, "neighbours": 12}"#;
         let config: LineTracksConfig = serde_json::from_str(text).unwrap();
-        let mut expected = LineTracksConfig {
+        let expected = LineTracksConfig {
             min_views: 4,
+            neighbours: 12,
             ..Default::default()
         };
-        expected.clustering.tolerance_in_pixels = 1.5;
         assert_eq!(config, expected);
         let text = serde_json::to_string(&config).unwrap();
         assert_eq!(

@@ -10,34 +10,17 @@ use super::hypothesis_scoring::{Alternatives, Hypothesis};
 use super::projected_line::ProjectedLine;
 use super::view_segments::{SegmentId, TrackView, VertexEnd, segment_of};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-/// Settings of the choice of one hypothesis per segment.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ConsensusConfig {
-    /// Rounds of choosing again.
-    pub rounds: usize,
-    /// Share of a partner's agreement that counts where the partner has chosen
-    /// another position.
-    pub one_sided_share: f64,
-    /// What a segment at the same vertex and the same depth adds; once per
-    /// vertex.
-    pub vertex_weight: f64,
-    /// A partner's position agrees if it projects this near to the segment.
-    pub tolerance_in_pixels: f64,
-}
-
-impl Default for ConsensusConfig {
-    fn default() -> Self {
-        Self {
-            rounds: 4,
-            one_sided_share: 0.2,
-            vertex_weight: 0.5,
-            tolerance_in_pixels: 3.0,
-        }
-    }
-}
+/// Rounds of choosing again.
+const ROUNDS: usize = 4;
+/// Share of a partner's agreement that counts where the partner has chosen
+/// another position.
+const ONE_SIDED_SHARE: f64 = 0.2;
+/// What a segment at the same vertex and the same depth adds; once per
+/// vertex.
+const VERTEX_WEIGHT: f64 = 0.5;
+/// A partner's position agrees if it projects this near to the segment.
+const TOLERANCE_IN_PIXELS: f64 = 3.0;
 
 /// A segment's position and the partners that hold it too.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,7 +39,6 @@ pub(super) fn find_consensus(
     views: &[TrackView],
     alternatives: &Alternatives,
     min_views: usize,
-    config: &ConsensusConfig,
 ) -> Vec<Vec<Option<Consensus>>> {
     // All choose the best supported position at first.
     let mut chosen: Vec<Vec<Option<usize>>> = alternatives
@@ -67,12 +49,11 @@ pub(super) fn find_consensus(
                 .collect()
         })
         .collect();
-    for _ in 0..config.rounds {
+    for _ in 0..ROUNDS {
         let choices = Choices {
             views,
             alternatives,
             chosen: &chosen,
-            config,
         };
         chosen = choices.map_segments(|id, list| {
             (0..list.len())
@@ -85,7 +66,6 @@ pub(super) fn find_consensus(
         views,
         alternatives,
         chosen: &chosen,
-        config,
     };
     choices.map_segments(|id, list| {
         let hypothesis = &list[choices.chosen[id.view][id.segment]?];
@@ -108,7 +88,6 @@ struct Choices<'a> {
     views: &'a [TrackView],
     alternatives: &'a Alternatives,
     chosen: &'a [Vec<Option<usize>>],
-    config: &'a ConsensusConfig,
 }
 
 impl Choices<'_> {
@@ -143,12 +122,12 @@ impl Choices<'_> {
                 let share = if self.agrees(support.id, id) {
                     1.0
                 } else {
-                    self.config.one_sided_share
+                    ONE_SIDED_SHARE
                 };
                 share * support.weight
             })
             .sum();
-        partners + self.config.vertex_weight * self.vertex_agreement(id, hypothesis)
+        partners + VERTEX_WEIGHT * self.vertex_agreement(id, hypothesis)
     }
 
     /// Whether the position that a partner has chosen projects onto the segment.
@@ -161,7 +140,7 @@ impl Choices<'_> {
         let position = self.views[partner.view].back_project(partner.segment, hypothesis.depths);
         let segment = &segment_of(self.views, id).segment;
         ProjectedLine::new(&self.views[id.view].camera, &position)
-            .is_some_and(|line| line.segment_distance(segment) <= self.config.tolerance_in_pixels)
+            .is_some_and(|line| line.segment_distance(segment) <= TOLERANCE_IN_PIXELS)
     }
 
     /// The number of the segment's ends at which another segment, with the same
@@ -177,7 +156,7 @@ impl Choices<'_> {
                 && self.hypothesis(other).is_some_and(|other| {
                     let noise = hypothesis.depth_noise[side].hypot(other.depth_noise[end.side]);
                     let difference = hypothesis.depths[side] - other.depths[end.side];
-                    difference.abs() <= self.config.tolerance_in_pixels * noise
+                    difference.abs() <= TOLERANCE_IN_PIXELS * noise
                 })
         };
         (0..2)

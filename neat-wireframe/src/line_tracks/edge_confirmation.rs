@@ -3,7 +3,7 @@
 //! An edge stays if enough views show it, among those that ought to, with
 //! segments that no stronger edge explains.
 
-use super::clustering::{ClusteringConfig, lies_on, view_count};
+use super::clustering::{lies_on, view_count};
 use super::graph_adjustment::segment_of_edge;
 use super::junction_graph::{GraphEdge, JunctionGraph};
 use super::line_refinement::shown_interval;
@@ -13,41 +13,22 @@ use super::view_segments::{SegmentId, TrackView, segment_of};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-/// Settings of the final test.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EdgeConfirmationConfig {
-    /// Supports lie this near to the edge in the mean.
-    pub max_mean_distance_in_pixels: f64,
-    /// Share of the views that ought to show the edge which do …
-    pub min_support_share: f64,
-    /// … and the same with the detector's score in the place of each view: texture
-    /// and curves make many weak detections.
-    pub min_score_share: f64,
-    /// Views within this angle of a view that shows the edge, with the whole edge
-    /// in the image, ought to show it too: what hides it would hide it there.
-    pub expected_angle_in_degrees: f64,
-    /// A view shows an edge if its segments cover this share of what of it lies in
-    /// the image: short pieces at a place here and there make no long edge.
-    pub min_covered_share: f64,
-    /// An edge explains a 2D segment if it covers this share of it.
-    pub min_explained_share: f64,
-}
-
-impl Default for EdgeConfirmationConfig {
-    fn default() -> Self {
-        Self {
-            max_mean_distance_in_pixels: 1.5,
-            min_support_share: 0.4,
-            min_score_share: 0.15,
-            expected_angle_in_degrees: 15.0,
-            min_covered_share: 0.3,
-            min_explained_share: 0.5,
-        }
-    }
-}
+/// Supports lie this near to the edge in the mean.
+const MAX_MEAN_DISTANCE_IN_PIXELS: f64 = 1.5;
+/// Share of the views that ought to show the edge which do …
+const MIN_SUPPORT_SHARE: f64 = 0.4;
+/// … and the same with the detector's score in the place of each view: texture
+/// and curves make many weak detections.
+const MIN_SCORE_SHARE: f64 = 0.15;
+/// Views within this angle of a view that shows the edge, with the whole edge
+/// in the image, ought to show it too: what hides it would hide it there.
+const EXPECTED_ANGLE_IN_DEGREES: f64 = 15.0;
+/// A view shows an edge if its segments cover this share of what of it lies in
+/// the image: short pieces at a place here and there make no long edge.
+const MIN_COVERED_SHARE: f64 = 0.3;
+/// An edge explains a 2D segment if it covers this share of it.
+const MIN_EXPLAINED_SHARE: f64 = 0.5;
 
 /// An edge with what speaks for it.
 struct Candidate {
@@ -60,17 +41,11 @@ struct Candidate {
 
 /// Gathers the supports of every edge anew, from all views, and drops the edges
 /// that fail the test.
-pub(super) fn confirm_edges(
-    views: &[TrackView],
-    graph: &mut JunctionGraph,
-    min_views: usize,
-    clustering: &ClusteringConfig,
-    config: &EdgeConfirmationConfig,
-) {
+pub(super) fn confirm_edges(views: &[TrackView], graph: &mut JunctionGraph, min_views: usize) {
     let candidates: Vec<Option<Candidate>> = graph
         .edges
         .par_iter()
-        .map(|edge| candidate(views, graph, edge, min_views, clustering, config))
+        .map(|edge| candidate(views, graph, edge, min_views))
         .collect();
     let mut candidates: Vec<Candidate> = candidates.into_iter().flatten().collect();
     candidates.sort_by(|a, b| {
@@ -103,18 +78,16 @@ fn candidate(
     graph: &JunctionGraph,
     edge: &GraphEdge,
     min_views: usize,
-    clustering: &ClusteringConfig,
-    config: &EdgeConfirmationConfig,
 ) -> Option<Candidate> {
     let line = segment_of_edge(graph, edge);
-    let supports = supports_of(views, &line, clustering, config);
+    let supports = supports_of(views, &line);
     if view_count(&supports) < min_views {
         return None;
     }
-    let (views_share, score_share) = support_shares(views, &supports, &line, config);
-    let enough = views_share >= config.min_support_share
-        && score_share >= config.min_score_share
-        && mean_distance(views, &supports, &line) <= config.max_mean_distance_in_pixels;
+    let (views_share, score_share) = support_shares(views, &supports, &line);
+    let enough = views_share >= MIN_SUPPORT_SHARE
+        && score_share >= MIN_SCORE_SHARE
+        && mean_distance(views, &supports, &line) <= MAX_MEAN_DISTANCE_IN_PIXELS;
     if !enough {
         return None;
     }
@@ -125,7 +98,7 @@ fn candidate(
             continue;
         };
         let share = (high.min(1.0) - low.max(0.0)) / (high - low);
-        if share >= config.min_explained_share {
+        if share >= MIN_EXPLAINED_SHARE {
             strength += share * segment_of(views, *id).segment.length();
             explained.push(*id);
         }
@@ -142,12 +115,7 @@ fn candidate(
 
 /// All 2D segments that lie on a 3D segment, of the views that show enough of it,
 /// ascending.
-fn supports_of(
-    views: &[TrackView],
-    line: &LineSegment3,
-    clustering: &ClusteringConfig,
-    config: &EdgeConfirmationConfig,
-) -> Vec<SegmentId> {
+fn supports_of(views: &[TrackView], line: &LineSegment3) -> Vec<SegmentId> {
     let mut supports = Vec::new();
     for (view, prepared) in views.iter().enumerate() {
         let Some(projected) = project_segment(prepared, line) else {
@@ -156,9 +124,9 @@ fn supports_of(
         let near = prepared.index.near(&projected).into_iter();
         let on_line: Vec<SegmentId> = near
             .map(|segment| SegmentId { view, segment })
-            .filter(|id| lies_on(views, *id, line, clustering))
+            .filter(|id| lies_on(views, *id, line))
             .collect();
-        if covered_share(views, view, &on_line, line) >= config.min_covered_share {
+        if covered_share(views, view, &on_line, line) >= MIN_COVERED_SHARE {
             supports.extend(on_line);
         }
     }
@@ -207,12 +175,7 @@ fn mean_distance(views: &[TrackView], supports: &[SegmentId], line: &LineSegment
 
 /// The views that show an edge as a share of those that ought to: as they are, and
 /// weighted by the score of the best detection.
-fn support_shares(
-    views: &[TrackView],
-    supports: &[SegmentId],
-    line: &LineSegment3,
-    config: &EdgeConfirmationConfig,
-) -> (f64, f64) {
+fn support_shares(views: &[TrackView], supports: &[SegmentId], line: &LineSegment3) -> (f64, f64) {
     let middle = line.point_at(0.5);
     let toward =
         |view: usize| -> Vector3<f64> { (views[view].camera.center_in_world - middle).normalize() };
@@ -226,7 +189,7 @@ fn support_shares(
             .fold(0.0, f64::max);
     }
     let directions: Vec<Vector3<f64>> = showing.iter().map(|view| toward(*view)).collect();
-    let min_cosine = config.expected_angle_in_degrees.to_radians().cos();
+    let min_cosine = EXPECTED_ANGLE_IN_DEGREES.to_radians().cos();
     let expected = (0..views.len())
         .filter(|view| {
             showing.binary_search(view).is_ok()
@@ -244,27 +207,16 @@ fn support_shares(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::line_tracks::junction_graph::{JunctionGraphConfig, junction_graph};
+    use crate::line_tracks::junction_graph::junction_graph;
     use crate::line_tracks::test_tracks::{cube_tracks, cube_views};
 
     fn confirmed(views: &[TrackView], mut graph: JunctionGraph) -> JunctionGraph {
-        confirm_edges(
-            views,
-            &mut graph,
-            3,
-            &ClusteringConfig::default(),
-            &EdgeConfirmationConfig::default(),
-        );
+        confirm_edges(views, &mut graph, 3);
         graph
     }
 
     fn cube_graph(views: &[TrackView]) -> JunctionGraph {
-        junction_graph(
-            views,
-            &cube_tracks(views),
-            3,
-            &JunctionGraphConfig::default(),
-        )
+        junction_graph(views, &cube_tracks(views), 3)
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! window: the crossing is a junction too.
 
 use super::certain_line::{CertainLine, certain_lines, meeting};
-use super::edge_splitting::{EdgeSplittingConfig, Split};
+use super::edge_splitting::{self, Split};
 use super::junction_graph::JunctionGraph;
 use super::line_refinement::LineRefinementConfig;
 use super::track_merging::project_segment;
@@ -21,14 +21,10 @@ pub(super) fn add_crossings(
     graph: &mut JunctionGraph,
     noise_in_pixels: f64,
     refinement: &LineRefinementConfig,
-    config: &EdgeSplittingConfig,
 ) -> Vec<Split> {
-    if !config.crossings {
-        return Vec::new();
-    }
     let lines = certain_lines(views, graph, refinement);
     let edges_of = graph.edges_of_segments(views);
-    let max_miss = config.max_crossing_miss_in_noise * noise_in_pixels;
+    let max_miss = edge_splitting::MAX_CROSSING_MISS_IN_NOISE * noise_in_pixels;
     let found: Vec<Vec<(usize, Vector3<f64>)>> = (0..lines.len())
         .into_par_iter()
         .map(|edge| {
@@ -40,7 +36,7 @@ pub(super) fn add_crossings(
                 .filter(|other| edge < *other && !share_junction(graph, edge, *other))
                 .filter_map(|other| {
                     let other_line = lines[other].as_ref()?;
-                    let place = crossing(views, line, other_line, max_miss, config)?;
+                    let place = crossing(views, line, other_line, max_miss)?;
                     Some((other, place))
                 })
                 .collect()
@@ -84,15 +80,15 @@ fn crossing(
     a: &CertainLine,
     b: &CertainLine,
     max_miss: f64,
-    config: &EdgeSplittingConfig,
 ) -> Option<Vector3<f64>> {
     // Most pairs end here, before anything is projected.
     let within = |parameters: [f64; 2]| {
         [a, b].iter().zip(parameters).all(|(line, t)| {
-            t.min(1.0 - t) * line.length_in_pixels() >= config.min_crossing_length_in_pixels
+            t.min(1.0 - t) * line.length_in_pixels()
+                >= edge_splitting::MIN_CROSSING_LENGTH_IN_PIXELS
         })
     };
-    let found = meeting(views, a, b, config.min_sine)?;
+    let found = meeting(views, a, b, edge_splitting::MIN_SINE)?;
     (found.miss_in_pixels <= max_miss && within(found.parameters)).then_some(found.place)
 }
 
@@ -129,13 +125,7 @@ mod tests {
             .collect();
         let mut graph = JunctionGraph { junctions, edges };
         let refinement = LineRefinementConfig::default();
-        let off = EdgeSplittingConfig {
-            crossings: false,
-            ..Default::default()
-        };
-        assert!(add_crossings(&views, &mut graph, 0.5, &refinement, &off).is_empty());
-        let config = EdgeSplittingConfig::default();
-        let splits = add_crossings(&views, &mut graph, 0.5, &refinement, &config);
+        let splits = add_crossings(&views, &mut graph, 0.5, &refinement);
         assert_eq!(splits, [0, 1].map(|edge| Split { edge, junction: 6 }));
         assert!((graph.junctions[6] - Vector3::new(0.0, 0.1, 0.0)).norm() < 1e-9);
     }

@@ -11,45 +11,21 @@ use nalgebra::Vector2;
 use neat_core::{LineSegment2, LineSegment3};
 use pathfinding::undirected::connected_components::components;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Which junctions lie on the inside of an edge.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EdgeSplittingConfig {
-    /// Junctions on the inside of an edge cut it; if not, edges stay whole.
-    pub enabled: bool,
-    /// Such a junction lies this near to the edge in the images, as a multiple of
-    /// the noise of the 2D segments.
-    pub max_distance_in_noise: f64,
-    /// Sine of the angle between its own edges and the one that it cuts, at least.
-    pub min_sine: f64,
-    /// Edges that cross on the inside of both share a junction …
-    pub crossings: bool,
-    /// … if they pass each other this near in the images, as a multiple of the
-    /// noise …
-    pub max_crossing_miss_in_noise: f64,
-    /// … and all four pieces are at least this long.
-    pub min_crossing_length_in_pixels: f64,
-    /// Pieces of other cuts are at least this long; junctions on one edge that are nearer to
-    /// each other become one.
-    pub min_length_in_pixels: f64,
-}
-
-impl Default for EdgeSplittingConfig {
-    fn default() -> Self {
-        Self {
-            enabled: true,
-            max_distance_in_noise: 2.0,
-            min_sine: 0.4,
-            crossings: true,
-            max_crossing_miss_in_noise: 1.5,
-            min_crossing_length_in_pixels: 10.0,
-            min_length_in_pixels: 4.0,
-        }
-    }
-}
+/// Such a junction lies this near to the edge in the images, as a multiple of
+/// the noise of the 2D segments.
+const MAX_DISTANCE_IN_NOISE: f64 = 2.0;
+/// Sine of the angle between its own edges and the one that it cuts, at least.
+pub(super) const MIN_SINE: f64 = 0.4;
+/// Edges that cross on the inside of both share a junction if they pass each
+/// other this near in the images, as a multiple of the noise …
+pub(super) const MAX_CROSSING_MISS_IN_NOISE: f64 = 1.5;
+/// … and all four pieces are at least this long.
+pub(super) const MIN_CROSSING_LENGTH_IN_PIXELS: f64 = 10.0;
+/// Pieces of other cuts are at least this long; junctions on one edge that are nearer to
+/// each other become one.
+const MIN_LENGTH_IN_PIXELS: f64 = 4.0;
 
 /// A junction on the inside of an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,14 +46,10 @@ pub(super) fn split_edges(
     min_views: usize,
     noise_in_pixels: f64,
     refinement: &LineRefinementConfig,
-    config: &EdgeSplittingConfig,
 ) -> usize {
-    if !config.enabled {
-        return 0;
-    }
     let lines = certain_lines(views, graph, refinement);
-    let max_distance = config.max_distance_in_noise * noise_in_pixels;
-    let mut splits = touching(views, graph, &lines, max_distance, config);
+    let max_distance = MAX_DISTANCE_IN_NOISE * noise_in_pixels;
+    let mut splits = touching(views, graph, &lines, max_distance);
     splits.extend(on_edges);
     splits.sort_unstable();
     splits.dedup();
@@ -91,7 +63,7 @@ pub(super) fn split_edges(
         let (of_edge, later) = rest.split_at(count);
         rest = later;
         let places = match &lines[index] {
-            Some(line) => inner_places(graph, line, of_edge, config, &mut same),
+            Some(line) => inner_places(graph, line, of_edge, &mut same),
             None => Vec::new(),
         };
         cut += usize::from(!places.is_empty());
@@ -135,7 +107,6 @@ fn touching(
     graph: &JunctionGraph,
     lines: &[Option<CertainLine>],
     max_distance: f64,
-    config: &EdgeSplittingConfig,
 ) -> Vec<Split> {
     let edges_of = graph.edges_of_segments(views);
     let mut edges_at: Vec<Vec<usize>> = vec![Vec::new(); graph.junctions.len()];
@@ -174,10 +145,9 @@ fn touching(
                 let Some(line) = &lines[*edge] else {
                     return false;
                 };
-                let across = |own: &&CertainLine| {
-                    own.direction.cross(&line.direction).norm() >= config.min_sine
-                };
-                is_inside(line, &place, config)
+                let across =
+                    |own: &&CertainLine| own.direction.cross(&line.direction).norm() >= MIN_SINE;
+                is_inside(line, &place)
                     && own.iter().all(across)
                     && line.distance_in_pixels(views, &place) <= max_distance
                     && mean_distance_in_pixels(views, &own_views, &line.line, &place)
@@ -192,13 +162,9 @@ fn touching(
 }
 
 /// Whether a place lies on the inside of a segment, both pieces being long enough.
-fn is_inside(
-    line: &CertainLine,
-    place: &nalgebra::Vector3<f64>,
-    config: &EdgeSplittingConfig,
-) -> bool {
+fn is_inside(line: &CertainLine, place: &nalgebra::Vector3<f64>) -> bool {
     let parameter = line.line.line_parameter(place);
-    parameter.min(1.0 - parameter) * line.length_in_pixels() >= config.min_length_in_pixels
+    parameter.min(1.0 - parameter) * line.length_in_pixels() >= MIN_LENGTH_IN_PIXELS
 }
 
 /// The junctions that cut an edge, in its order; those that lie at one place
@@ -207,13 +173,12 @@ fn inner_places(
     graph: &JunctionGraph,
     line: &CertainLine,
     splits: &[Split],
-    config: &EdgeSplittingConfig,
     same: &mut Vec<Vec<usize>>,
 ) -> Vec<usize> {
     let mut places: Vec<(f64, usize)> = splits
         .iter()
         .map(|split| split.junction)
-        .filter(|junction| is_inside(line, &graph.junctions[*junction], config))
+        .filter(|junction| is_inside(line, &graph.junctions[*junction]))
         .map(|junction| {
             (
                 line.line.line_parameter(&graph.junctions[junction]),
@@ -223,7 +188,7 @@ fn inner_places(
         .collect();
     places.sort_by(|(s, a), (t, b)| s.total_cmp(t).then(a.cmp(b)));
     places.dedup_by(|later, earlier| {
-        let near = (later.0 - earlier.0) * line.length_in_pixels() < config.min_length_in_pixels;
+        let near = (later.0 - earlier.0) * line.length_in_pixels() < MIN_LENGTH_IN_PIXELS;
         if near {
             same.push(vec![later.1, earlier.1]);
         }
@@ -300,28 +265,20 @@ mod tests {
             })
             .collect();
         let mut graph = JunctionGraph { junctions, edges };
-        let split = |graph: &mut JunctionGraph, on_edges: &[Split], enabled| {
-            let config = EdgeSplittingConfig {
-                enabled,
-                ..Default::default()
-            };
+        let split = |graph: &mut JunctionGraph, on_edges: &[Split]| {
             let refinement = LineRefinementConfig::default();
-            split_edges(&views, graph, on_edges, 3, 0.5, &refinement, &config)
+            split_edges(&views, graph, on_edges, 3, 0.5, &refinement)
         };
-        let mut untouched = graph.clone();
-        assert_eq!(split(&mut untouched, &[], false), 0);
-        assert_eq!(untouched, graph);
-
         let bar = Split {
             edge: 0,
             junction: 2,
         };
-        assert_eq!(split(&mut graph, &[bar], true), 1);
+        assert_eq!(split(&mut graph, &[bar]), 1);
         let pairs: Vec<_> = graph.edges.iter().map(|edge| edge.junctions).collect();
         assert_eq!(pairs, [[0, 4], [1, 2], [2, 3], [2, 4], [4, 5], [4, 6]]);
         assert!(graph.edges.iter().all(|edge| edge.supports.len() == 10));
         let again = graph.clone();
-        assert_eq!(split(&mut graph, &[], true), 0);
+        assert_eq!(split(&mut graph, &[]), 0);
         assert_eq!(graph, again);
     }
 }

@@ -1,7 +1,7 @@
 //! Ends of tracks that become one junction.
 
 use super::clustering::Track;
-use super::junction_graph::JunctionGraphConfig;
+use super::junction_graph;
 use super::view_segments::TrackView;
 use nalgebra::{Matrix3, Vector3};
 
@@ -49,17 +49,15 @@ impl<'a> TrackEnds<'a> {
 /// Clusters of ends that grow by joining.
 pub(super) struct Joining<'a> {
     ends: &'a TrackEnds<'a>,
-    config: &'a JunctionGraphConfig,
     cluster_of: Vec<usize>,
     /// Members of each cluster, ascending, and its position.
     clusters: Vec<(Vec<usize>, Vector3<f64>)>,
 }
 
 impl<'a> Joining<'a> {
-    pub(super) fn new(ends: &'a TrackEnds<'a>, config: &'a JunctionGraphConfig) -> Self {
+    pub(super) fn new(ends: &'a TrackEnds<'a>) -> Self {
         Self {
             ends,
-            config,
             cluster_of: (0..ends.positions.len()).collect(),
             clusters: ends
                 .positions
@@ -121,10 +119,10 @@ impl<'a> Joining<'a> {
         let along = offset.dot(&self.ends.directions[end]);
         let across = (offset - along * self.ends.directions[end]).norm();
         let pixel = self.ends.pixel_sizes[end];
-        let attach = 2.0 * self.config.attach_in_pixels;
-        let shift = (self.config.max_relative_shift * self.ends.length(end))
+        let attach = 2.0 * junction_graph::ATTACH_IN_PIXELS;
+        let shift = (junction_graph::MAX_RELATIVE_SHIFT * self.ends.length(end))
             .min(attach.min(max_shift_in_pixels) * pixel);
-        across <= self.config.max_line_distance_in_pixels * pixel && along.abs() <= shift
+        across <= junction_graph::MAX_LINE_DISTANCE_IN_PIXELS * pixel && along.abs() <= shift
     }
 
     /// The positions of all clusters and the cluster of every end.

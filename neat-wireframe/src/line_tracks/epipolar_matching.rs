@@ -10,31 +10,15 @@
 use super::neighbours::ball_interval;
 use super::view_segments::TrackView;
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
-/// Settings of the search for partners.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EpipolarMatchingConfig {
-    /// The common arc must be at least this share of the longer of the two arcs.
-    pub min_overlap: f64,
-    /// A pixel of noise may move a hypothesis by at most this share of its depth:
-    /// what lies nearly along its epipolar line is left out.
-    pub max_relative_depth_noise: f64,
-    /// Hypotheses nearer than this to the viewing direction are left out.
-    pub min_view_angle_in_degrees: f64,
-}
-
-impl Default for EpipolarMatchingConfig {
-    fn default() -> Self {
-        Self {
-            min_overlap: 0.25,
-            max_relative_depth_noise: 0.03,
-            min_view_angle_in_degrees: 5.0,
-        }
-    }
-}
+/// The common arc must be at least this share of the longer of the two arcs.
+const MIN_OVERLAP: f64 = 0.25;
+/// A pixel of noise may move a hypothesis by at most this share of its depth:
+/// what lies nearly along its epipolar line is left out.
+const MAX_RELATIVE_DEPTH_NOISE: f64 = 0.03;
+/// Hypotheses nearer than this to the viewing direction are left out.
+const MIN_VIEW_ANGLE_IN_DEGREES: f64 = 5.0;
 
 /// Arcs longer than this belong to segments that run past the epipole.
 const MAX_ARC: f64 = 2.0;
@@ -154,7 +138,6 @@ impl<'a> ViewPair<'a> {
         &self,
         segment: usize,
         ball_radius: f64,
-        config: &EpipolarMatchingConfig,
         matches: &mut Vec<LineMatch>,
     ) {
         let rays = &self.view.segments[segment].rays;
@@ -169,7 +152,7 @@ impl<'a> ViewPair<'a> {
             return;
         };
         let depth_ranges = [depth_ranges.0, depth_ranges.1];
-        let min_overlap = config.min_overlap.clamp(LEAST_OVERLAP, 1.0);
+        let min_overlap = MIN_OVERLAP.clamp(LEAST_OVERLAP, 1.0);
         // A longer arc could not overlap by its share.
         let lowest = arc.low - arc.length * (1.0 / min_overlap - 1.0);
         let highest = arc.low + arc.length;
@@ -183,9 +166,7 @@ impl<'a> ViewPair<'a> {
             if common < min_overlap * arc.length.max(other.length) {
                 continue;
             }
-            if let Some(found) =
-                self.triangulate(rays, &arc, *partner, other, &depth_ranges, config)
-            {
+            if let Some(found) = self.triangulate(rays, &arc, *partner, other, &depth_ranges) {
                 matches.push(found);
             }
         }
@@ -199,7 +180,6 @@ impl<'a> ViewPair<'a> {
         partner: usize,
         partner_arc: &Arc,
         depth_ranges: &[[f64; 2]; 2],
-        config: &EpipolarMatchingConfig,
     ) -> Option<LineMatch> {
         let prepared = &self.other.segments[partner];
         let normal = &prepared.plane_normal;
@@ -226,7 +206,7 @@ impl<'a> ViewPair<'a> {
             let place = (arc.ends[side] - partner_arc.low - half_arc) / half_arc;
             let leverage = (0.5 * (1.0 + place * place)).sqrt();
             let noise = from_other.norm() / self.other.focal_in_pixels / sine.abs() * leverage;
-            if noise > config.max_relative_depth_noise * depth {
+            if noise > MAX_RELATIVE_DEPTH_NOISE * depth {
                 return None;
             }
             depths[side] = depth;
@@ -234,7 +214,7 @@ impl<'a> ViewPair<'a> {
         }
         let direction = depths[1] * rays[1] - depths[0] * rays[0];
         let sine_to_view = direction.cross(&rays[0]).norm() / direction.norm();
-        (sine_to_view > config.min_view_angle_in_degrees.to_radians().sin()).then_some(LineMatch {
+        (sine_to_view > MIN_VIEW_ANGLE_IN_DEGREES.to_radians().sin()).then_some(LineMatch {
             slot: self.slot,
             segment: partner,
             depths,
@@ -260,11 +240,10 @@ mod tests {
             .map(|observation| TrackView::new(observation, 1.0, 1.0))
             .collect();
         let pair = ViewPair::new(&views[0], &views[1], 7).unwrap();
-        let config = EpipolarMatchingConfig::default();
         let mut found = 0;
         for (edge, [a, b]) in edges.iter().enumerate() {
             let mut matches = Vec::new();
-            pair.append_matches(edge, 1.2, &config, &mut matches);
+            pair.append_matches(edge, 1.2, &mut matches);
             for partner in matches.iter().filter(|m| m.segment == edge) {
                 found += 1;
                 assert_eq!(partner.slot, 7);

@@ -2,7 +2,7 @@
 
 use super::certain_line::{CertainLine, Meeting, certain_lines, meeting};
 use super::edge_splitting::Split;
-use super::free_ends::FreeEndsConfig;
+use super::free_ends;
 use super::junction_graph::JunctionGraph;
 use super::line_refinement::{LineRefinementConfig, shown_interval};
 use super::projected_line::ProjectedLine;
@@ -61,7 +61,6 @@ pub(super) struct Search<'a> {
     edges_of: Vec<Vec<Vec<usize>>>,
     max_miss: f64,
     max_bend: f64,
-    config: &'a FreeEndsConfig,
 }
 
 impl<'a> Search<'a> {
@@ -71,7 +70,6 @@ impl<'a> Search<'a> {
         on_edges: &[Split],
         noise_in_pixels: f64,
         refinement: &LineRefinementConfig,
-        config: &'a FreeEndsConfig,
     ) -> Self {
         let mut anchored = vec![false; graph.junctions.len()];
         for split in on_edges {
@@ -84,9 +82,8 @@ impl<'a> Search<'a> {
             degree: graph.degrees(),
             anchored,
             edges_of: graph.edges_of_segments(views),
-            max_miss: config.max_miss_in_noise * noise_in_pixels,
-            max_bend: config.max_bend_in_noise * noise_in_pixels,
-            config,
+            max_miss: free_ends::MAX_MISS_IN_NOISE * noise_in_pixels,
+            max_bend: free_ends::MAX_BEND_IN_NOISE * noise_in_pixels,
         }
     }
 
@@ -166,7 +163,7 @@ impl<'a> Search<'a> {
         other_line: &CertainLine,
     ) -> Option<Found> {
         let junction = self.graph.edges[edge].junctions[side];
-        let found = meeting(self.views, line, other_line, self.config.min_sine)?;
+        let found = meeting(self.views, line, other_line, free_ends::MIN_SINE)?;
         let shift = outward_shift(line, side, found.parameters[0]);
         let parameter = found.parameters[1];
         let other_side = usize::from(parameter > 0.5);
@@ -235,13 +232,13 @@ impl<'a> Search<'a> {
 
     /// Pixels by which an end moves without evidence for more.
     fn max_shift(&self, line: &CertainLine) -> f64 {
-        let relative = self.config.max_relative_shift * line.length_in_pixels();
-        relative.min(self.config.max_shift_in_pixels)
+        let relative = free_ends::MAX_RELATIVE_SHIFT * line.length_in_pixels();
+        relative.min(free_ends::MAX_SHIFT_IN_PIXELS)
     }
 
     /// Pixels by which an end moves at most.
     fn max_extension(&self, line: &CertainLine) -> f64 {
-        let covered = self.config.max_covered_extension * line.length_in_pixels();
+        let covered = free_ends::MAX_COVERED_EXTENSION * line.length_in_pixels();
         covered.max(self.max_shift(line))
     }
 
@@ -269,8 +266,8 @@ impl<'a> Search<'a> {
             .iter()
             .filter(|view| self.covers(**view, line, gap))
             .count();
-        covering >= self.config.min_covering_views
-            && covering as f64 >= self.config.min_covering_share * line.views.len() as f64
+        covering >= free_ends::MIN_COVERING_VIEWS
+            && covering as f64 >= free_ends::MIN_COVERING_SHARE * line.views.len() as f64
     }
 
     /// Whether the segments of a view that lie on the line show enough of an
@@ -297,7 +294,7 @@ impl<'a> Search<'a> {
             })
             .filter_map(|id| shown_interval(self.views, id, &line.line))
             .collect();
-        covered_length(shown, [low, high]) >= self.config.min_covered_share * (high - low)
+        covered_length(shown, [low, high]) >= free_ends::MIN_COVERED_SHARE * (high - low)
     }
 }
 

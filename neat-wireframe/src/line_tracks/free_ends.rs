@@ -12,54 +12,31 @@ use super::free_end_search::{Found, Search, Target};
 use super::junction_graph::JunctionGraph;
 use super::line_refinement::LineRefinementConfig;
 use super::view_segments::TrackView;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// Which free ends meet something.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct FreeEndsConfig {
-    /// Joined ends let others find them: the search is repeated up to this many
-    /// times. 0 switches the step off.
-    pub rounds: usize,
-    /// Edges that meet pass each other this near in their images, as a multiple of
-    /// the noise of the 2D segments.
-    pub max_miss_in_noise: f64,
-    /// An edge on which another one ends bends by at most this multiple of the
-    /// noise.
-    pub max_bend_in_noise: f64,
-    /// Sine of the angle between two edges that meet, at least.
-    pub min_sine: f64,
-    /// An end moves this far along its edge without further evidence …
-    pub max_shift_in_pixels: f64,
-    /// … and by at most this share of its edge.
-    pub max_relative_shift: f64,
-    /// It grows by up to this share of its edge where 2D segments cover the gap.
-    pub max_covered_extension: f64,
-    /// A view covers a gap if its segments on the line show this share of it.
-    pub min_covered_share: f64,
-    /// Views that cover a gap, at least …
-    pub min_covering_views: usize,
-    /// … and as a share of the views that show the edge.
-    pub min_covering_share: f64,
-}
-
-impl Default for FreeEndsConfig {
-    fn default() -> Self {
-        Self {
-            rounds: 3,
-            max_miss_in_noise: 3.0,
-            max_bend_in_noise: 1.0,
-            min_sine: 0.4,
-            max_shift_in_pixels: 12.0,
-            max_relative_shift: 0.25,
-            max_covered_extension: 0.5,
-            min_covered_share: 0.6,
-            min_covering_views: 2,
-            min_covering_share: 0.2,
-        }
-    }
-}
+/// Joined ends let others find them: the search is repeated up to this many
+/// times. 0 switches the step off.
+const ROUNDS: usize = 3;
+/// Edges that meet pass each other this near in their images, as a multiple of
+/// the noise of the 2D segments.
+pub(super) const MAX_MISS_IN_NOISE: f64 = 3.0;
+/// An edge on which another one ends bends by at most this multiple of the
+/// noise.
+pub(super) const MAX_BEND_IN_NOISE: f64 = 1.0;
+/// Sine of the angle between two edges that meet, at least.
+pub(super) const MIN_SINE: f64 = 0.4;
+/// An end moves this far along its edge without further evidence …
+pub(super) const MAX_SHIFT_IN_PIXELS: f64 = 12.0;
+/// … and by at most this share of its edge.
+pub(super) const MAX_RELATIVE_SHIFT: f64 = 0.25;
+/// It grows by up to this share of its edge where 2D segments cover the gap.
+pub(super) const MAX_COVERED_EXTENSION: f64 = 0.5;
+/// A view covers a gap if its segments on the line show this share of it.
+pub(super) const MIN_COVERED_SHARE: f64 = 0.6;
+/// Views that cover a gap, at least …
+pub(super) const MIN_COVERING_VIEWS: usize = 2;
+/// … and as a share of the views that show the edge.
+pub(super) const MIN_COVERING_SHARE: f64 = 0.2;
 
 /// What the step has done.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -79,19 +56,11 @@ pub(super) fn join_free_ends(
     graph: &mut JunctionGraph,
     noise_in_pixels: f64,
     refinement: &LineRefinementConfig,
-    config: &FreeEndsConfig,
 ) -> JoinedEnds {
     let mut joined = JoinedEnds::default();
-    for _ in 0..config.rounds {
-        let found = Search::new(
-            views,
-            graph,
-            &joined.on_edges,
-            noise_in_pixels,
-            refinement,
-            config,
-        )
-        .found();
+    for _ in 0..ROUNDS {
+        let found =
+            Search::new(views, graph, &joined.on_edges, noise_in_pixels, refinement).found();
         if !apply(graph, &found, &mut joined) {
             break;
         }
@@ -209,7 +178,7 @@ mod tests {
 
     fn join(views: &[TrackView], graph: &mut JunctionGraph) -> JoinedEnds {
         let refinement = LineRefinementConfig::default();
-        join_free_ends(views, graph, 0.5, &refinement, &FreeEndsConfig::default())
+        join_free_ends(views, graph, 0.5, &refinement)
     }
 
     #[test]

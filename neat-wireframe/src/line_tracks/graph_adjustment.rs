@@ -8,49 +8,29 @@ use crate::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, adjust_obser
 use crate::solve::Cauchy;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-/// Settings of the adjustment.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GraphAdjustmentConfig {
-    /// Weight of junction-to-end residuals relative to end-to-line ones.
-    pub end_weight: f64,
-    /// Scale of the Cauchy loss.
-    pub cauchy_scale_in_pixels: f64,
-    /// Ends of 2D segments this near to a projected junction pull it.
-    pub end_distance_in_pixels: f64,
-}
-
-impl Default for GraphAdjustmentConfig {
-    fn default() -> Self {
-        Self {
-            end_weight: 0.3,
-            cauchy_scale_in_pixels: 1.0,
-            end_distance_in_pixels: 4.0,
-        }
-    }
-}
+/// Ends of 2D segments this near to a projected junction pull it.
+const END_DISTANCE_IN_PIXELS: f64 = 4.0;
+/// What such an end weighs, where the line of a segment weighs 1.
+const END_WEIGHT: f64 = 0.3;
+/// Scale of the Cauchy loss.
+const CAUCHY_SCALE_IN_PIXELS: f64 = 1.0;
 
 /// Moves all junctions until the projected edges lie on their supports.
-pub(super) fn adjust_graph(
-    views: &[TrackView],
-    graph: &mut JunctionGraph,
-    config: &GraphAdjustmentConfig,
-) {
+pub(super) fn adjust_graph(views: &[TrackView], graph: &mut JunctionGraph) {
     let observed: Vec<ObservedEdge> = graph
         .edges
         .par_iter()
         .map(|edge| ObservedEdge {
             junctions: edge.junctions,
-            observations: observations(views, graph, edge, config),
+            observations: observations(views, graph, edge),
         })
         .collect();
     let loss = Loss {
         cauchy: Cauchy {
-            scale: config.cauchy_scale_in_pixels,
+            scale: CAUCHY_SCALE_IN_PIXELS,
         },
-        end_weight: config.end_weight,
+        end_weight: END_WEIGHT,
     };
     graph.junctions = adjust_observed(&observed, &graph.junctions, loss).junctions;
 }
@@ -59,7 +39,6 @@ fn observations(
     views: &[TrackView],
     graph: &JunctionGraph,
     edge: &GraphEdge,
-    config: &GraphAdjustmentConfig,
 ) -> Vec<EdgeObservation> {
     let line = segment_of_edge(graph, edge);
     edge.supports
@@ -74,7 +53,7 @@ fn observations(
                     .ends()
                     .into_iter()
                     .min_by(|a, b| (a - pixel).norm().total_cmp(&(b - pixel).norm()))
-                    .filter(|end| (end - pixel).norm() <= config.end_distance_in_pixels)
+                    .filter(|end| (end - pixel).norm() <= END_DISTANCE_IN_PIXELS)
             };
             Some(EdgeObservation {
                 camera: view.camera,
@@ -116,7 +95,7 @@ pub(super) fn segment_of_edge(graph: &JunctionGraph, edge: &GraphEdge) -> LineSe
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::line_tracks::junction_graph::{JunctionGraphConfig, junction_graph};
+    use crate::line_tracks::junction_graph::junction_graph;
     use crate::line_tracks::test_tracks::{cube_tracks, cube_views};
     use crate::test_scenes::{Noise, cube};
 
@@ -124,12 +103,12 @@ mod tests {
     fn displaced_corners_return() {
         let views = cube_views(12);
         let tracks = cube_tracks(&views);
-        let mut graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        let mut graph = junction_graph(&views, &tracks, 3);
         let mut noise = Noise(5);
         for junction in &mut graph.junctions {
             *junction += 0.01 * noise.vector();
         }
-        adjust_graph(&views, &mut graph, &GraphAdjustmentConfig::default());
+        adjust_graph(&views, &mut graph);
         for corner in cube().0 {
             assert!(graph.junctions.iter().any(|x| (x - corner).norm() < 1e-4));
         }

@@ -6,33 +6,31 @@
 //! pixel of the partner's noise makes are distances in that partner's image, so
 //! agreement is a reprojection test.
 
-use super::epipolar_matching::{EpipolarMatchingConfig, LineMatch, ViewPair};
+use super::epipolar_matching::{LineMatch, ViewPair};
 use super::view_segments::{SegmentId, TrackView};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Settings of the scores of hypotheses.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct HypothesisScoringConfig {
+/// Depth tolerance of a prior as a share of the depth, beside its own spread.
+const PRIOR_RELATIVE_TOLERANCE: f64 = 0.01;
+
+/// Settings of the scores of hypotheses, which the two users of them choose.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Scoring {
     /// Partners that project farther than this from a hypothesis do not agree.
     pub tolerance_in_pixels: f64,
     /// Hypotheses kept per segment, for the choice by mutual agreement.
     pub alternatives: usize,
     /// What a prior that fully agrees adds, where a view adds 1.
     pub prior_weight: f64,
-    /// Depth tolerance of a prior as a share of the depth, beside its own spread.
-    pub prior_relative_tolerance: f64,
 }
 
-impl Default for HypothesisScoringConfig {
+impl Default for Scoring {
     fn default() -> Self {
         Self {
             tolerance_in_pixels: 3.0,
             alternatives: 4,
             prior_weight: 1.0,
-            prior_relative_tolerance: 0.01,
         }
     }
 }
@@ -80,8 +78,7 @@ pub(super) fn score_hypotheses(
     priors: &[DepthPrior],
     ball_radius: f64,
     min_views: usize,
-    matching: &EpipolarMatchingConfig,
-    scoring: &HypothesisScoringConfig,
+    scoring: &Scoring,
 ) -> Alternatives {
     views
         .par_iter()
@@ -97,7 +94,7 @@ pub(super) fn score_hypotheses(
                 .map(|segment| {
                     let mut matches = Vec::new();
                     for pair in &pairs {
-                        pair.append_matches(segment, ball_radius, matching, &mut matches);
+                        pair.append_matches(segment, ball_radius, &mut matches);
                     }
                     let id = SegmentId { view: i, segment };
                     let prior = priors
@@ -119,7 +116,7 @@ struct Scorer<'a> {
     slots: Vec<Slot>,
     neighbours: &'a [usize],
     prior: Option<DepthPrior>,
-    config: &'a HypothesisScoringConfig,
+    config: &'a Scoring,
 }
 
 /// The partners in one neighbour.
@@ -138,7 +135,7 @@ impl<'a> Scorer<'a> {
         mut matches: Vec<LineMatch>,
         neighbours: &'a [usize],
         prior: Option<DepthPrior>,
-        config: &'a HypothesisScoringConfig,
+        config: &'a Scoring,
     ) -> Self {
         matches.sort_by(|a, b| {
             (a.slot.cmp(&b.slot))
@@ -264,8 +261,8 @@ impl<'a> Scorer<'a> {
         let prior = self.prior.map_or(0.0, |prior| {
             let relative = (0..2)
                 .map(|side| {
-                    let tolerance = prior.spreads[side]
-                        + self.config.prior_relative_tolerance * prior.depths[side].abs();
+                    let tolerance =
+                        prior.spreads[side] + PRIOR_RELATIVE_TOLERANCE * prior.depths[side].abs();
                     (depths[side] - prior.depths[side]).abs() / tolerance
                 })
                 .fold(0.0, f64::max);
@@ -348,7 +345,7 @@ mod tests {
             partner(1, 8, 9.0),
         ];
         let neighbours = [4, 2, 9];
-        let config = HypothesisScoringConfig::default();
+        let config = Scoring::default();
         let best = Scorer::new(matches.clone(), &neighbours, None, &config).best(3);
         assert_eq!(best.len(), 2);
         assert!((best[0].depths[0] - 5.0).abs() < 0.005);
@@ -382,7 +379,7 @@ mod tests {
             depths: [6.98, 8.02],
             spreads: [0.02; 2],
         };
-        let config = HypothesisScoringConfig::default();
+        let config = Scoring::default();
         let best = Scorer::new(matches, &[1, 2], Some(prior), &config).best(3);
         assert!((best[0].depths[0] - 7.0).abs() < 1e-9);
         assert_eq!(best.len(), 2);
@@ -390,7 +387,7 @@ mod tests {
 
     #[test]
     fn nothing_in_nothing_out() {
-        let config = HypothesisScoringConfig::default();
+        let config = Scoring::default();
         assert!(
             Scorer::new(Vec::new(), &[], None, &config)
                 .best(3)

@@ -11,38 +11,18 @@ use super::projected_line::line_parameter_of_ray;
 use super::view_segments::{SegmentId, TrackView, segment_of};
 use neat_core::LineSegment3;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-/// Which edges float alone.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct IsolatedEdgesConfig {
-    /// Depths that differ by less than this share are the same.
-    pub max_relative_depth_difference: f64,
-    /// An edge counts as many views as show it, times the share of its neighbours
-    /// in the images that have its depth; it stays if that is at least this share
-    /// of the views that every edge needs. Three views that agree by chance are
-    /// easily found on a façade, but seldom where all around agrees too.
-    pub min_accompanied_share: f64,
-}
-
-impl Default for IsolatedEdgesConfig {
-    fn default() -> Self {
-        Self {
-            max_relative_depth_difference: 0.08,
-            min_accompanied_share: 0.85,
-        }
-    }
-}
+/// Depths that differ by less than this share are the same.
+const MAX_RELATIVE_DEPTH_DIFFERENCE: f64 = 0.08;
+/// An edge counts as many views as show it, times the share of its neighbours
+/// in the images that have its depth; it stays if that is at least this share
+/// of the views that every edge needs. Three views that agree by chance are
+/// easily found on a façade, but seldom where all around agrees too.
+const MIN_ACCOMPANIED_SHARE: f64 = 0.85;
 
 /// Drops the edges that share no junction with another edge and are alone at
 /// their depth.
-pub(super) fn drop_isolated(
-    views: &[TrackView],
-    graph: &mut JunctionGraph,
-    min_views: usize,
-    config: &IsolatedEdgesConfig,
-) {
+pub(super) fn drop_isolated(views: &[TrackView], graph: &mut JunctionGraph, min_views: usize) {
     let degree = graph.degrees();
     let lines: Vec<LineSegment3> = graph
         .edges
@@ -76,13 +56,12 @@ pub(super) fn drop_isolated(
                 for (other_depth, _) in neighbours_in_image(views, *id, i, &shown) {
                     all += 1;
                     let difference = (other_depth - depth).abs();
-                    same += usize::from(difference < config.max_relative_depth_difference * depth);
+                    same += usize::from(difference < MAX_RELATIVE_DEPTH_DIFFERENCE * depth);
                 }
             }
             // One neighbour more of each kind: few say little.
             let share = (same + 1) as f64 / (all + 2) as f64;
-            share * view_count(&edge.supports) as f64
-                >= config.min_accompanied_share * min_views as f64
+            share * view_count(&edge.supports) as f64 >= MIN_ACCOMPANIED_SHARE * min_views as f64
         })
         .collect();
     let mut keep = keep.into_iter();
@@ -155,7 +134,7 @@ mod tests {
             })
             .collect();
         let mut graph = JunctionGraph { junctions, edges };
-        drop_isolated(&views, &mut graph, 3, &IsolatedEdgesConfig::default());
+        drop_isolated(&views, &mut graph, 3);
         assert_eq!(graph.edges.len(), 12);
         assert!(graph.edges.iter().all(|edge| edge.junctions != [24, 25]));
     }

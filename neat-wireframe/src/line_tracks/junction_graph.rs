@@ -12,46 +12,25 @@ use super::view_segments::{SegmentId, TrackView, VertexEnd};
 use crate::index::PointIndex;
 use crate::projection::project_in_front;
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Settings of the junctions.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct JunctionGraphConfig {
-    /// Views whose vertices must join two ends.
-    pub min_votes: usize,
-    /// A vertex belongs to a track's end if it lies this near to its projection …
-    pub attach_in_pixels: f64,
-    /// … or nearer than this share of the track's length, at most twice as far.
-    pub attach_relative: f64,
-    /// A junction lies this near to the line of each of its tracks.
-    pub max_line_distance_in_pixels: f64,
-    /// Ends nearer to each other than this are joined without any vote …
-    pub near_in_pixels: f64,
-    /// … and ends of lines that cross at a clear angle up to this distance:
-    /// detectors stop short of corners.
-    pub near_corner_in_pixels: f64,
-    /// Cosine of that angle at most.
-    pub max_corner_cosine: f64,
-    /// Joining moves no end along its track by more than this share of it.
-    pub max_relative_shift: f64,
-}
-
-impl Default for JunctionGraphConfig {
-    fn default() -> Self {
-        Self {
-            min_votes: 2,
-            attach_in_pixels: 12.0,
-            attach_relative: 0.15,
-            max_line_distance_in_pixels: 2.5,
-            near_in_pixels: 6.0,
-            near_corner_in_pixels: 18.0,
-            max_corner_cosine: 0.9,
-            max_relative_shift: 0.35,
-        }
-    }
-}
+/// Views whose vertices must join two ends.
+const MIN_VOTES: usize = 2;
+/// A vertex belongs to a track's end if it lies this near to its projection …
+pub(super) const ATTACH_IN_PIXELS: f64 = 12.0;
+/// … or nearer than this share of the track's length, at most twice as far.
+const ATTACH_RELATIVE: f64 = 0.15;
+/// A junction lies this near to the line of each of its tracks.
+pub(super) const MAX_LINE_DISTANCE_IN_PIXELS: f64 = 2.5;
+/// Ends nearer to each other than this are joined without any vote …
+const NEAR_IN_PIXELS: f64 = 6.0;
+/// … and ends of lines that cross at a clear angle up to this distance:
+/// detectors stop short of corners.
+const NEAR_CORNER_IN_PIXELS: f64 = 18.0;
+/// Cosine of that angle at most.
+const MAX_CORNER_COSINE: f64 = 0.9;
+/// Joining moves no end along its track by more than this share of it.
+pub(super) const MAX_RELATIVE_SHIFT: f64 = 0.35;
 
 /// An edge between two junctions with the 2D segments that show it.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,17 +84,16 @@ pub(super) fn junction_graph(
     views: &[TrackView],
     tracks: &[Track],
     min_views: usize,
-    config: &JunctionGraphConfig,
 ) -> JunctionGraph {
     let track_of = tracks_of_segments(views, tracks);
     let ends = TrackEnds::new(views, tracks);
-    let attached = attached_vertices(views, &ends, &track_of, config);
-    let mut joining = Joining::new(&ends, config);
-    for (_, [a, b]) in votes(&attached, config) {
+    let attached = attached_vertices(views, &ends, &track_of);
+    let mut joining = Joining::new(&ends);
+    for (_, [a, b]) in votes(&attached) {
         joining.join(a, b, f64::INFINITY);
     }
-    for (_, [a, b]) in near_pairs(&ends, config) {
-        joining.join(a, b, config.near_corner_in_pixels);
+    for (_, [a, b]) in near_pairs(&ends) {
+        joining.join(a, b, NEAR_CORNER_IN_PIXELS);
     }
     let (junctions, junction_of_end) = joining.junctions();
 
@@ -127,14 +105,7 @@ pub(super) fn junction_graph(
             supports.extend(&of_track.members);
         }
     }
-    let drawn = drawn_edges(
-        views,
-        &track_of,
-        &attached,
-        &junctions,
-        &junction_of_end,
-        config,
-    );
+    let drawn = drawn_edges(views, &track_of, &attached, &junctions, &junction_of_end);
     for (pair, supports) in drawn {
         if view_count(&supports) >= min_views {
             edges.entry(pair).or_default().extend(supports);
@@ -169,7 +140,6 @@ fn attached_vertices(
     views: &[TrackView],
     ends: &TrackEnds,
     track_of: &TrackOfSegment,
-    config: &JunctionGraphConfig,
 ) -> Vec<Attached> {
     let mut attached = Vec::new();
     for (view, prepared) in views.iter().enumerate() {
@@ -188,8 +158,8 @@ fn attached_vertices(
                 };
                 let distances = [(start - pixel).norm(), (stop - pixel).norm()];
                 let side = usize::from(distances[1] < distances[0]);
-                let relative = config.attach_relative * (stop - start).norm();
-                let reach = relative.clamp(config.attach_in_pixels, 2.0 * config.attach_in_pixels);
+                let relative = ATTACH_RELATIVE * (stop - start).norm();
+                let reach = relative.clamp(ATTACH_IN_PIXELS, 2.0 * ATTACH_IN_PIXELS);
                 if distances[side] <= reach {
                     attached.push(Attached {
                         view,
@@ -206,7 +176,7 @@ fn attached_vertices(
 }
 
 /// Pairs of ends that enough views join, most views first.
-fn votes(attached: &[Attached], config: &JunctionGraphConfig) -> Vec<(usize, [usize; 2])> {
+fn votes(attached: &[Attached]) -> Vec<(usize, [usize; 2])> {
     // The last view that voted, so that a view counts once.
     let mut votes: BTreeMap<[usize; 2], (usize, usize)> = BTreeMap::new();
     for group in attached.chunk_by(|a, b| (a.view, a.vertex) == (b.view, b.vertex)) {
@@ -225,7 +195,7 @@ fn votes(attached: &[Attached], config: &JunctionGraphConfig) -> Vec<(usize, [us
     }
     let mut pairs: Vec<(usize, [usize; 2])> = votes
         .into_iter()
-        .filter(|(_, (count, _))| *count >= config.min_votes)
+        .filter(|(_, (count, _))| *count >= MIN_VOTES)
         .map(|(pair, (count, _))| (count, pair))
         .collect();
     pairs.sort_by(|(x, a), (y, b)| y.cmp(x).then(a.cmp(b)));
@@ -233,21 +203,21 @@ fn votes(attached: &[Attached], config: &JunctionGraphConfig) -> Vec<(usize, [us
 }
 
 /// Pairs of ends that all but meet, nearest first.
-fn near_pairs(ends: &TrackEnds, config: &JunctionGraphConfig) -> Vec<(f64, [usize; 2])> {
+fn near_pairs(ends: &TrackEnds) -> Vec<(f64, [usize; 2])> {
     let index = PointIndex::new(ends.positions.clone());
     let mut pairs = Vec::new();
     for (a, position) in ends.positions.iter().enumerate() {
-        let farthest = config.near_in_pixels.max(config.near_corner_in_pixels);
+        let farthest = NEAR_IN_PIXELS.max(NEAR_CORNER_IN_PIXELS);
         let radius = farthest * ends.pixel_sizes[a];
         for neighbour in index.within(position, radius) {
             let b = neighbour.index;
             let size = ends.pixel_sizes[a].min(ends.pixel_sizes[b]);
             let distance = neighbour.distance / size;
             let cosine = ends.directions[a].dot(&ends.directions[b]).abs();
-            let reach = if cosine <= config.max_corner_cosine {
+            let reach = if cosine <= MAX_CORNER_COSINE {
                 farthest
             } else {
-                config.near_in_pixels
+                NEAR_IN_PIXELS
             };
             if a < b && a / 2 != b / 2 && distance <= reach {
                 pairs.push((distance, [a, b]));
@@ -266,7 +236,6 @@ fn drawn_edges(
     attached: &[Attached],
     junctions: &[Vector3<f64>],
     junction_of_end: &[usize],
-    config: &JunctionGraphConfig,
 ) -> BTreeMap<[usize; 2], Vec<SegmentId>> {
     let mut drawn: BTreeMap<[usize; 2], Vec<SegmentId>> = BTreeMap::new();
     for (view, prepared) in views.iter().enumerate() {
@@ -279,8 +248,7 @@ fn drawn_edges(
             };
             let distance = (pixel - prepared.vertex_position(a.vertex)).norm();
             let known = &mut junction_of_vertex[a.vertex];
-            if distance <= config.near_in_pixels && known.is_none_or(|(other, _)| distance < other)
-            {
+            if distance <= NEAR_IN_PIXELS && known.is_none_or(|(other, _)| distance < other) {
                 *known = Some((distance, junction));
             }
         }
@@ -310,7 +278,7 @@ mod tests {
     fn the_ends_of_a_cube_meet_in_its_corners() {
         let views = cube_views(12);
         let tracks = cube_tracks(&views);
-        let graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        let graph = junction_graph(&views, &tracks, 3);
         assert_eq!((graph.junctions.len(), graph.edges.len()), (8, 12));
         for corner in cube().0 {
             assert!(graph.junctions.iter().any(|x| (x - corner).norm() < 1e-9));
@@ -323,7 +291,7 @@ mod tests {
         let mut tracks = cube_tracks(&views);
         tracks.remove(7);
         tracks.remove(2);
-        let graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        let graph = junction_graph(&views, &tracks, 3);
         assert_eq!((graph.junctions.len(), graph.edges.len()), (8, 12));
         assert!(graph.edges.iter().all(|edge| edge.supports.len() == 12));
     }
@@ -334,14 +302,14 @@ mod tests {
         let mut tracks = cube_tracks(&views);
         let short = tracks[0].line;
         tracks[0].line.end = short.point_at(1e-3);
-        let graph = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        let graph = junction_graph(&views, &tracks, 3);
         assert!(
             graph
                 .edges
                 .iter()
                 .all(|edge| edge.junctions[0] != edge.junctions[1])
         );
-        let nothing = junction_graph(&[], &[], 3, &JunctionGraphConfig::default());
+        let nothing = junction_graph(&[], &[], 3);
         assert_eq!(nothing, JunctionGraph::default());
     }
 }

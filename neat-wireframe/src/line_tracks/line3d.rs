@@ -16,10 +16,9 @@
 //! | a line through a cluster, parts that three views show | by the principal axis of all end points |
 //! | optional diffusion, collinearity and bundle adjustment | left out |
 
-use super::epipolar_matching::EpipolarMatchingConfig;
 use super::graph_segmentation::{Link, segment_graph};
-use super::hypothesis_scoring::{Hypothesis, HypothesisScoringConfig, score_hypotheses};
-use super::neighbours::{NeighboursConfig, neighbours};
+use super::hypothesis_scoring::{Hypothesis, Scoring, score_hypotheses};
+use super::neighbours::neighbours;
 use super::projected_line::ProjectedLine;
 use super::report::SegmentSupport;
 use super::view_segments::{SegmentId, TrackView, segment_of};
@@ -41,9 +40,7 @@ pub struct Line3dConfig {
     /// Structure lies within the scene ball times this.
     pub ball_margin: f64,
     /// Which views are compared.
-    pub neighbours: NeighboursConfig,
-    /// Which segments are compared.
-    pub matching: EpipolarMatchingConfig,
+    pub neighbours: usize,
     /// Standard deviation of the distance of two images of one segment.
     pub sigma_in_pixels: f64,
     /// Standard deviation of the angle between two positions of one segment.
@@ -60,8 +57,7 @@ impl Default for Line3dConfig {
             min_views: 3,
             min_segment_length_in_pixels: 8.0,
             ball_margin: 1.5,
-            neighbours: NeighboursConfig::default(),
-            matching: EpipolarMatchingConfig::default(),
+            neighbours: 10,
             sigma_in_pixels: 2.5,
             sigma_in_degrees: 10.0,
             min_affinity: 0.5,
@@ -112,8 +108,8 @@ pub fn line3d(
             TrackView::new(observation, scene_radius.recip(), length)
         })
         .collect();
-    let neighbours = neighbours(&views, config.ball_margin, &config.neighbours);
-    let scoring = HypothesisScoringConfig {
+    let neighbours = neighbours(&views, config.ball_margin, config.neighbours);
+    let scoring = Scoring {
         // Agreement ends at two standard deviations.
         tolerance_in_pixels: 2.0 * config.sigma_in_pixels,
         alternatives: 1,
@@ -125,7 +121,6 @@ pub fn line3d(
         &[],
         config.ball_margin,
         min_views,
-        &config.matching,
         &scoring,
     );
     let positioned: Vec<Positioned> = (alternatives.into_iter().enumerate())

@@ -16,7 +16,8 @@
 //! abstraction using line segments* (Line3D++, 2017).
 //!
 //! All steps work in a world whose scene ball is the unit ball around the
-//! origin; thresholds are pixels of the images.
+//! origin; thresholds are pixels of the images. They are constants beside their use;
+//! unless a comment says so, none has been measured on its own.
 
 mod certain_line;
 mod clustering;
@@ -47,42 +48,28 @@ mod view_segments;
 #[cfg(test)]
 mod test_tracks;
 
-pub use clustering::ClusteringConfig;
 pub use config::LineTracksConfig;
-pub use consensus::ConsensusConfig;
-pub use edge_confirmation::EdgeConfirmationConfig;
-pub use edge_splitting::EdgeSplittingConfig;
-pub use epipolar_matching::EpipolarMatchingConfig;
-pub use free_ends::FreeEndsConfig;
-pub use graph_adjustment::GraphAdjustmentConfig;
-pub use hypothesis_scoring::HypothesisScoringConfig;
-pub use isolated_edges::IsolatedEdgesConfig;
-pub use junction_graph::JunctionGraphConfig;
-pub use line_refinement::LineRefinementConfig;
 pub use line3d::{Line3dConfig, Line3dSegment, line3d, wireframe_of_segments};
-pub use neighbours::NeighboursConfig;
-pub use parallel_edges::ParallelEdgesConfig;
-pub use report::{LineEvidence, LineTracksReport, LineTracksResult, SegmentSupport, StepTiming};
-pub use straight_junctions::StraightJunctionsConfig;
-pub use track_merging::TrackMergingConfig;
+pub use report::{LineEvidence, LineTracksReport, LineTracksResult, SegmentSupport};
 
-use crate::evidence::occlusion::visible_views;
+use crate::evidence::occlusion::{OcclusionConfig, visible_views};
 use crate::signed_distance::UnitBallSurface;
 use crate::{SegmentProposal, SignedDistance, ViewObservation, Wireframe3d};
-use clustering::{grow_tracks, view_count};
+use clustering::{Track, grow_tracks, view_count};
 use consensus::find_consensus;
 use edge_confirmation::confirm_edges;
 use edge_crossings::add_crossings;
 use edge_splitting::split_edges;
 use free_ends::join_free_ends;
 use graph_adjustment::{adjust_graph, noise_in_pixels};
-use hypothesis_scoring::{DepthPrior, score_hypotheses};
+use hypothesis_scoring::{DepthPrior, Scoring, score_hypotheses};
 use isolated_edges::drop_isolated;
 use junction_graph::{GraphEdge, JunctionGraph, junction_graph};
+use line_refinement::LineRefinementConfig;
 use parallel_edges::merge_parallel;
 use rayon::prelude::*;
-use std::time::Instant;
 use straight_junctions::dissolve_straight;
+use tracing::debug;
 use track_merging::{gather_unclaimed, merge_duplicates};
 use view_segments::{SegmentId, TrackView, segment_of};
 
@@ -98,8 +85,7 @@ use view_segments::{SegmentId, TrackView, segment_of};
 ///   structure lies.
 ///
 /// The result is empty where nothing can be built: too few usable views, a
-/// radius that is not a positive number. But for the timings it does not depend
-/// on the number of threads.
+/// radius that is not a positive number. It does not depend on the number of threads.
 pub fn run(
     observations: &[ViewObservation],
     priors: &[SegmentProposal],
@@ -110,170 +96,152 @@ pub fn run(
     if !(scene_radius.is_normal() && scene_radius > 0.0) {
         return LineTracksResult::default();
     }
-    let mut clock = StepClock::new();
-    let mut report = LineTracksReport::default();
-    let min_views = config.min_views.max(2);
+    let _span = tracing::debug_span!("line_tracks", views = observations.len()).entered();
     let views: Vec<TrackView> = observations
         .par_iter()
         .map(|observation| {
-            TrackView::new(
-                observation,
-                scene_radius.recip(),
-                config.min_segment_length_in_pixels,
-            )
+            let length = config.min_segment_length_in_pixels;
+            TrackView::new(observation, scene_radius.recip(), length)
         })
         .collect();
-    report.usable_views = views.iter().filter(|v| !v.segments.is_empty()).count();
-    report.usable_segments = views.iter().map(|v| v.segments.len()).sum();
-    let neighbours = neighbours::neighbours(&views, config.ball_margin, &config.neighbours);
-    report.neighbour_pairs = neighbours.iter().map(Vec::len).sum();
-    let priors = depth_priors(&views, priors, scene_radius.recip());
-    report.usable_priors = priors.len();
-    clock.end_of("preparation");
-
-    let alternatives = score_hypotheses(
-        &views,
-        &neighbours,
-        &priors,
-        config.ball_margin,
-        min_views,
-        &config.matching,
-        &config.scoring,
-    );
-    report.segments_with_hypotheses = alternatives
-        .iter()
-        .flatten()
-        .filter(|list| !list.is_empty())
-        .count();
-    clock.end_of("matching");
-
-    let consensus = find_consensus(&views, &alternatives, min_views, &config.consensus);
-    drop(alternatives);
-    report.segments_in_consensus = consensus.iter().flatten().flatten().count();
-    clock.end_of("consensus");
-
-    let tracks = grow_tracks(
-        &views,
-        &consensus,
-        min_views,
-        &config.clustering,
-        &config.refinement,
-    );
-    report.grown_tracks = tracks.len();
-    clock.end_of("tracks");
-
-    let merge = |tracks| {
-        merge_duplicates(
-            &views,
-            tracks,
-            min_views,
-            &config.merging,
-            &config.refinement,
-        )
+    let mut steps = Steps {
+        views: &views,
+        min_views: config.min_views.max(2),
+        refinement: LineRefinementConfig::default(),
+        config,
+        report: LineTracksReport::default(),
     };
-    let tracks = merge(tracks);
-    let tracks = gather_unclaimed(
-        &views,
-        tracks,
-        min_views,
-        &config.clustering,
-        &config.refinement,
-    );
-    let tracks = merge(tracks);
-    report.merged_tracks = tracks.len();
-    clock.end_of("merging");
-
-    let mut graph = junction_graph(&views, &tracks, min_views, &config.junctions);
-    dissolve_straight(&views, &mut graph, &config.straight);
-    report.graph_edges = graph.edges.len();
-    clock.end_of("junctions");
-
-    adjust_graph(&views, &mut graph, &config.adjustment);
-    confirm_edges(
-        &views,
-        &mut graph,
-        min_views,
-        &config.clustering,
-        &config.confirmation,
-    );
-    report.confirmed_edges = graph.edges.len();
-    drop_isolated(&views, &mut graph, min_views, &config.isolation);
-    report.accompanied_edges = graph.edges.len();
-    clock.end_of("adjustment");
-
-    let noise = noise_in_pixels(&views, &graph);
-    let merged = merge_parallel(&views, &mut graph, noise, &config.parallel);
-    report.dropped_copies = merged.copies;
-    report.merged_pieces = merged.pieces;
-    let joined = join_free_ends(
-        &views,
-        &mut graph,
-        noise,
-        &config.refinement,
-        &config.free_ends,
-    );
-    report.joined_corners = joined.corners;
-    report.attached_ends = joined.attached;
-    report.ends_on_edges = joined.on_edges.len();
-    let crossings = add_crossings(
-        &views,
-        &mut graph,
-        noise,
-        &config.refinement,
-        &config.splitting,
-    );
-    report.crossings = crossings.len() / 2;
-    report.split_edges = split_edges(
-        &views,
-        &mut graph,
-        &[joined.on_edges, crossings].concat(),
-        min_views,
-        noise,
-        &config.refinement,
-        &config.splitting,
-    );
-    clock.end_of("ends");
-
-    let mut visible = None;
-    if let (true, Some(surface)) = (config.occlusion_test, surface) {
+    let tracks = steps.tracks(&depth_priors(&views, priors, scene_radius.recip()));
+    let mut graph = steps.graph(&tracks);
+    steps.ends(&mut graph);
+    let visible = surface.filter(|_| config.occlusion_test).map(|surface| {
         let surface = UnitBallSurface {
             surface,
             scene_radius,
         };
-        visible = Some(drop_occluded(
-            observations,
-            &mut graph,
-            &surface,
-            scene_radius,
-            config,
-        ));
-        clock.end_of("occlusion");
+        drop_occluded(observations, &mut graph, &surface, scene_radius)
+    });
+    steps.report.unoccluded_edges = graph.edges.len();
+    result(&views, graph, visible, scene_radius, steps.report)
+}
+
+/// One run: what all steps need, and what they report.
+struct Steps<'a> {
+    views: &'a [TrackView],
+    min_views: usize,
+    refinement: LineRefinementConfig,
+    config: &'a LineTracksConfig,
+    report: LineTracksReport,
+}
+
+impl Steps<'_> {
+    /// Segments of several views on one line.
+    fn tracks(&mut self, priors: &[DepthPrior]) -> Vec<Track> {
+        let (views, min_views, config) = (self.views, self.min_views, self.config);
+        let (refinement, report) = (&self.refinement, &mut self.report);
+        report.usable_views = views.iter().filter(|v| !v.segments.is_empty()).count();
+        report.usable_segments = views.iter().map(|v| v.segments.len()).sum();
+        report.usable_priors = priors.len();
+        let neighbours = neighbours::neighbours(views, config.ball_margin, config.neighbours);
+        report.neighbour_pairs = neighbours.iter().map(Vec::len).sum();
+        debug!(
+            views = report.usable_views,
+            segments = report.usable_segments,
+            pairs = report.neighbour_pairs,
+            priors = report.usable_priors,
+            "prepared"
+        );
+
+        let scoring = Scoring {
+            prior_weight: config.prior_weight,
+            ..Default::default()
+        };
+        let margin = config.ball_margin;
+        let alternatives =
+            score_hypotheses(views, &neighbours, priors, margin, min_views, &scoring);
+        let lists = alternatives.iter().flatten();
+        report.segments_with_hypotheses = lists.filter(|list| !list.is_empty()).count();
+        debug!(segments = report.segments_with_hypotheses, "matched");
+
+        let consensus = find_consensus(views, &alternatives, min_views);
+        drop(alternatives);
+        report.segments_in_consensus = consensus.iter().flatten().flatten().count();
+        debug!(segments = report.segments_in_consensus, "in consensus");
+
+        let tracks = grow_tracks(views, &consensus, min_views, refinement);
+        report.grown_tracks = tracks.len();
+        let tracks = merge_duplicates(views, tracks, min_views, refinement);
+        let tracks = gather_unclaimed(views, tracks, min_views, refinement);
+        let tracks = merge_duplicates(views, tracks, min_views, refinement);
+        report.merged_tracks = tracks.len();
+        debug!(
+            grown = report.grown_tracks,
+            merged = report.merged_tracks,
+            "tracks"
+        );
+        tracks
     }
-    report.unoccluded_edges = graph.edges.len();
-    result(&views, graph, visible, scene_radius, report, clock.timings)
-}
 
-/// Measures the steps.
-struct StepClock {
-    last: Instant,
-    timings: Vec<StepTiming>,
-}
+    /// The tracks joined where 2D vertices join them, adjusted, without edges that
+    /// the images do not confirm.
+    fn graph(&mut self, tracks: &[Track]) -> JunctionGraph {
+        let (views, min_views, report) = (self.views, self.min_views, &mut self.report);
+        let mut graph = junction_graph(views, tracks, min_views);
+        dissolve_straight(views, &mut graph);
+        report.graph_edges = graph.edges.len();
+        adjust_graph(views, &mut graph);
+        confirm_edges(views, &mut graph, min_views);
+        report.confirmed_edges = graph.edges.len();
+        drop_isolated(views, &mut graph, min_views);
+        report.accompanied_edges = graph.edges.len();
+        debug!(
+            edges = report.graph_edges,
+            confirmed = report.confirmed_edges,
+            accompanied = report.accompanied_edges,
+            "graph"
+        );
+        graph
+    }
 
-impl StepClock {
-    fn new() -> Self {
-        Self {
-            last: Instant::now(),
-            timings: Vec::new(),
+    /// Edges become one, free ends meet something, edges are cut where others end
+    /// on or cross them.
+    fn ends(&mut self, graph: &mut JunctionGraph) {
+        let (views, config, report) = (self.views, self.config, &mut self.report);
+        let noise = noise_in_pixels(views, graph);
+        if config.parallel_edges {
+            let merged = merge_parallel(views, graph, noise);
+            report.dropped_copies = merged.copies;
+            report.merged_pieces = merged.pieces;
         }
-    }
-
-    fn end_of(&mut self, step: &'static str) {
-        let now = Instant::now();
-        self.timings.push(StepTiming {
-            step,
-            duration: now - self.last,
-        });
-        self.last = now;
+        let mut splits = Vec::new();
+        if config.free_ends {
+            let joined = join_free_ends(views, graph, noise, &self.refinement);
+            report.joined_corners = joined.corners;
+            report.attached_ends = joined.attached;
+            report.ends_on_edges = joined.on_edges.len();
+            splits = joined.on_edges;
+        }
+        if config.edge_crossings {
+            let crossings = add_crossings(views, graph, noise, &self.refinement);
+            report.crossings = crossings.len() / 2;
+            splits.extend(crossings);
+        }
+        if config.edge_splitting {
+            let refinement = &self.refinement;
+            report.split_edges =
+                split_edges(views, graph, &splits, self.min_views, noise, refinement);
+        }
+        debug!(
+            noise_in_pixels = noise,
+            copies = report.dropped_copies,
+            pieces = report.merged_pieces,
+            corners = report.joined_corners,
+            attached = report.attached_ends,
+            on_edges = report.ends_on_edges,
+            crossings = report.crossings,
+            split = report.split_edges,
+            "ends"
+        );
     }
 }
 
@@ -318,8 +286,8 @@ fn drop_occluded(
     graph: &mut JunctionGraph,
     surface: &UnitBallSurface,
     scene_radius: f64,
-    config: &LineTracksConfig,
 ) -> Vec<usize> {
+    let config = OcclusionConfig::default();
     let views: Vec<ViewObservation> = observations
         .iter()
         .filter(|observation| observation.camera.validate().is_ok())
@@ -334,15 +302,13 @@ fn drop_occluded(
         })
         .collect();
     let pairs: Vec<[usize; 2]> = graph.edges.iter().map(|edge| edge.junctions).collect();
-    let visible = visible_views(&views, &graph.junctions, &pairs, surface, &config.occlusion);
+    let visible = visible_views(&views, &graph.junctions, &pairs, surface, &config);
     let edges = std::mem::take(&mut graph.edges);
     let mut kept_visible = Vec::new();
     for (edge, visible) in edges.into_iter().zip(visible) {
         let support = view_count(&edge.supports);
-        let ratio = config
-            .occlusion
-            .support_ratio(support, visible, views.len());
-        if ratio >= config.occlusion.min_support_ratio {
+        let ratio = config.support_ratio(support, visible, views.len());
+        if ratio >= config.min_support_ratio {
             graph.edges.push(edge);
             kept_visible.push(visible);
         }
@@ -358,7 +324,6 @@ fn result(
     visible: Option<Vec<usize>>,
     scene_radius: f64,
     mut report: LineTracksReport,
-    timings: Vec<StepTiming>,
 ) -> LineTracksResult {
     let mut order: Vec<usize> = graph.edges.iter().flat_map(|edge| edge.junctions).collect();
     order.sort_unstable();
@@ -397,7 +362,6 @@ fn result(
         },
         edges: evidence,
         report,
-        timings,
     }
 }
 

@@ -4,78 +4,46 @@
 use super::view_segments::TrackView;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-/// Settings of the choice of neighbours.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct NeighboursConfig {
-    /// Neighbours of each view at most.
-    pub count: usize,
-    /// Rays that meet under a smaller angle say little about depth.
-    pub min_angle_in_degrees: f64,
-    /// Views from farther apart see other sides of things.
-    pub max_angle_in_degrees: f64,
-    /// Points per view at which shared sight is tested: segments …
-    pub sampled_segments: usize,
-    /// … times depths within the scene ball.
-    pub sampled_depths: usize,
-}
+/// Rays that meet under a smaller angle say little about depth.
+const MIN_ANGLE_IN_DEGREES: f64 = 2.0;
+/// Views from farther apart see other sides of things.
+const MAX_ANGLE_IN_DEGREES: f64 = 60.0;
+/// Points per view at which shared sight is tested: segments …
+const SAMPLED_SEGMENTS: usize = 64;
+/// … times depths within the scene ball.
+const SAMPLED_DEPTHS: usize = 6;
 
-impl Default for NeighboursConfig {
-    fn default() -> Self {
-        Self {
-            count: 10,
-            min_angle_in_degrees: 2.0,
-            max_angle_in_degrees: 60.0,
-            sampled_segments: 64,
-            sampled_depths: 6,
-        }
-    }
-}
-
-/// The neighbours of every view, best first.
+/// The neighbours of every view, at most `count`, best first.
 ///
 /// Where structure lies is not known yet, so points on the rays of a view's
 /// segments within the ball of radius `ball_radius` stand for it; a neighbour is
 /// worth the number of these that it sees under a useful angle, small angles
 /// less.
-pub(super) fn neighbours(
-    views: &[TrackView],
-    ball_radius: f64,
-    config: &NeighboursConfig,
-) -> Vec<Vec<usize>> {
+pub(super) fn neighbours(views: &[TrackView], ball_radius: f64, count: usize) -> Vec<Vec<usize>> {
     views
         .par_iter()
         .enumerate()
         .map(|(i, view)| {
-            let points = sample_points(view, ball_radius, config);
+            let points = sample_points(view, ball_radius);
             let mut worths: Vec<(f64, usize)> = views
                 .iter()
                 .enumerate()
                 .filter(|(j, other)| *j != i && !other.segments.is_empty())
-                .map(|(j, other)| (worth(view, other, &points, config), j))
+                .map(|(j, other)| (worth(view, other, &points), j))
                 .filter(|(worth, _)| *worth > 0.0)
                 .collect();
             worths.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            worths.truncate(config.count);
+            worths.truncate(count);
             worths.into_iter().map(|(_, j)| j).collect()
         })
         .collect()
 }
 
 /// Points within the ball on the rays through the middles of some segments.
-fn sample_points(
-    view: &TrackView,
-    ball_radius: f64,
-    config: &NeighboursConfig,
-) -> Vec<Vector3<f64>> {
-    let step = view
-        .segments
-        .len()
-        .div_ceil(config.sampled_segments.max(1))
-        .max(1);
-    let depths = config.sampled_depths.max(1);
+fn sample_points(view: &TrackView, ball_radius: f64) -> Vec<Vector3<f64>> {
+    let step = view.segments.len().div_ceil(SAMPLED_SEGMENTS.max(1)).max(1);
+    let depths = SAMPLED_DEPTHS.max(1);
     let mut points = Vec::new();
     for segment in view.segments.iter().step_by(step) {
         let ray = (segment.rays[0] + segment.rays[1]).normalize();
@@ -91,14 +59,8 @@ fn sample_points(
     points
 }
 
-fn worth(
-    view: &TrackView,
-    other: &TrackView,
-    points: &[Vector3<f64>],
-    config: &NeighboursConfig,
-) -> f64 {
-    let [min, max] =
-        [config.min_angle_in_degrees, config.max_angle_in_degrees].map(f64::to_radians);
+fn worth(view: &TrackView, other: &TrackView, points: &[Vector3<f64>]) -> f64 {
+    let [min, max] = [MIN_ANGLE_IN_DEGREES, MAX_ANGLE_IN_DEGREES].map(f64::to_radians);
     points
         .iter()
         .filter(|point| other.camera.sees(point))
@@ -146,14 +108,12 @@ mod tests {
     #[test]
     fn views_under_a_useful_angle_are_neighbours_and_copies_are_not() {
         let views: Vec<_> = [0.0, 0.0, 20.0, 40.0, 180.0].map(view_at).into();
-        let config = NeighboursConfig::default();
-        let found = neighbours(&views, 1.0, &config);
+        let found = neighbours(&views, 1.0, 10);
         assert_eq!(found[0].len(), 2);
         assert!(found[0].contains(&2) && found[0].contains(&3));
         assert!(found[4].is_empty());
-        let one = NeighboursConfig { count: 1, ..config };
         assert!(
-            neighbours(&views, 1.0, &one)
+            neighbours(&views, 1.0, 1)
                 .iter()
                 .all(|list| list.len() <= 1)
         );

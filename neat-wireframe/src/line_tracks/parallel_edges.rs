@@ -11,48 +11,27 @@ use super::projected_line::ProjectedLine;
 use super::view_segments::{SegmentId, TrackView, segment_of};
 use crate::projection::project_in_front;
 use neat_core::LineSegment3;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Which edges are one.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ParallelEdgesConfig {
-    /// The step is repeated while it finds something, up to this many times; 0
-    /// switches it off.
-    pub rounds: usize,
-    /// Sine of the angle between edges that are one, at most.
-    pub max_sine: f64,
-    /// An edge that lies along another one by less than this share is no copy.
-    pub min_overlap: f64,
-    /// A copy shares at least this share of its 2D segments with the other edge.
-    pub min_common_share: f64,
-    /// Edges are not copies if the views that show each by segments of its own are
-    /// at least this share of the views of the one that fewer show.
-    pub min_separate_share: f64,
-    /// Views whose segments bridge the gap between two pieces, at least …
-    pub min_bridging_views: usize,
-    /// … and as a share of the views of the piece that fewer show.
-    pub min_bridging_share: f64,
-    /// The pieces' ends lie this near to the whole, as a multiple of the noise of
-    /// the 2D segments.
-    pub max_bend_in_noise: f64,
-}
-
-impl Default for ParallelEdgesConfig {
-    fn default() -> Self {
-        Self {
-            rounds: 4,
-            max_sine: 0.1,
-            min_overlap: 0.8,
-            min_common_share: 0.7,
-            min_separate_share: 0.34,
-            min_bridging_views: 2,
-            min_bridging_share: 0.2,
-            max_bend_in_noise: 2.0,
-        }
-    }
-}
+/// The step is repeated while it finds something, up to this many times; 0
+/// switches it off.
+const ROUNDS: usize = 4;
+/// Sine of the angle between edges that are one, at most.
+const MAX_SINE: f64 = 0.1;
+/// An edge that lies along another one by less than this share is no copy.
+const MIN_OVERLAP: f64 = 0.8;
+/// A copy shares at least this share of its 2D segments with the other edge.
+const MIN_COMMON_SHARE: f64 = 0.7;
+/// Edges are not copies if the views that show each by segments of its own are
+/// at least this share of the views of the one that fewer show.
+const MIN_SEPARATE_SHARE: f64 = 0.34;
+/// Views whose segments bridge the gap between two pieces, at least …
+const MIN_BRIDGING_VIEWS: usize = 2;
+/// … and as a share of the views of the piece that fewer show.
+const MIN_BRIDGING_SHARE: f64 = 0.2;
+/// The pieces' ends lie this near to the whole, as a multiple of the noise of
+/// the 2D segments.
+const MAX_BEND_IN_NOISE: f64 = 2.0;
 
 /// What the step has done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -69,10 +48,9 @@ pub(super) fn merge_parallel(
     views: &[TrackView],
     graph: &mut JunctionGraph,
     noise_in_pixels: f64,
-    config: &ParallelEdgesConfig,
 ) -> MergedEdges {
     let mut merged = MergedEdges::default();
-    for _ in 0..config.rounds {
+    for _ in 0..ROUNDS {
         let before = merged;
         let degree = graph.degrees();
         let mut pairs = pairs_with_common_segments(views, graph);
@@ -89,7 +67,6 @@ pub(super) fn merge_parallel(
                 degree: &degree,
                 edges: [a, b],
                 lines: [a, b].map(|edge| segment_of_edge(graph, &graph.edges[edge])),
-                config,
             };
             if !pair.is_parallel() {
                 continue;
@@ -152,7 +129,6 @@ struct Pair<'a> {
     degree: &'a [usize],
     edges: [usize; 2],
     lines: [LineSegment3; 2],
-    config: &'a ParallelEdgesConfig,
 }
 
 impl Pair<'_> {
@@ -162,7 +138,7 @@ impl Pair<'_> {
 
     fn is_parallel(&self) -> bool {
         let [a, b] = self.lines.map(|line| (line.end - line.start).normalize());
-        a.cross(&b).norm() <= self.config.max_sine
+        a.cross(&b).norm() <= MAX_SINE
     }
 
     /// Which of the two, if any, is a copy of the other: the shorter one, if all
@@ -173,9 +149,9 @@ impl Pair<'_> {
         let free = |junction: usize| self.degree[junction] == 1;
         let [s, t] = line.ends().map(|end| other.line_parameter(&end));
         let along = s.max(t).min(1.0) - s.min(t).max(0.0);
-        let lies_along = along >= self.config.min_overlap * (s - t).abs();
+        let lies_along = along >= MIN_OVERLAP * (s - t).abs();
         let own = self.edge(side).supports.len();
-        if (common as f64) < self.config.min_common_share * own as f64 {
+        if (common as f64) < MIN_COMMON_SHARE * own as f64 {
             return None;
         }
         if !lies_along || !self.edge(side).junctions.into_iter().all(free) {
@@ -185,7 +161,7 @@ impl Pair<'_> {
             .map(|side| view_count(&self.edge(side).supports))
             .min()?;
         let separate = self.separate_views() as f64;
-        (separate < self.config.min_separate_share * fewer as f64).then_some(side)
+        (separate < MIN_SEPARATE_SHARE * fewer as f64).then_some(side)
     }
 
     /// The number of views that show each by a segment that is nearer to it than
@@ -221,9 +197,7 @@ impl Pair<'_> {
         let fewer = (0..2)
             .map(|side| view_count(&self.edge(side).supports))
             .min()?;
-        if bridging < self.config.min_bridging_views
-            || (bridging as f64) < self.config.min_bridging_share * fewer as f64
-        {
+        if bridging < MIN_BRIDGING_VIEWS || (bridging as f64) < MIN_BRIDGING_SHARE * fewer as f64 {
             return None;
         }
         let whole = LineSegment3::new(self.graph.junctions[a], self.graph.junctions[b]);
@@ -235,7 +209,7 @@ impl Pair<'_> {
         let mut supports = [self.edge(0).supports.as_slice(), &self.edge(1).supports].concat();
         supports.sort_unstable();
         supports.dedup();
-        let max_bend = self.config.max_bend_in_noise * noise_in_pixels;
+        let max_bend = MAX_BEND_IN_NOISE * noise_in_pixels;
         let straight = between.iter().all(|junction| {
             self.mean_distance(&supports, &whole, &self.graph.junctions[*junction]) <= max_bend
         });
@@ -291,7 +265,7 @@ mod tests {
     }
 
     fn merge(views: &[TrackView], graph: &mut JunctionGraph) -> [usize; 2] {
-        let merged = merge_parallel(views, graph, 0.5, &ParallelEdgesConfig::default());
+        let merged = merge_parallel(views, graph, 0.5);
         [merged.copies, merged.pieces]
     }
 

@@ -2,7 +2,6 @@
 
 use crate::Wireframe3d;
 use serde::{Deserialize, Serialize};
-use std::time::Duration;
 
 /// A wireframe with the evidence for each of its edges.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -14,8 +13,6 @@ pub struct LineTracksResult {
     pub edges: Vec<LineEvidence>,
     /// What each step kept.
     pub report: LineTracksReport,
-    /// How long each step took; the only part that differs from run to run.
-    pub timings: Vec<StepTiming>,
 }
 
 /// What speaks for an edge.
@@ -84,13 +81,4 @@ pub struct LineTracksReport {
     pub junctions: usize,
     /// Edges of the result.
     pub edges: usize,
-}
-
-/// Duration of one step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepTiming {
-    /// Name of the step.
-    pub step: &'static str,
-    /// Wall-clock time.
-    pub duration: Duration,
 }

@@ -5,33 +5,15 @@ use super::projected_line::ProjectedLine;
 use super::view_segments::TrackView;
 use crate::projection::project_in_front;
 use neat_core::LineSegment3;
-use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Which junctions only cut a line.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct StraightJunctionsConfig {
-    /// A junction of two edges that lies this near to the line between their
-    /// other ends, in all their views, is none.
-    pub max_distance_in_pixels: f64,
-}
-
-impl Default for StraightJunctionsConfig {
-    fn default() -> Self {
-        Self {
-            max_distance_in_pixels: 1.0,
-        }
-    }
-}
+/// A junction of two edges that lies this near to the line between their
+/// other ends, in all their views, is none.
+const MAX_DISTANCE_IN_PIXELS: f64 = 1.0;
 
 /// Replaces both edges of every straight junction by one. The junctions stay in
 /// the list, without edges.
-pub(super) fn dissolve_straight(
-    views: &[TrackView],
-    graph: &mut JunctionGraph,
-    config: &StraightJunctionsConfig,
-) {
+pub(super) fn dissolve_straight(views: &[TrackView], graph: &mut JunctionGraph) {
     let mut edges: BTreeMap<[usize; 2], Vec<_>> = std::mem::take(&mut graph.edges)
         .into_iter()
         .map(|edge| (edge.junctions, edge.supports))
@@ -66,7 +48,7 @@ pub(super) fn dissolve_straight(
                     project_in_front(camera, &graph.junctions[middle]),
                 )
                 .map(|(line, pixel)| line.distance(&pixel).abs());
-                distance.is_some_and(|d| d <= config.max_distance_in_pixels)
+                distance.is_some_and(|d| d <= MAX_DISTANCE_IN_PIXELS)
             });
         if !straight {
             continue;
@@ -92,14 +74,14 @@ pub(super) fn dissolve_straight(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::line_tracks::junction_graph::{JunctionGraphConfig, junction_graph};
+    use crate::line_tracks::junction_graph::junction_graph;
     use crate::line_tracks::test_tracks::{cube_tracks, cube_views};
 
     #[test]
     fn two_halves_become_one_edge_and_corners_stay() {
         let views = cube_views(12);
         let tracks = cube_tracks(&views);
-        let whole = junction_graph(&views, &tracks, 3, &JunctionGraphConfig::default());
+        let whole = junction_graph(&views, &tracks, 3);
         let mut cut = whole.clone();
         let [a, b] = cut.edges[5].junctions;
         let middle = cut.junctions.len();
@@ -111,11 +93,11 @@ mod tests {
             supports: cut.edges[5].supports.clone(),
         };
         cut.edges.push(second);
-        dissolve_straight(&views, &mut cut, &StraightJunctionsConfig::default());
+        dissolve_straight(&views, &mut cut);
         assert_eq!(cut.edges, whole.edges);
 
         let mut untouched = whole.clone();
-        dissolve_straight(&views, &mut untouched, &StraightJunctionsConfig::default());
+        dissolve_straight(&views, &mut untouched);
         assert_eq!(untouched, whole);
     }
 }

@@ -4,42 +4,25 @@
 //! Close parallel edges, such as those of a window frame, are told apart by the
 //! images: views that show both next to each other forbid the merge.
 
-use super::clustering::{ClusteringConfig, Track, lies_on, split_by_cover};
+use super::clustering::{Track, lies_on, split_by_cover};
 use super::line_refinement::{LineRefinementConfig, refine_line, shown_interval};
 use super::projected_line::ProjectedLine;
 use super::view_segments::{SegmentId, TrackView, segment_of};
 use crate::projection::project_in_front;
 use neat_core::{LineSegment2, LineSegment3};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Settings of the merging of tracks.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct TrackMergingConfig {
-    /// Tracks are one if the members of each lie this near, in the mean, to the
-    /// projected line of the other.
-    pub max_distance_in_pixels: f64,
-    /// The same for tracks that no view shows next to each other.
-    pub max_exclusive_distance_in_pixels: f64,
-    /// Views that show both next to each other forbid the merge if they are at
-    /// least this share of the views of the track that fewer show …
-    pub min_separate_share: f64,
-    /// … and the two lie this far apart there.
-    pub separate_in_pixels: f64,
-}
-
-impl Default for TrackMergingConfig {
-    fn default() -> Self {
-        Self {
-            max_distance_in_pixels: 1.5,
-            max_exclusive_distance_in_pixels: 3.0,
-            min_separate_share: 0.34,
-            separate_in_pixels: 1.2,
-        }
-    }
-}
+/// Tracks are one if the members of each lie this near, in the mean, to the
+/// projected line of the other.
+const MAX_DISTANCE_IN_PIXELS: f64 = 1.5;
+/// The same for tracks that no view shows next to each other.
+const MAX_EXCLUSIVE_DISTANCE_IN_PIXELS: f64 = 3.0;
+/// Views that show both next to each other forbid the merge if they are at
+/// least this share of the views of the track that fewer show …
+const MIN_SEPARATE_SHARE: f64 = 0.34;
+/// … and the two lie this far apart there.
+const SEPARATE_IN_PIXELS: f64 = 1.2;
 
 /// Tracks of the same 3D segment are parallel within about 18 degrees: short ones
 /// have no better direction.
@@ -76,7 +59,6 @@ pub(super) fn gather_unclaimed(
     views: &[TrackView],
     tracks: Vec<Track>,
     min_views: usize,
-    config: &ClusteringConfig,
     refinement: &LineRefinementConfig,
 ) -> Vec<Track> {
     let track_of = tracks_of_segments(views, &tracks);
@@ -95,7 +77,7 @@ pub(super) fn gather_unclaimed(
                         .into_iter()
                         .map(|segment| SegmentId { view, segment })
                         .filter(|id| track_of[id.view][id.segment].is_none())
-                        .filter(|id| lies_on(views, *id, &track.line, config)),
+                        .filter(|id| lies_on(views, *id, &track.line)),
                 );
             }
             wanted
@@ -131,12 +113,11 @@ pub(super) fn merge_duplicates(
     views: &[TrackView],
     mut tracks: Vec<Track>,
     min_views: usize,
-    config: &TrackMergingConfig,
     refinement: &LineRefinementConfig,
 ) -> Vec<Track> {
     // Every round merges disjoint pairs; chains need a few.
     for _ in 0..8 {
-        let mut pairs = duplicate_pairs(views, &tracks, config);
+        let mut pairs = duplicate_pairs(views, &tracks);
         if pairs.is_empty() {
             break;
         }
@@ -193,11 +174,7 @@ fn refine_all(
 }
 
 /// Pairs of tracks that show the same, with their mean distance in pixels.
-fn duplicate_pairs(
-    views: &[TrackView],
-    tracks: &[Track],
-    config: &TrackMergingConfig,
-) -> Vec<(f64, [usize; 2])> {
+fn duplicate_pairs(views: &[TrackView], tracks: &[Track]) -> Vec<(f64, [usize; 2])> {
     let track_of = tracks_of_segments(views, tracks);
     let found: Vec<Vec<(f64, [usize; 2])>> = tracks
         .par_iter()
@@ -207,14 +184,14 @@ fn duplicate_pairs(
                 .into_iter()
                 .filter(|b| a < *b)
                 .filter_map(|b| {
-                    let distance = mutual_distance(views, track, &tracks[b], config)?;
-                    let separate = separate_views(views, track, &tracks[b], config);
+                    let distance = mutual_distance(views, track, &tracks[b])?;
+                    let separate = separate_views(views, track, &tracks[b]);
                     let fewer = track.view_count().min(tracks[b].view_count());
                     let same = if separate == 0 {
-                        distance <= config.max_exclusive_distance_in_pixels
+                        distance <= MAX_EXCLUSIVE_DISTANCE_IN_PIXELS
                     } else {
-                        distance <= config.max_distance_in_pixels
-                            && (separate as f64) < config.min_separate_share * fewer as f64
+                        distance <= MAX_DISTANCE_IN_PIXELS
+                            && (separate as f64) < MIN_SEPARATE_SHARE * fewer as f64
                     };
                     same.then_some((distance, [a, b]))
                 })
@@ -241,20 +218,13 @@ fn near_tracks(views: &[TrackView], track: &Track, track_of: &TrackOfSegment) ->
 
 /// Mean distance of each track's ends from the other's line, in the images of
 /// all members' views, if both means are small and the tracks touch.
-fn mutual_distance(
-    views: &[TrackView],
-    a: &Track,
-    b: &Track,
-    config: &TrackMergingConfig,
-) -> Option<f64> {
+fn mutual_distance(views: &[TrackView], a: &Track, b: &Track) -> Option<f64> {
     let [first, second] = [a, b].map(|track| (track.line.end - track.line.start).normalize());
     let parallel = first.dot(&second).abs() > MIN_PARALLEL_COSINE;
     if !parallel {
         return None;
     }
-    let farthest = config
-        .max_distance_in_pixels
-        .max(config.max_exclusive_distance_in_pixels);
+    let farthest = MAX_DISTANCE_IN_PIXELS.max(MAX_EXCLUSIVE_DISTANCE_IN_PIXELS);
     let mut worst = 0.0_f64;
     for (fixed, other) in [(a, b), (b, a)] {
         // Only the part of the other that lies along this one.
@@ -292,7 +262,7 @@ fn overlapping_part(line: &LineSegment3, other: &LineSegment3) -> Option<LineSeg
 }
 
 /// The number of views that show members of both tracks side by side.
-fn separate_views(views: &[TrackView], a: &Track, b: &Track, config: &TrackMergingConfig) -> usize {
+fn separate_views(views: &[TrackView], a: &Track, b: &Track) -> usize {
     let mut by_view: BTreeMap<usize, [Vec<SegmentId>; 2]> = BTreeMap::new();
     for (side, track) in [a, b].into_iter().enumerate() {
         for id in &track.members {
@@ -302,22 +272,14 @@ fn separate_views(views: &[TrackView], a: &Track, b: &Track, config: &TrackMergi
     by_view
         .values()
         .filter(|[of_a, of_b]| {
-            of_a.iter().any(|p| {
-                of_b.iter()
-                    .any(|q| side_by_side(views, *p, *q, &a.line, config))
-            })
+            of_a.iter()
+                .any(|p| of_b.iter().any(|q| side_by_side(views, *p, *q, &a.line)))
         })
         .count()
 }
 
 /// Whether two segments of one view run along the same part of a line, apart.
-fn side_by_side(
-    views: &[TrackView],
-    p: SegmentId,
-    q: SegmentId,
-    line: &LineSegment3,
-    config: &TrackMergingConfig,
-) -> bool {
+fn side_by_side(views: &[TrackView], p: SegmentId, q: SegmentId, line: &LineSegment3) -> bool {
     let intervals = Option::zip(
         shown_interval(views, p, line),
         shown_interval(views, q, line),
@@ -337,7 +299,7 @@ fn side_by_side(
     };
     let middle = short.point_at(0.5);
     let foot = long.point_at(long.line_parameter(&middle));
-    (middle - foot).norm() > config.separate_in_pixels
+    (middle - foot).norm() > SEPARATE_IN_PIXELS
 }
 
 #[cfg(test)]
@@ -354,13 +316,7 @@ mod tests {
             .line
             .map(|end| end + nalgebra::Vector3::repeat(5e-4));
         tracks.push(Track { line, members });
-        let merged = merge_duplicates(
-            &views,
-            tracks,
-            3,
-            &TrackMergingConfig::default(),
-            &LineRefinementConfig::default(),
-        );
+        let merged = merge_duplicates(&views, tracks, 3, &LineRefinementConfig::default());
         assert_eq!(merged.len(), 12);
         for edge in 0..12 {
             let of_edge: Vec<_> = merged
@@ -392,8 +348,7 @@ mod tests {
                 members: (0..12).map(|view| SegmentId { view, segment }).collect(),
             })
             .collect();
-        let config = TrackMergingConfig::default();
-        let merged = merge_duplicates(&views, tracks, 3, &config, &LineRefinementConfig::default());
+        let merged = merge_duplicates(&views, tracks, 3, &LineRefinementConfig::default());
         assert_eq!(merged.len(), 2);
     }
 
@@ -404,13 +359,7 @@ mod tests {
         for track in &mut tracks {
             track.members.truncate(5);
         }
-        let gathered = gather_unclaimed(
-            &views,
-            tracks,
-            3,
-            &ClusteringConfig::default(),
-            &LineRefinementConfig::default(),
-        );
+        let gathered = gather_unclaimed(&views, tracks, 3, &LineRefinementConfig::default());
         assert!(gathered.iter().all(|track| track.view_count() >= 11));
     }
 }

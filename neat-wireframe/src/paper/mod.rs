@@ -21,6 +21,7 @@ use nalgebra::Vector3;
 use neat_core::assignment::AssignmentError;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use tracing::debug;
 
 /// Every threshold and switch of the paper's back end.
 ///
@@ -208,6 +209,7 @@ impl PaperBackEndConfig {
             attracted_edges: attracted.edges.len(),
             visible_edges: edges.len(),
         };
+        debug!(?counts, "paper back end");
         let mut result = PaperWireframe {
             wireframe: Wireframe3d {
                 junctions: attracted.junctions,

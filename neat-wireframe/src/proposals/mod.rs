@@ -2,7 +2,7 @@
 
 mod robust_segments;
 
-pub use robust_segments::{RobustSegmentConfig, WeightedSegment, robust_segment};
+pub use robust_segments::{WeightedSegment, robust_segment};
 
 use neat_core::LineSegment3;
 

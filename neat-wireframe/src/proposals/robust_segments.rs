@@ -4,7 +4,6 @@
 use crate::{SegmentProposal, ViewObservation};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
-use serde::{Deserialize, Serialize};
 
 /// What one ray through the attraction region of a 2D segment rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,27 +15,12 @@ pub struct WeightedSegment {
     pub weight: f64,
 }
 
-/// How rays are combined by [`robust_segment`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RobustSegmentConfig {
-    /// Rays need more accumulated weight than this: others missed the surface.
-    pub min_weight: f64,
-    /// Fewer rays than this give no proposal, and as many are always kept.
-    pub min_rays: usize,
-    /// Share of the rays to keep, best reprojection first.
-    pub kept_fraction: f64,
-}
-
-impl Default for RobustSegmentConfig {
-    fn default() -> Self {
-        Self {
-            min_weight: 0.3,
-            min_rays: 2,
-            kept_fraction: 0.5,
-        }
-    }
-}
+/// Rays need more accumulated weight than this: others missed the surface.
+const MIN_WEIGHT: f64 = 0.3;
+/// Fewer rays than this give no proposal, and as many are always kept.
+const MIN_RAYS: usize = 2;
+/// Share of the rays to keep, best reprojection first.
+const KEPT_FRACTION: f64 = 0.5;
 
 /// Combines the rays of one detected segment into one proposal.
 ///
@@ -49,7 +33,6 @@ pub fn robust_segment(
     view: usize,
     segment_in_view: usize,
     rays: &[WeightedSegment],
-    config: &RobustSegmentConfig,
 ) -> Option<SegmentProposal> {
     let observation = observations.get(view)?;
     let detected = observation.segments.get(segment_in_view)?.segment;
@@ -57,7 +40,7 @@ pub fn robust_segment(
 
     let mut ordered: Vec<(f64, LineSegment3)> = rays
         .iter()
-        .filter(|ray| ray.weight > config.min_weight)
+        .filter(|ray| ray.weight > MIN_WEIGHT)
         .filter_map(|ray| {
             let projected = project(&ray.segment);
             let reversed = projected.reversed();
@@ -74,12 +57,12 @@ pub fn robust_segment(
                 .then_some((start.max(end), segment))
         })
         .collect();
-    let min_rays = config.min_rays.max(1);
+    let min_rays = MIN_RAYS.max(1);
     if ordered.len() < min_rays {
         return None;
     }
     ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let kept = (config.kept_fraction * ordered.len() as f64) as usize;
+    let kept = (KEPT_FRACTION * ordered.len() as f64) as usize;
     ordered.truncate(kept.max(min_rays));
 
     let median_end = |end: fn(&LineSegment3) -> Vector3<f64>| {
@@ -134,8 +117,7 @@ mod tests {
             ray(shifted(0.0), 0.2),
             ray(shifted(f64::NAN), 0.9),
         ];
-        let config = RobustSegmentConfig::default();
-        let proposal = robust_segment(&views, 1, 4, &rays, &config).unwrap();
+        let proposal = robust_segment(&views, 1, 4, &rays).unwrap();
         assert!(proposal.segment.squared_end_distance(&truth) < 1e-20);
         assert!(proposal.end_error_in_pixels.iter().all(|e| *e < 1e-6));
         for spread in proposal.end_spread {
@@ -151,11 +133,10 @@ mod tests {
             segment: LineSegment3::new(junctions[0], junctions[1]),
             weight: 1.0,
         };
-        let config = RobustSegmentConfig::default();
-        assert_eq!(robust_segment(&views, 0, 0, &[ray], &config), None);
-        assert_eq!(robust_segment(&views, 0, 0, &[], &config), None);
-        assert_eq!(robust_segment(&views, 1, 0, &[ray, ray], &config), None);
-        assert_eq!(robust_segment(&views, 0, 12, &[ray, ray], &config), None);
-        assert!(robust_segment(&views, 0, 0, &[ray, ray], &config).is_some());
+        assert_eq!(robust_segment(&views, 0, 0, &[ray]), None);
+        assert_eq!(robust_segment(&views, 0, 0, &[]), None);
+        assert_eq!(robust_segment(&views, 1, 0, &[ray, ray]), None);
+        assert_eq!(robust_segment(&views, 0, 12, &[ray, ray]), None);
+        assert!(robust_segment(&views, 0, 0, &[ray, ray]).is_some());
     }
 }

@@ -130,7 +130,7 @@ fn free_ends_that_no_view_shows_are_not_determined() {
     assert!(confidence.edges[0].views >= 25);
     // Across the edge they are: with a wider limit that shows.
     let mut config = config;
-    config.covariance.max_relative_sigma = 1.5;
+    config.max_relative_sigma = 1.5;
     let confidence = assess(&wireframe, &observations, None, 1.0, &config).unwrap();
     let covariance = confidence.junctions[0].covariance.unwrap();
     let along = (b - a).normalize();

@@ -55,7 +55,7 @@ fn broken_and_empty_input_says_nothing_and_does_no_harm() {
     for edge in &blind.edges {
         assert_eq!((edge.views, edge.expected_views), (0, 0));
         assert_eq!(edge.residual_in_pixels, None);
-        assert!((edge.probability - config.existence.prior).abs() < 0.05);
+        assert!((edge.probability - config.prior).abs() < 0.05);
     }
     assert!(blind.junctions.iter().all(|j| j.covariance.is_none()));
 
@@ -98,14 +98,14 @@ fn broken_and_empty_input_says_nothing_and_does_no_harm() {
 fn configurations_without_sense_do_not_panic() {
     let scene = scene(Solid::Box, Detector::Vertices, 0.5, 8, 1);
     let changes: [fn(&mut ConfidenceConfig); 8] = [
-        |c| c.existence.view_correlation = [0.9, 0.1],
-        |c| c.existence.view_correlation = [f64::NAN; 2],
-        |c| c.existence.prior = f64::NAN,
-        |c| c.existence.min_coincidence_rate = 7.0,
-        |c| c.existence.max_decoys = 0,
-        |c| c.covariance.max_iterations = 0,
-        |c| c.covariance.min_noise_in_pixels = 0.0,
-        |c| c.occlusion.points_per_edge = 0,
+        |c| c.tolerance_in_pixels = f64::NAN,
+        |c| c.min_covered_share = -1.0,
+        |c| c.usual_noise_in_pixels = 0.0,
+        |c| c.max_relative_sigma = f64::INFINITY,
+        |c| c.prior = f64::NAN,
+        |c| c.prior = 7.0,
+        |c| c.usual_detection_rate = 0.0,
+        |c| c.usual_detection_rate = f64::NAN,
     ];
     for change in changes {
         let mut config = ConfidenceConfig::default();

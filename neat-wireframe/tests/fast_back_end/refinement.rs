@@ -3,8 +3,7 @@
 use crate::field::{BlockSurface, observations, proposals, supported_truth};
 use crate::score::Score;
 use neat_core::synthetic::BlockScene;
-use neat_wireframe::fast::Step;
-use neat_wireframe::fast::{FastBackEndConfig, run};
+use neat_wireframe::fast::{FastBackEndConfig, Step, run};
 
 #[test]
 fn refinement_reduces_the_junction_error_threefold() {
