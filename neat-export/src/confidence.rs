@@ -32,7 +32,8 @@ impl Confidence {
 
     /// The class of every edge.
     pub fn of_edges(document: &WireframeDocument) -> Vec<Self> {
-        let field = |name| document.edge_fields.get(name);
+        let fields = document.edge_fields.named();
+        let field = |name| fields.get(name);
         let (values, [high, medium]) = match (field(PROBABILITY), field(SUPPORTING_VIEWS)) {
             (Some(probabilities), _) => (probabilities, PROBABILITIES),
             (None, Some(views)) => (views, VIEWS),
@@ -97,7 +98,9 @@ mod tests {
         };
         assert_eq!(names(&document), ["unknown"; 4]);
         let mut set = |name: &str, values| {
-            document.edge_fields.insert(name.into(), values);
+            let mut fields = document.edge_fields.named();
+            fields.insert(name.into(), values);
+            document.edge_fields = fields.into();
             names(&document)
         };
         let by_views = set(SUPPORTING_VIEWS, vec![2.0, 3.0, 4.0, 5.0]);

@@ -57,11 +57,11 @@ impl EdgeFilter {
                 self.min_views.map(f64::from),
             ),
         ];
+        let fields = document.edge_fields.named();
         let mut passes = vec![true; document.edges.len()];
         for (field, option, minimum) in minima {
             let Some(minimum) = minimum else { continue };
-            let values = document
-                .edge_fields
+            let values = fields
                 .get(field)
                 .ok_or(ExportError::NoField { field, option })?;
             for (passes, value) in passes.iter_mut().zip(values) {
@@ -98,8 +98,8 @@ fn with_edges(document: &WireframeDocument, passes: &[bool]) -> WireframeDocumen
         edges: passing
             .map(|(ends, _)| ends.map(|end| new_index[end]))
             .collect(),
-        junction_fields: chosen_fields(&document.junction_fields, &joined),
-        edge_fields: chosen_fields(&document.edge_fields, passes),
+        junction_fields: chosen_fields(&document.junction_fields.named(), &joined).into(),
+        edge_fields: chosen_fields(&document.edge_fields.named(), passes).into(),
         junction_covariances: chosen(&document.junction_covariances, &joined),
         views: document.views.clone(),
         edge_support: chosen(&document.edge_support, passes),
@@ -125,7 +125,7 @@ fn chosen_fields(
 mod tests {
     use super::*;
     use nalgebra::Vector3;
-    use neat_wireframe::export::SupportingSegment;
+    use neat_wireframe::export::{EdgeFields, SupportingSegment};
     use std::path::Path;
 
     /// A path 0–1–2–3 and the lonely junction 4; edge `i` has `i` views and the
@@ -142,11 +142,13 @@ mod tests {
             junction_fields: BTreeMap::from([(
                 "sigma".into(),
                 (0..5).map(|i| 0.1 * f64::from(i)).collect(),
-            )]),
+            )])
+            .into(),
             edge_fields: BTreeMap::from([
                 (PROBABILITY.into(), vec![0.0, 0.5, 1.0]),
                 (SUPPORTING_VIEWS.into(), vec![0.0, 1.0, 2.0]),
-            ]),
+            ])
+            .into(),
             junction_covariances: (0..5)
                 .map(|i| (i != 3).then_some([f64::from(i); 6]))
                 .collect(),
@@ -172,8 +174,8 @@ mod tests {
         kept.check(Path::new("w")).unwrap();
         assert_eq!(kept.junctions, document().junctions[2..4]);
         assert_eq!(kept.edges, [[0, 1]]);
-        assert_eq!(kept.junction_fields["sigma"], [0.2, 0.1 * 3.0]);
-        assert_eq!(kept.edge_fields[PROBABILITY], [1.0]);
+        assert_eq!(kept.junction_fields.sigma, Some(vec![0.2, 0.1 * 3.0]));
+        assert_eq!(kept.edge_fields.probability, Some(vec![1.0]));
         assert_eq!(kept.junction_covariances, [Some([2.0; 6]), None]);
         assert_eq!(kept.edge_support, document().edge_support[2..]);
         assert_eq!(kept.metadata["edge_filter"]["min_views"], 2);
@@ -200,7 +202,7 @@ mod tests {
     #[test]
     fn a_missing_field_and_a_bad_minimum_are_errors() {
         let mut document = document();
-        document.edge_fields.clear();
+        document.edge_fields = EdgeFields::default();
         let filter = |min_probability, min_views| EdgeFilter {
             min_probability,
             min_views,

@@ -16,8 +16,10 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
     let document = to.document;
     let position = |junction: usize| document.junctions[junction].as_slice();
     let classes = Confidence::of_edges(document);
+    let junction_fields = document.junction_fields.named();
+    let edge_fields = document.edge_fields.named();
     let edges = document.edges.iter().enumerate().map(|(edge, [a, b])| {
-        let mut properties = fields(&document.edge_fields, edge);
+        let mut properties = fields(&edge_fields, edge);
         properties.insert("edge".into(), edge.into());
         properties.insert("junctions".into(), json!([a, b]));
         properties.insert("confidence".into(), classes[edge].name().into());
@@ -25,7 +27,7 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
         feature(line, properties)
     });
     let isolated = isolated_junctions(document).into_iter().map(|junction| {
-        let mut properties = fields(&document.junction_fields, junction);
+        let mut properties = fields(&junction_fields, junction);
         properties.insert("junction".into(), junction.into());
         let point = json!({"type": "Point", "coordinates": position(junction)});
         feature(point, properties)

@@ -67,9 +67,7 @@ fn document() -> WireframeDocument {
         ..WireframeDocument::default()
     };
     let probabilities = vec![1.0, 0.9, 0.89, 0.5, 0.49, 0.0, 0.95, 0.7];
-    document
-        .edge_fields
-        .insert("probability".into(), probabilities);
+    document.edge_fields.probability = Some(probabilities);
     let hostile = "</title><script>alert('x')&\"]]>\\\0\n\u{7}#99=ä😀\u{ffff}";
     document.metadata.insert("scene".into(), hostile.into());
     document
@@ -293,7 +291,7 @@ fn layers_and_properties_tell_the_confidence() {
         assert_eq!(properties["confidence"], class.to_lowercase());
         assert_eq!(
             properties["probability"],
-            document().edge_fields["probability"][edge]
+            document().edge_fields.named()["probability"][edge]
         );
     }
 }
@@ -326,7 +324,7 @@ fn bad_documents_and_options_write_nothing() {
     let mut dangling = document();
     dangling.edges.push([0, 5]);
     let mut short = document();
-    short.junction_fields.insert("sigma".into(), vec![1.0]);
+    short.junction_fields.sigma = Some(vec![1.0]);
     for format in Format::ALL {
         let dir = tempfile::tempdir().unwrap();
         let path = place(&dir, format);

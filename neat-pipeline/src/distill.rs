@@ -96,10 +96,7 @@ impl Distilled {
             .fill(&mut document, &names, original_from_world);
         let curved = curved_chains(&self.wireframe);
         if curved.contains(&true) {
-            let curved = curved.into_iter().map(|is| f64::from(u8::from(is)));
-            document
-                .edge_fields
-                .insert("curved".into(), curved.collect());
+            document.edge_fields.curved = Some(curved);
         }
         document
     }

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
 use neat_core::{LineSegment2, file};
 use neat_report::{Curve, FactGroup, JunctionSnapshot, PhotographConfig, Report, ReportError};
-use neat_wireframe::export::{SupportingSegment, WireframeDocument};
+use neat_wireframe::export::{EdgeFields, JunctionFields, SupportingSegment, WireframeDocument};
 use std::error::Error;
 use std::path::PathBuf;
 
@@ -71,10 +71,10 @@ fn hostile(sample: &Report) -> Report {
         view.photograph = None;
     }
     let fields = &mut report.document.edge_fields;
-    let values = fields.values().next().cloned().unwrap_or_default();
+    let values = fields.probability.clone().unwrap_or_default();
     // Names that objects of JavaScript have already.
     for name in [text(), "__proto__".to_owned(), "constructor".to_owned()] {
-        fields.insert(name, values.clone());
+        fields.other.insert(name, values.clone());
     }
     report
 }
@@ -129,16 +129,21 @@ fn document(data: &SyntheticData) -> WireframeDocument {
         })
         .collect();
 
-    let counts: Vec<f64> = support.iter().map(|list| list.len() as f64).collect();
-    let probability = counts.iter().map(|n| 1.0 - (-0.33 * n).exp() * 0.95);
+    let counts: Vec<usize> = support.iter().map(Vec::len).collect();
+    let probability = counts
+        .iter()
+        .map(|n| 1.0 - (-0.33 * *n as f64).exp() * 0.95);
     let sigmas = (0..wireframe.junctions.len()).map(|i| 0.001 + 0.0008 * wave(i as f64).x.abs());
     WireframeDocument {
-        edge_fields: [
-            ("probability".to_owned(), probability.collect()),
-            ("supporting_views".to_owned(), counts),
-        ]
-        .into(),
-        junction_fields: [("sigma".to_owned(), sigmas.collect())].into(),
+        edge_fields: EdgeFields {
+            probability: Some(probability.collect()),
+            supporting_views: Some(counts),
+            ..EdgeFields::default()
+        },
+        junction_fields: JunctionFields {
+            sigma: Some(sigmas.collect()),
+            ..JunctionFields::default()
+        },
         views: views.iter().map(|view| view.name.clone()).collect(),
         edge_support: support,
         ..WireframeDocument::from(&wireframe)

@@ -9,8 +9,8 @@ pub(crate) fn check(report: &Report) -> Result<(), ReportError> {
     let document = &report.document;
     let (junctions, edges) = (document.junctions.len(), document.edges.len());
     check_wireframe(&document.junctions, &document.edges)?;
-    check_fields(&document.junction_fields, junctions, "junction")?;
-    check_fields(&document.edge_fields, edges, "edge")?;
+    check_fields(&document.junction_fields.named(), junctions, "junction")?;
+    check_fields(&document.edge_fields.named(), edges, "edge")?;
 
     let covariances = &document.junction_covariances;
     let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
@@ -87,7 +87,7 @@ mod tests {
     use crate::ReportView;
     use nalgebra::{Matrix3, Vector2, Vector3};
     use neat_core::{Camera, Intrinsics, LineSegment2};
-    use neat_wireframe::export::{SupportingSegment, WireframeDocument};
+    use neat_wireframe::export::{EdgeFields, SupportingSegment, WireframeDocument};
 
     fn good() -> Report {
         let support = SupportingSegment {
@@ -99,7 +99,10 @@ mod tests {
             document: WireframeDocument {
                 junctions: vec![Vector3::zeros(), Vector3::x()],
                 edges: vec![[0, 1]],
-                edge_fields: [("probability".to_owned(), vec![0.5])].into(),
+                edge_fields: EdgeFields {
+                    probability: Some(vec![0.5]),
+                    ..EdgeFields::default()
+                },
                 junction_covariances: vec![None, Some([1.0; 6])],
                 views: vec!["a".into()],
                 edge_support: vec![vec![support]],
@@ -129,11 +132,10 @@ mod tests {
         let damages: [Damage; 9] = [
             ("wireframe is not valid", |r| r.document.edges[0] = [0, 2]),
             ("`probability`", |r| {
-                r.document.edge_fields.insert("probability".into(), vec![]);
+                r.document.edge_fields.probability = Some(vec![]);
             }),
             ("`probability`", |r| {
-                let values = vec![f64::NAN];
-                r.document.edge_fields.insert("probability".into(), values);
+                r.document.edge_fields.probability = Some(vec![f64::NAN]);
             }),
             ("`junction_covariances`", |r| {
                 r.document.junction_covariances[1] = Some([f64::INFINITY; 6]);

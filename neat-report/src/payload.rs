@@ -4,6 +4,7 @@ use crate::{Curve, JunctionSnapshot, Report, ReportView};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use neat_wireframe::export::{EdgeFields, JunctionFields};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -14,8 +15,8 @@ pub(crate) struct Payload<'a> {
     title: &'a str,
     junctions: &'a [Vector3<f64>],
     edges: &'a [[usize; 2]],
-    junction_fields: &'a BTreeMap<String, Vec<f64>>,
-    edge_fields: &'a BTreeMap<String, Vec<f64>>,
+    junction_fields: &'a JunctionFields,
+    edge_fields: &'a EdgeFields,
     /// Largest standard deviation of each junction, where it is known.
     sigmas: Vec<Option<f64>>,
     /// (view, [x, y, x, y] from the image corner, residual) for every edge.
@@ -151,7 +152,7 @@ fn rounded(pixels: f64) -> f64 {
 /// eigenvalue of each covariance.
 fn sigmas(report: &Report) -> Vec<Option<f64>> {
     let document = &report.document;
-    if let Some(sigmas) = document.junction_fields.get("sigma") {
+    if let Some(sigmas) = &document.junction_fields.sigma {
         return sigmas.iter().copied().map(Some).collect();
     }
     let largest = |&[xx, xy, xz, yy, yz, zz]: &[f64; 6]| {
@@ -223,8 +224,7 @@ mod tests {
         let found = sigmas(&report);
         assert!((found[0].unwrap() - 3.0).abs() < 1e-12);
         assert_eq!(found[1], None);
-        let field = ("sigma".to_owned(), vec![0.5, 0.25]);
-        report.document.junction_fields = [field].into();
+        report.document.junction_fields.sigma = Some(vec![0.5, 0.25]);
         assert_eq!(sigmas(&report), [Some(0.5), Some(0.25)]);
     }
 }

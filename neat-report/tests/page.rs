@@ -151,8 +151,8 @@ fn names_of_all_kinds_stay_texts() {
     let edges = vec![0.5; report.document.edges.len()];
     let junctions = vec![0.5; report.document.junctions.len()];
     for name in [HOSTILE, "__proto__", "constructor"] {
-        (report.document.edge_fields).insert(name.into(), edges.clone());
-        (report.document.junction_fields).insert(name.into(), junctions.clone());
+        (report.document.edge_fields.other).insert(name.into(), edges.clone());
+        (report.document.junction_fields.other).insert(name.into(), junctions.clone());
     }
     report.document.metadata = [(HOSTILE.to_owned(), HOSTILE.into())].into();
     let page = report.render().unwrap();

@@ -182,9 +182,12 @@ fn fields_and_metadata_read_back() {
     document.metadata.insert("scene".into(), "toy".into());
     document.metadata.insert("seed".into(), 42.into());
     let votes = vec![7.0, 0.1, 3.0, 1e-9];
-    document.junction_fields.insert("votes".into(), votes);
+    document.junction_fields.other.insert("votes".into(), votes);
     let views = vec![5.0, 6.0, 7.0];
-    document.edge_fields.insert("visible_views".into(), views);
+    document
+        .edge_fields
+        .other
+        .insert("visible_views".into(), views);
     document.junction_covariances = vec![None; 4];
     document.junction_covariances[1] = Some([1e-6, 0.1, -3e-9, 2.0, 0.0, 4.0]);
     document.views = vec!["0000".into(), "0001".into()];
@@ -200,14 +203,14 @@ fn fields_and_metadata_read_back() {
     assert_eq!(read.wireframe(), awkward());
 
     for bad in [vec![1.0], vec![1.0, 2.0, f64::NAN]] {
-        document.edge_fields.insert("score".into(), bad);
+        document.edge_fields.other.insert("score".into(), bad);
         let error = write_json(&path, &document).unwrap_err().to_string();
         assert!(
             error.contains("`score`") && error.contains("3 entries"),
             "{error}"
         );
     }
-    document.edge_fields.remove("score");
+    document.edge_fields.other.remove("score");
 
     let mut without_view = document.clone();
     without_view.views.pop();

@@ -63,8 +63,8 @@ impl Session<'_> {
             ("Junctions", document.junctions.len().to_string()),
             ("Edges", document.edges.len().to_string()),
         ];
-        if let Some(curved) = document.edge_fields.get("curved") {
-            let pieces = curved.iter().filter(|is_piece| **is_piece > 0.0).count();
+        if let Some(curved) = &document.edge_fields.curved {
+            let pieces = curved.iter().filter(|is_piece| **is_piece).count();
             result.push(("Of them pieces of curves", pieces.to_string()));
         }
         if let Some(agreement) = agreement {

@@ -135,8 +135,7 @@ fn main() -> Result<(), AnyError> {
     if let Some(dir) = &arguments.out {
         std::fs::create_dir_all(dir)?;
         let mut document = WireframeDocument::from(&in_files);
-        let views = views_per_edge.iter().map(|views| *views as f64).collect();
-        document.edge_fields.insert("views".into(), views);
+        document.edge_fields.supporting_views = Some(views_per_edge.clone());
         write_json(&dir.join("wireframe.json"), &document)?;
         write_obj(&dir.join("wireframe.obj"), &in_files)?;
         write_ply(&dir.join("wireframe.ply"), &in_files)?;

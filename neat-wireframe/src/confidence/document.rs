@@ -1,7 +1,7 @@
 //! Confidence in `wireframe.json` and as line tracks.
 
 use super::covariance::largest_eigenvalue;
-use super::{Confidence, EdgeSupport};
+use super::{Confidence, EdgeConfidence, EdgeSupport};
 use crate::ViewObservation;
 use crate::Wireframe3d;
 use crate::export::{LineTrack, SupportingSegment, TrackSegment, WireframeDocument};
@@ -19,7 +19,7 @@ impl Confidence {
     /// `original_from_world` has moved from the world of the cameras to the frame
     /// of the user's files. `view_names` are those of the observations.
     ///
-    /// Fields hold numbers only, so a junction that is not determined has the
+    /// Fields hold a number for every junction and edge, so a junction that is not determined has the
     /// scene's radius as `sigma` (and `null` as covariance), and an edge without
     /// support the tolerance as `residual_in_pixels`.
     ///
@@ -45,13 +45,9 @@ impl Confidence {
             let sigma = |c: &Matrix3<f64>| largest_eigenvalue(c).max(0.0).sqrt();
             covariance.as_ref().map_or(undetermined, sigma)
         };
-        document.junction_fields.extend([
-            ("sigma".into(), covariances.iter().map(sigma).collect()),
-            (
-                "supporting_views".into(),
-                self.junctions.iter().map(|j| j.views as f64).collect(),
-            ),
-        ]);
+        let fields = &mut document.junction_fields;
+        fields.sigma = Some(covariances.iter().map(sigma).collect());
+        fields.supporting_views = Some(self.junctions.iter().map(|j| j.views).collect());
         let upper_triangle = |c: Matrix3<f64>| {
             [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|index| c[index])
         };
@@ -60,26 +56,13 @@ impl Confidence {
             .collect();
 
         let edges = || self.edges.iter();
-        document.edge_fields.extend([
-            (
-                "supporting_views".into(),
-                edges().map(|edge| edge.views as f64).collect(),
-            ),
-            (
-                "expected_views".into(),
-                edges().map(|edge| edge.expected_views as f64).collect(),
-            ),
-            (
-                "probability".into(),
-                edges().map(|edge| edge.probability).collect(),
-            ),
-            (
-                "residual_in_pixels".into(),
-                edges()
-                    .map(|edge| edge.residual_in_pixels.unwrap_or(self.tolerance_in_pixels))
-                    .collect(),
-            ),
-        ]);
+        let residual =
+            |edge: &EdgeConfidence| edge.residual_in_pixels.unwrap_or(self.tolerance_in_pixels);
+        let fields = &mut document.edge_fields;
+        fields.supporting_views = Some(edges().map(|edge| edge.views).collect());
+        fields.expected_views = Some(edges().map(|edge| edge.expected_views).collect());
+        fields.probability = Some(edges().map(|edge| edge.probability).collect());
+        fields.residual_in_pixels = Some(edges().map(residual).collect());
         document.views = view_names.to_vec();
         document.edge_support = edges()
             .map(|edge| edge.supports.iter().map(supporting_segment).collect())

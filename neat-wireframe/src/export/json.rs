@@ -1,6 +1,6 @@
 //! `wireframe.json`: the graph with whatever is known about its parts.
 
-use super::{ExportError, check};
+use super::{EdgeFields, ExportError, JunctionFields, check};
 use crate::Wireframe3d;
 use nalgebra::Vector3;
 use neat_core::file;
@@ -35,12 +35,12 @@ pub struct WireframeDocument {
     /// Index pairs into `junctions`.
     #[serde(default, alias = "lines")]
     pub edges: Vec<[usize; 2]>,
-    /// Named numbers, one per junction.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub junction_fields: BTreeMap<String, Vec<f64>>,
-    /// Named numbers, one per edge.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub edge_fields: BTreeMap<String, Vec<f64>>,
+    /// Facts about every junction.
+    #[serde(default, skip_serializing_if = "JunctionFields::is_empty")]
+    pub junction_fields: JunctionFields,
+    /// Facts about every edge.
+    #[serde(default, skip_serializing_if = "EdgeFields::is_empty")]
+    pub edge_fields: EdgeFields,
     /// The upper triangle `[xx, xy, xz, yy, yz, zz]` of every junction's
     /// covariance in squared units of the user's frame; `None` where the
     /// observations do not determine the position. Empty, or one per junction.
@@ -84,8 +84,12 @@ impl WireframeDocument {
     /// wrong length.
     pub fn check(&self, path: &Path) -> Result<(), ExportError> {
         check(path, &self.junctions, &self.edges)?;
-        let per_junction = (&self.junction_fields, self.junctions.len(), "junction");
-        let per_edge = (&self.edge_fields, self.edges.len(), "edge");
+        let per_junction = (
+            self.junction_fields.named(),
+            self.junctions.len(),
+            "junction",
+        );
+        let per_edge = (self.edge_fields.named(), self.edges.len(), "edge");
         for (fields, expected, of) in [per_junction, per_edge] {
             let bad = fields
                 .iter()

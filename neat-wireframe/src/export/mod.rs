@@ -4,11 +4,13 @@
 //! back as the same number, and replace an existing file only when the new one is
 //! complete.
 
+mod fields;
 mod json;
 mod limap;
 mod obj;
 mod ply;
 
+pub use fields::{EdgeFields, JunctionFields};
 pub use json::{SupportingSegment, WireframeDocument, parse_json, read_json, write_json};
 pub use limap::{
     LineTrack, TrackSegment, parse_all_tracks, parse_image_list, parse_track, read_all_tracks,

@@ -50,19 +50,19 @@ fn documents_hold_everything_in_the_frame_of_the_user() {
             expected[(2, 2)]
         ]
     );
-    let sigma = document.junction_fields["sigma"][2];
+    let sigmas = document.junction_fields.sigma.as_ref().unwrap();
+    let sigma = sigmas[2];
     assert!(sigma * sigma <= xx + yy + zz && 3.0 * sigma * sigma >= xx + yy + zz);
     assert_eq!(document.junction_covariances.last(), Some(&None));
-    assert_eq!(document.junction_fields["sigma"].last(), Some(&15.0));
-    assert_eq!(
-        document.junction_fields["supporting_views"].last(),
-        Some(&0.0)
-    );
+    assert_eq!(sigmas.last(), Some(&15.0));
+    let views = document.junction_fields.supporting_views.as_ref().unwrap();
+    assert_eq!(views.last(), Some(&0));
+    let fields = document.edge_fields.named();
 
     for (edge, support) in document.edge_support.iter().enumerate() {
-        assert!(document.edge_fields["probability"][edge] > 0.5);
-        assert!(document.edge_fields["residual_in_pixels"][edge] < 1.5);
-        assert!(document.edge_fields["supporting_views"][edge] <= 15.0);
+        assert!(fields["probability"][edge] > 0.5);
+        assert!(fields["residual_in_pixels"][edge] < 1.5);
+        assert!(fields["supporting_views"][edge] <= 15.0);
         let segment = wireframe.segment(edge);
         for support in support {
             let [x0, y0, x1, y1] = support.segment;
