@@ -29,7 +29,7 @@
 //! | [`load_scene`], [`LoadOptions`], [`layout`] | a folder → a scene; one file for each of eleven layouts |
 //! | [`mod@convert`] | a scene → files for other programs |
 //! | [`hawp_json`], [`ground_truth`], [`npz`], [`ply`], [`image_file`] | single files |
-//! | [`file`], [`file_cache`], [`MemoryLimit`] | whole files or none, results kept, bounded memory |
+//! | [`mod@file`], [`file_cache`], [`MemoryLimit`] | whole files or none, results kept, bounded memory |
 //! | [`synthetic`] | scenes with exact truth |
 //! | [`assignment`] | the matching of least cost |
 //! | [`SceneError`], [`with_causes`] | what can be wrong, with file, view and remedy |
