@@ -1,6 +1,5 @@
 //! The signed distance network (VolSDF; paper Appendix C.1).
 
-use crate::ray_sampler::DistanceQuery;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use neat_tensor::kernels::cpu::softplus_network::SoftplusNetwork;
@@ -383,11 +382,5 @@ impl Distances {
                 *distance = cap;
             }
         }
-    }
-}
-
-impl DistanceQuery for Distances {
-    fn distances(&mut self, points: &[[f32; 3]]) -> Vec<f32> {
-        self.capped(points)
     }
 }

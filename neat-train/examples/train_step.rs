@@ -45,10 +45,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let device = Backend::Flex.device()?.autodiff();
     let train = TrainConfig::default();
     let model = NeatModel::new(&ModelConfig::default(), 1.0, 0, &device)?;
-    let mut distances = model.implicit_network.distances(&device);
+    let distances = model.implicit_network.distances(&device);
     let beta = host_vec(model.density.beta())[0];
     let sampler = train.sampler.init(1.0, 0.2);
-    let samples = sampler.sample(&batch.rays, beta, &mut distances, &mut Deterministic);
+    let mut query = |points: &[[f32; 3]]| distances.capped(points);
+    let samples = sampler.sample(&batch.rays, beta, &mut query, &mut Deterministic);
 
     // The paper's total loss, its gradients, and Adam's step.
     let views = [JunctionView {

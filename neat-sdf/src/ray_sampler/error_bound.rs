@@ -97,7 +97,7 @@ impl ErrorBoundConfig {
         &self,
         rays: &RayBundle,
         beta0: f32,
-        query: &mut impl DistanceQuery,
+        query: &mut DistanceQuery<'_>,
         noise: &mut impl SamplingNoise,
         trace: Option<&mut ErrorBoundTrace>,
     ) -> RaySamples {
@@ -114,7 +114,7 @@ impl ErrorBoundConfig {
         refinement: &mut Refinement,
         rays: &RayBundle,
         beta0: f32,
-        query: &mut impl DistanceQuery,
+        query: &mut DistanceQuery<'_>,
         noise: &mut impl SamplingNoise,
         mut trace: Option<&mut ErrorBoundTrace>,
     ) {
@@ -128,7 +128,7 @@ impl ErrorBoundConfig {
             if wanted.is_empty() {
                 break;
             }
-            let distances = query.distances(wanted);
+            let distances = query(wanted);
             refinement.merge_each(&distances, |ray| {
                 ray.search_beta(beta0, epsilon, self.bisections);
             });

@@ -127,12 +127,12 @@ impl DistanceGrid {
         &mut self,
         offset: usize,
         stride: usize,
-        query: &mut impl DistanceQuery,
+        query: &mut DistanceQuery<'_>,
     ) {
         let nodes: Vec<usize> = self.interleaved(offset, stride).collect();
         for nodes in nodes.chunks(QUERY_CHUNK) {
             let points: Vec<[f32; 3]> = nodes.iter().map(|i| self.node(*i)).collect();
-            for (node, value) in nodes.iter().zip(query.distances(&points)) {
+            for (node, value) in nodes.iter().zip(query(&points)) {
                 self.values[*node] = value;
             }
         }
@@ -190,7 +190,7 @@ impl GridCachedConfig {
         &self,
         grid: &mut DistanceGrid,
         iteration: u64,
-        query: &mut impl DistanceQuery,
+        query: &mut DistanceQuery<'_>,
     ) {
         if let Some((offset, stride)) = self.due(iteration) {
             grid.update_interleaved(offset, stride, query);

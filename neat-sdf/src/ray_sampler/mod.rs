@@ -102,17 +102,8 @@ pub struct DeviceSamples {
     pub directions: Tensor<2>,
 }
 
-/// A batched signed distance query.
-pub trait DistanceQuery {
-    /// The (capped) signed distance at each point.
-    fn distances(&mut self, points: &[[f32; 3]]) -> Vec<f32>;
-}
-
-impl<F: FnMut(&[[f32; 3]]) -> Vec<f32>> DistanceQuery for F {
-    fn distances(&mut self, points: &[[f32; 3]]) -> Vec<f32> {
-        self(points)
-    }
-}
+/// A batched query: the (capped) signed distance at each point.
+pub type DistanceQuery<'a> = dyn FnMut(&[[f32; 3]]) -> Vec<f32> + 'a;
 
 /// Which sampler, and its numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -158,14 +149,14 @@ impl RaySamplerConfig {
 
 impl RaySampler {
     /// Brings cached state up to date before iteration `iteration`.
-    pub fn refresh(&mut self, iteration: u64, query: &mut impl DistanceQuery) {
+    pub fn refresh(&mut self, iteration: u64, query: &mut DistanceQuery<'_>) {
         if let Self::GridCached(config, grid) = self {
             config.refresh(grid, iteration, query);
         }
     }
 
     /// Brings cached state fully up to date, for evaluation.
-    pub fn refresh_all(&mut self, query: &mut impl DistanceQuery) {
+    pub fn refresh_all(&mut self, query: &mut DistanceQuery<'_>) {
         if let Self::GridCached(_, grid) = self {
             grid.update_interleaved(0, 1, query);
         }
@@ -192,7 +183,7 @@ impl RaySampler {
         &self,
         rays: &RayBundle,
         beta: f32,
-        query: &mut impl DistanceQuery,
+        query: &mut DistanceQuery<'_>,
         noise: &mut impl SamplingNoise,
     ) -> RaySamples {
         match self {

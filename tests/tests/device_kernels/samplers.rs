@@ -104,10 +104,11 @@ fn assert_belongs_together(samples: DeviceSamples, rays: &RayBundle, last_is_inf
 fn error_bound_agrees(beta: f32, noise: &(impl SamplingNoise + Clone), what: &str) {
     let config = ErrorBoundConfig::default();
     let rays = rays();
-    let mut distances = network(&flex()).distances(&flex());
+    let distances = network(&flex()).distances(&flex());
+    let mut query = |points: &[[f32; 3]]| distances.capped(points);
     let mut trace = ErrorBoundTrace::default();
     let mut of_host = noise.clone();
-    let host = config.sample(&rays, beta, &mut distances, &mut of_host, Some(&mut trace));
+    let host = config.sample(&rays, beta, &mut query, &mut of_host, Some(&mut trace));
     let weights = weights(&host, &rays, &distances, beta);
     let needed = trace.z.len();
     let what = format!("{what}, β {beta}, {needed} iterations");
@@ -145,16 +146,17 @@ fn algorithm_1_places_the_same_samples() {
 fn a_cached_grid_places_the_same_samples() {
     let config = GridCachedConfig::default();
     let rays = rays();
-    let mut distances = network(&flex()).distances(&flex());
+    let distances = network(&flex()).distances(&flex());
+    let mut query = |points: &[[f32; 3]]| distances.capped(points);
     let grid = || DistanceGrid::sphere(config.resolution, SCENE_RADIUS as f32, 0.9);
     for iterations in [1, 17] {
         let mut sampler = RaySampler::GridCached(config, grid());
         for iteration in 0..iterations {
-            sampler.refresh(iteration, &mut distances);
+            sampler.refresh(iteration, &mut query);
         }
         for beta in [0.3, 0.001] {
             let mut noise = Seeded(stream(2, Purpose::Samples, 0));
-            let host = sampler.sample(&rays, beta, &mut distances, &mut noise);
+            let host = sampler.sample(&rays, beta, &mut query, &mut noise);
             let weights = weights(&host, &rays, &distances, beta);
             on_each_gpu_backend(|device| {
                 let network = network(&device);

@@ -19,7 +19,7 @@ pub(super) fn sample(
     config: &ErrorBoundConfig,
     rays: &RayBundle,
     beta0: f32,
-    query: &mut impl DistanceQuery,
+    query: &mut DistanceQuery<'_>,
     noise: &mut impl SamplingNoise,
 ) -> (RaySamples, usize) {
     let (near, far, epsilon) = (config.near as f32, config.far as f32, config.epsilon as f32);
@@ -32,7 +32,7 @@ pub(super) fn sample(
         iteration += 1;
         for (i, state) in states.iter_mut().enumerate() {
             let points: Vec<_> = new_z[i].iter().map(|z| rays.point(i, *z)).collect();
-            let sdf = query.distances(&points);
+            let sdf = query(&points);
             state.samples.extend(new_z[i].iter().copied().zip(sdf));
             state.samples.sort_by(|a, b| a.0.total_cmp(&b.0));
             state.search_beta(beta0, epsilon, config.bisections);
