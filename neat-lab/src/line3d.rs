@@ -55,10 +55,8 @@ pub fn reconstruct_line3d(
         .metadata
         .insert("scene".into(), scene.name.clone().into());
     document.views = scene.views.iter().map(|view| view.name.clone()).collect();
-    let views = segments.iter().map(|segment| segment.views as f64);
-    document
-        .edge_fields
-        .insert("supporting_views".into(), views.collect());
+    let views = segments.iter().map(|segment| segment.views);
+    document.edge_fields.supporting_views = Some(views.collect());
     file::create_dir(out)?;
     let path = |extension: &str| out.join("wireframe").with_extension(extension);
     write_json(&path("json"), &document)?;
