@@ -5,8 +5,8 @@
 
 use crate::error::LabError;
 use burn::tensor::{DType, Device, Tensor, TensorData};
-use neat_core::MemoryLimit;
 use neat_core::synthetic::{SyntheticScene, generate};
+use neat_core::{MemoryLimit, Scene};
 use neat_pipeline::config::Preset;
 use neat_pipeline::plan::{Machine, settle};
 use neat_pipeline::scene::scaled_for;
@@ -119,7 +119,8 @@ impl Part {
 }
 
 /// Measures `presets` on `backend`, each until `seconds` have passed (one step at
-/// least), with kernels or `plain` tensor operations. `progress` hears what comes next, and which share of all is done.
+/// least), with kernels or `plain` tensor operations. `progress` hears what comes next,
+/// and which share of all is done.
 ///
 /// # Errors
 /// If a preset cannot be trained.
@@ -137,58 +138,28 @@ pub fn benchmark(
         Kernels::default()
     };
     progress("matrix product", 0.0);
-    let views = generate(&views())
-        .expect("benchmark: the default scene is valid")
-        .scene;
     let side = match (backend, software_driver(device)) {
         (Backend::Wgpu, None) => GPU_SIDE,
         (Backend::Wgpu, Some(_)) => SOFTWARE_SIDE,
         _ => SIDE,
     };
-    let yardstick = matrix_product_rate(side, device);
+    let bench = Bench {
+        backend,
+        device,
+        views: generate(&views())
+            .expect("benchmark: the default scene is valid")
+            .scene,
+        kernels,
+        yardstick: matrix_product_rate(side, device),
+        seconds,
+    };
     let mut measured = Vec::new();
     for (i, preset) in presets.iter().enumerate() {
         let mut progress = |step: &str, fraction: f64| {
             let done = (i as f64 + fraction) / presets.len() as f64;
             progress(&format!("{preset}: {step}"), done);
         };
-        let asked = preset.config();
-        let scene = scaled_for(&asked.data, views.clone());
-        let machine = Machine {
-            backend,
-            memory_limit: MemoryLimit::NONE,
-        };
-        let (plan, _) = settle(&asked, &scene, machine, None)?;
-        let config = plan.config();
-        let mut training = config.training();
-        training.kernels = kernels.clone();
-        let mut trainer = Trainer::new(&scene, &training, 0, device)?;
-        let mut run = Run::default();
-        warm_up(&mut trainer, backend, &mut progress)?;
-        synchronise(device);
-        run.measure(&mut trainer, &config.model, seconds, &mut progress)?;
-        let start = Instant::now();
-        synchronise(device);
-        run.whole += start.elapsed();
-        progress("distance with gradient", 1.0);
-        let mut parts = run.parts(yardstick);
-        let points = StepRows {
-            eikonal: POINTS,
-            ..StepRows::default()
-        };
-        parts.push(Part::new(
-            "distance with gradient, alone",
-            gradient_seconds(trainer.implicit_network(), device),
-            StepFlops::count(&config.model, &points).forward,
-            yardstick,
-        ));
-        measured.push(PresetBenchmark {
-            preset: *preset,
-            steps: run.steps,
-            rows: run.rows.divided_by(run.steps as usize),
-            parts,
-            peak_memory: peak_memory(),
-        });
+        measured.push(bench.measure(*preset, &mut progress)?);
     }
     progress("matrix product", 1.0);
     let yardstick_again = matrix_product_rate(side, device);
@@ -196,14 +167,70 @@ pub fn benchmark(
         backend,
         device: device_name(device),
         threads: rayon::current_num_threads(),
-        fused: kernels.on(device, DType::F32).has_kernels(),
+        fused: bench.kernels.on(device, DType::F32).has_kernels(),
         yardstick_side: side,
-        yardstick,
+        yardstick: bench.yardstick,
         yardstick_again,
-        busy: yardstick.max(yardstick_again) > BUSY * yardstick.min(yardstick_again),
+        busy: bench.yardstick.max(yardstick_again) > BUSY * bench.yardstick.min(yardstick_again),
         copy: (backend == Backend::Wgpu).then(|| copy_rate(device)),
         presets: measured,
     })
+}
+
+/// What all presets are measured with.
+struct Bench<'a> {
+    backend: Backend,
+    device: &'a Device,
+    views: Scene,
+    kernels: Kernels,
+    yardstick: f64,
+    seconds: f64,
+}
+
+impl Bench<'_> {
+    fn measure(
+        &self,
+        preset: Preset,
+        progress: &mut dyn FnMut(&str, f64),
+    ) -> Result<PresetBenchmark, LabError> {
+        let asked = preset.config();
+        let scene = scaled_for(&asked.data, self.views.clone());
+        let machine = Machine {
+            backend: self.backend,
+            memory_limit: MemoryLimit::NONE,
+        };
+        let (plan, _) = settle(&asked, &scene, machine, None)?;
+        let config = plan.config();
+        let mut training = config.training();
+        training.kernels = self.kernels.clone();
+        let mut trainer = Trainer::new(&scene, &training, 0, self.device)?;
+        let mut run = Run::default();
+        warm_up(&mut trainer, self.backend, progress)?;
+        synchronise(self.device);
+        run.measure(&mut trainer, &config.model, self.seconds, progress)?;
+        let start = Instant::now();
+        synchronise(self.device);
+        run.whole += start.elapsed();
+        progress("distance with gradient", 1.0);
+        let mut parts = run.parts(self.yardstick);
+        let points = StepRows {
+            eikonal: POINTS,
+            ..StepRows::default()
+        };
+        parts.push(Part::new(
+            "distance with gradient, alone",
+            gradient_seconds(trainer.implicit_network(), self.device),
+            StepFlops::count(&config.model, &points).forward,
+            self.yardstick,
+        ));
+        Ok(PresetBenchmark {
+            preset,
+            steps: run.steps,
+            rows: run.rows.divided_by(run.steps as usize),
+            parts,
+            peak_memory: process_memory("VmHWM:").map(|kib| kib / 1024.0 / 1024.0),
+        })
+    }
 }
 
 /// What all presets are trained on.
@@ -359,13 +386,11 @@ fn gradient_seconds(network: &ImplicitNetwork, device: &Device) -> f64 {
     best_seconds(|| network.gradient_uncapped(points.clone()))
 }
 
-/// Largest resident memory of this process in GiB, where the system tells
-/// (Linux).
-fn peak_memory() -> Option<f64> {
+/// A figure of this process's memory in KiB, by its name where the system tells (Linux).
+pub(crate) fn process_memory(name: &str) -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib / 1024.0 / 1024.0)
+    let line = status.lines().find(|line| line.starts_with(name))?;
+    line.split_whitespace().nth(1)?.parse().ok()
 }
 
 impl Benchmark {
@@ -406,9 +431,10 @@ impl Benchmark {
 
     /// How networks ran, in words.
     fn networks(&self) -> &'static str {
-        match self.fused {
-            true => "fused operations",
-            false => "fused operations off",
+        if self.fused {
+            "fused operations"
+        } else {
+            "fused operations off"
         }
     }
 }
@@ -430,15 +456,16 @@ impl PresetBenchmark {
         );
         for part in &self.parts {
             let (name, milliseconds) = (part.name, part.seconds * 1e3);
-            let _ = match part.flops > 0.0 {
-                true => writeln!(
+            let _ = if part.flops > 0.0 {
+                writeln!(
                     text,
                     "| {name} | {milliseconds:.2} ms | {:.3} | {:.1} | {:.0} % |",
                     part.flops / 1e9,
                     part.flops / part.seconds / 1e9,
                     part.share * 100.0
-                ),
-                false => writeln!(text, "| {name} | {milliseconds:.2} ms | | | |"),
+                )
+            } else {
+                writeln!(text, "| {name} | {milliseconds:.2} ms | | | |")
             };
         }
     }

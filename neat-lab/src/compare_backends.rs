@@ -1,5 +1,6 @@
 //! The same seeds on every backend: time, memory and agreement.
 
+use crate::benchmark::process_memory;
 use burn::tensor::TensorData;
 use neat_core::Scene;
 use neat_tensor::{Backend, BackendError, Kernels};
@@ -106,7 +107,7 @@ pub fn compare_backends(
             let report = trainer.step(step as f64 / steps as f64).map_err(fail)?;
             times.push(start.elapsed().as_secs_f64() * 1e3);
             losses.push(report.losses.total);
-            if let Some(mib) = resident_mib() {
+            if let Some(mib) = process_memory("VmRSS:").map(|kib| kib / 1024.0) {
                 peak = Some(peak.map_or(mib, |p| p.max(mib)));
             }
             progress(&backend.to_string(), (step + 1) as f64 / steps as f64);
@@ -226,12 +227,4 @@ impl Comparison {
         }
         table
     }
-}
-
-/// Resident memory of this process, where the system tells (Linux).
-fn resident_mib() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
-    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(kib / 1024.0)
 }

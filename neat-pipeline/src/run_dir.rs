@@ -323,10 +323,8 @@ impl RunDir {
     /// If the file cannot be written.
     pub fn write_config(&self, config: &Config) -> Result<(), RunDirError> {
         let text = toml::to_string_pretty(config)?;
-        Ok(file::write_atomically(
-            &self.root.join(CONFIG),
-            text.as_bytes(),
-        )?)
+        let path = self.root.join(CONFIG);
+        Ok(file::write_atomically(&path, text.as_bytes())?)
     }
 
     /// Reads `config.toml`.
@@ -344,10 +342,8 @@ impl RunDir {
     /// If the file cannot be written.
     pub fn write_plan(&self, plan: &Plan) -> Result<(), RunDirError> {
         let text = toml::to_string_pretty(plan.config())?;
-        Ok(file::write_atomically(
-            &self.root.join(PLAN),
-            text.as_bytes(),
-        )?)
+        let path = self.root.join(PLAN);
+        Ok(file::write_atomically(&path, text.as_bytes())?)
     }
 
     /// Reads `plan.toml`. Runs of earlier versions have none: their `config.toml` leaves

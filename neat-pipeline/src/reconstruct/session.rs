@@ -187,6 +187,7 @@ impl<'a> Session<'a> {
     }
 
     pub fn written(&mut self, path: PathBuf) {
+        tracing::debug!(path = %path.display(), "written");
         (self.on_event)(Event::FileWritten(path));
     }
 
