@@ -1,7 +1,7 @@
 //! How good the detector is: precision and recall of junctions and segments on
 //! synthetic scenes with noise and blur, and on real objects with known truth.
 //!
-//! `cargo run --release -p neat-detect --example detector_table [-- SCENE...]`
+//! `cargo run --release -p neat-lab --example detector_table [-- SCENE...]`
 //!
 //! A SCENE is a folder that loads, with `gt_wireframe.json` and `mesh.obj`; where
 //! it has HAWP wireframes, they are measured by the same truth.

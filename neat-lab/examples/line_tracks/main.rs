@@ -2,7 +2,7 @@
 //! alone: no training.
 //!
 //! ```text
-//! cargo run --release -p neat-wireframe --example line_tracks -- SCENE \
+//! cargo run --release -p neat-lab --example line_tracks -- SCENE \
 //!     [--out DIR] [--overlays DIR] [--config FILE.json] [--truth gt_wireframe.json] \
 //!     [--baseline]
 //! ```
