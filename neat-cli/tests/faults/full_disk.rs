@@ -110,8 +110,11 @@ fn a_full_disk_at_any_write_is_reported_and_loses_nothing() {
         "overlays/",
         "report.html",
     ] {
+        // A file of one page may get the page that the failed one before it left.
+        let path = reference.join(file);
+        let is_small = path.is_file() && fs::metadata(&path).unwrap().len() <= PAGE;
         assert!(
-            full_at.iter().any(|path| path.starts_with(file)),
+            is_small || full_at.iter().any(|path| path.starts_with(file)),
             "{file} always had space: {full_at:?}"
         );
     }

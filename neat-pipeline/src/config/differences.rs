@@ -61,6 +61,17 @@ fn collect_leaves(key: &str, value: &Value, leaves: &mut BTreeMap<String, Value>
 mod tests {
     use super::*;
     use crate::config::Preset;
+    use std::collections::BTreeSet;
+
+    /// Two hundred is what a person can still look through: a number that nobody has
+    /// a reason to change is a constant beside its use.
+    #[test]
+    fn there_are_not_more_settings_than_a_person_can_look_through() {
+        let keys: BTreeSet<String> = (Preset::ALL.iter())
+            .flat_map(|preset| leaves(&preset.config()).into_keys())
+            .collect();
+        assert!((100..=200).contains(&keys.len()), "{} settings", keys.len());
+    }
 
     #[test]
     fn every_value_that_differs_is_named() {

@@ -17,9 +17,7 @@ const MAX_REQUIRED_VIEWS: usize = 5;
 /// views: `clip(round(0.2 V), 2, 5)`.
 pub fn required_views(views: usize) -> usize {
     let share = (REQUIRED_SHARE_OF_VIEWS * views as f64).round_ties_even();
-    (share as usize)
-        .max(MIN_REQUIRED_VIEWS)
-        .min(MAX_REQUIRED_VIEWS)
+    (share as usize).clamp(MIN_REQUIRED_VIEWS, MAX_REQUIRED_VIEWS)
 }
 
 /// Largest distance between a detection's ends and those of an edge of this

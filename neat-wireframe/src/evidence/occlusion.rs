@@ -10,7 +10,7 @@ const ROUNDS: usize = 8;
 /// of at least one edge.
 const POINTS_PER_BATCH: usize = 1 << 16;
 
-/// Settings of [`visible_views`] and of the test that uses it. Lengths are in
+/// Settings of `visible_views` and of the test that uses it. Lengths are in
 /// the unit of a scene whose ball has radius 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OcclusionConfig {
