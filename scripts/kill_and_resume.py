@@ -183,9 +183,9 @@ class Session:
         result = [Mark(self.begin, START)]
         for event in self.events():
             stage = None
-            if event["event"] == "stage_started":
+            if event.get("event") == "stage_started":
                 stage = event["stage"]
-            elif event["event"] == "stage_finished":
+            elif event.get("event") == "stage_finished":
                 stage = AFTERWARDS.get(event["stage"])
             if stage:
                 result.append(Mark(event["time"], stage))
@@ -193,7 +193,7 @@ class Session:
 
     def continued_after(self):
         """The step of the checkpoint that it went on from; None if it did not (yet)."""
-        steps = (event["step"] for event in self.events() if event["event"] == "resumed")
+        steps = (event["step"] for event in self.events() if event.get("event") == "resumed")
         return next(steps, None)
 
     def ended(self):

@@ -113,7 +113,7 @@ fn programs_read_what_is_decided_and_what_has_no_effect() {
 }
 
 #[test]
-fn a_run_of_an_earlier_version_is_continued_and_distilled() {
+fn a_run_whose_configuration_leaves_nothing_open_needs_no_plan() {
     let scene = TestScene::new();
     scene.run("train", "1").assert().success();
     // There what was settled was in config.toml, and a warning was its text.

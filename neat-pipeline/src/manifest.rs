@@ -90,13 +90,20 @@ impl Manifest {
         self.steps = before.steps;
         self.started = before.started;
         if !before.decisions.is_empty() {
-            self.decisions = before.decisions;
+            // What computes is decided anew in every session.
+            let computes = |decision: &Decision| decision.setting == "backend";
+            let now = self.decisions.iter().find(|d| computes(d)).cloned();
+            let told = before.decisions.into_iter();
+            self.decisions = told
+                .filter_map(|d| if computes(&d) { now.clone() } else { Some(d) })
+                .collect();
         }
         for (stage, seconds) in before.seconds {
             *self.seconds.entry(stage).or_default() += seconds;
         }
         for warning in before.warnings {
-            if !self.warnings.contains(&warning) {
+            // Manifests of earlier versions have no kinds.
+            if !self.warnings.iter().any(|w| w.message == warning.message) {
                 self.warnings.push(warning);
             }
         }

@@ -10,7 +10,9 @@ mod step_memory;
 mod without_effect;
 
 pub use step_memory::{bytes_per_ray, rows_of_step};
-pub(crate) use without_effect::{changes_of_presets, settings_without_effect};
+pub(crate) use without_effect::{
+    changes_of_presets, settings_of_training, settings_without_effect,
+};
 
 use crate::config::{Assembler, Background, Choice, Config};
 use crate::event::Decision;
@@ -72,6 +74,9 @@ impl Plan {
             Choice::Auto => Assembler::Fast,
         };
         config.distill.back_end = Choice::Given(assembler);
+        if config.model.perceiver.junctions.fixed().is_none() {
+            return Err(PlanError::Open("model.perceiver.junctions"));
+        }
         config.training().validate()?;
         Ok(Self {
             config,
@@ -136,12 +141,19 @@ pub fn settle(
             let reason = "as photographs show no silhouettes".to_owned();
             decide("train.loss.mask", &0, reason);
         }
-        if asked.model.implicit.bounding_sphere_slope == 0.0 {
+        if earlier.is_none() && asked.model.implicit.bounding_sphere_slope == 0.0 {
             config.model.implicit.bounding_sphere_slope = SPHERE_SLOPE;
             let reason = "as the sphere stands for all that is behind the scene".to_owned();
             let setting = "model.implicit.bounding_sphere_slope";
             decide(setting, &SPHERE_SLOPE, reason);
         }
+    }
+    if let Some(plan) = earlier
+        && asked.model.implicit.bounding_sphere_slope == 0.0
+    {
+        // The field was trained with it, whatever is said of the background now.
+        let slope = plan.config.model.implicit.bounding_sphere_slope;
+        config.model.implicit.bounding_sphere_slope = slope;
     }
     if asked.model.perceiver.junctions.fixed().is_none() {
         let kept = earlier.and_then(|plan| plan.config.model.perceiver.junctions.fixed());

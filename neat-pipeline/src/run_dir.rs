@@ -104,8 +104,10 @@ pub enum RunDirError {
     /// A run that ended before its first checkpoint.
     #[error("{0} has no checkpoint: train again with --overwrite")]
     NoCheckpoint(PathBuf),
-    /// `config.toml` or `manifest.json` does not parse.
-    #[error("{path} cannot be understood: {reason}; correct it or train again with --overwrite")]
+    /// `config.toml`, `plan.toml` or `manifest.json` does not parse.
+    #[error(
+        "{path} cannot be understood: {reason}; if another version of neat wrote it, use that one, else correct it or train again with --overwrite"
+    )]
     Malformed {
         /// The file.
         path: PathBuf,
@@ -346,8 +348,7 @@ impl RunDir {
         Ok(file::write_atomically(&path, text.as_bytes())?)
     }
 
-    /// Reads `plan.toml`. Runs of earlier versions have none: their `config.toml` leaves
-    /// nothing open.
+    /// Reads `plan.toml`; where there is none, `config.toml`, if that leaves nothing open.
     ///
     /// # Errors
     /// If the file is missing where it is needed, or not a plan of this version.

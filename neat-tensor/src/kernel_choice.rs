@@ -20,7 +20,7 @@ pub struct Kernels {
 const MAX_KEPT_BYTES: u64 = 2 << 30;
 
 impl Default for Kernels {
-    /// Kernels where there are any, in memory that is not limited.
+    /// [`Kernels::within`] 2 GiB, of this value and its clones.
     fn default() -> Self {
         Self::within(None)
     }

@@ -340,6 +340,7 @@ impl LossConfig {
 impl Losses {
     /// From the total and, in the order of the table, the terms.
     pub fn from_terms(numbers: &[f32]) -> Self {
+        debug_assert_eq!(numbers.len(), 1 + LOSS_TERMS.len());
         let mut losses = Self {
             total: f64::from(numbers[0]),
             ..Self::default()

@@ -84,7 +84,10 @@ impl CompareBackendsArgs {
             // Every backend takes a step at once.
             memory_limit: MemoryLimit::NONE,
         };
-        let (plan, _) = settle(&asked, &scene, machine, None)?;
+        let (plan, decisions) = settle(&asked, &scene, machine, None)?;
+        for decision in decisions {
+            on_event(Event::Decided(decision));
+        }
         file::create_dir(&self.out)?;
         let comparison = compare_backends(
             &scene,

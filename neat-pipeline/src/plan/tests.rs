@@ -69,7 +69,7 @@ fn photographs_get_a_sphere_behind_them_and_line_tracks() {
 #[test]
 fn what_is_given_or_decided_stays() {
     let (plan, _) = settled(&Preset::Fast.config(), &photographs());
-    // As the runs of earlier versions have it.
+    // As a person has it who leaves nothing open.
     let (again, decisions) = settled(plan.config(), &black());
     assert_eq!(again, plan);
     assert!(decisions.is_empty(), "{decisions:?}");
@@ -94,6 +94,16 @@ fn what_an_earlier_part_of_a_run_has_decided_stays() {
     let (other, _) = settle(&asked, &black(), MACHINE, Some(&first)).unwrap();
     assert_eq!(other.assembler(), Assembler::Paper);
     assert_eq!(other.config().train.ray_chunk, Some(8));
+}
+
+#[test]
+fn a_trained_field_keeps_its_sphere_whatever_is_said_of_the_background() {
+    let (trained, _) = settled(&Preset::Fast.config(), &photographs());
+    let mut asked = Preset::Fast.config();
+    asked.data.background = Some(Choice::Given(Background::Black));
+    let (plan, _) = settle(&asked, &photographs(), MACHINE, Some(&trained)).unwrap();
+    assert_eq!(plan.assembler(), Assembler::Fast);
+    assert_eq!(plan.config().model, trained.config().model);
 }
 
 #[test]

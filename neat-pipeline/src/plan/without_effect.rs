@@ -34,6 +34,23 @@ pub(crate) fn settings_without_effect(
         .collect()
 }
 
+/// A warning for every change of a setting that only training looks at, for a run whose
+/// field is trained.
+pub(crate) fn settings_of_training(changes: &[Difference]) -> Vec<Warning> {
+    changes
+        .iter()
+        .filter(|change| change.key.starts_with("train."))
+        // Rays are sampled, and samples left out, in every rendering.
+        .filter(|change| !change.key.starts_with("train.sampler."))
+        .filter(|change| change.key != "train.min_sample_weight")
+        .map(|change| {
+            let (key, value) = (&change.key, &change.now);
+            let message = format!("{key} = {value} has no effect: the field is trained");
+            Warning::new(WarningKind::NoEffect, message)
+        })
+        .collect()
+}
+
 /// How the keys of settings begin that do nothing, and why.
 fn idle_settings(
     plan: &Plan,
@@ -108,6 +125,15 @@ mod tests {
                 "train.loss.mask = 0.7 has no effect: photographs show no silhouettes".to_owned(),
             ]
         );
+        let sets = [
+            "train.steps=5".to_owned(),
+            "train.sampler.lookups=32".to_owned(),
+        ];
+        let fast = Preset::Fast.config();
+        let changes = differences(&fast, &apply_overrides(&fast, &sets).unwrap());
+        let told_of_run = settings_of_training(&changes);
+        assert_eq!(told_of_run.len(), 1);
+        assert!(told_of_run[0].message.contains("train.steps = 5"));
         let points = told(black, &["train.surface_points=8"]);
         assert!(points[0].contains("no sparse points"), "{points:?}");
     }

@@ -4,14 +4,14 @@ use crate::config::{Config, differences};
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Warning, WarningKind};
 use crate::manifest::Manifest;
-use crate::plan::{Machine, Plan, settings_without_effect, settle};
+use crate::plan::{Machine, Plan, settings_of_training, settings_without_effect, settle};
 use crate::resources::Resources;
 use crate::run_dir::{RunDir, RunDirError};
 use crate::scene::prepare_scene;
 use burn::tensor::Device;
 use neat_core::Scene;
-use neat_tensor::Backend;
 use neat_tensor::backend::software_driver;
+use neat_tensor::{Backend, Kernels};
 use neat_train::TrainedField;
 use std::path::Path;
 
@@ -100,6 +100,9 @@ fn read_run(
     let (plan, _) = settle(&asked, &prepared.scene, machine, Some(&planned))?;
     let changes = differences(then, &asked);
     let sparse_points = !prepared.scene.sparse_points.is_empty();
+    for warning in settings_of_training(&changes) {
+        on_event(Event::Warning(warning));
+    }
     for warning in settings_without_effect(&changes, &plan, sparse_points, prepared.detected) {
         on_event(Event::Warning(warning));
     }
@@ -110,7 +113,9 @@ fn read_run(
         let warning = Warning::new(WarningKind::DamagedCheckpoint, text);
         on_event(Event::Warning(warning));
     }
-    let field = TrainedField::load(&plan.config().training(), &usable.checkpoint, &device)?;
+    let mut training = plan.config().training();
+    training.kernels = Kernels::within(resources.memory_limit.bytes());
+    let field = TrainedField::load(&training, &usable.checkpoint, &device)?;
     Ok(OpenedRun {
         dir,
         asked,

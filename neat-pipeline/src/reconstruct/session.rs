@@ -107,8 +107,9 @@ impl<'a> Session<'a> {
     /// Writes what says what the run is.
     fn begin(&mut self, asked: &Config, detected: bool) -> Result<(), PipelineError> {
         self.set_damaged_aside()?;
-        self.dir.write_config(asked)?;
+        // Without a plan, what was asked would be taken for one.
         self.dir.write_plan(&self.plan)?;
+        self.dir.write_config(asked)?;
         if detected {
             self.write_detections()?;
         }

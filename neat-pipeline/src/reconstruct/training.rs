@@ -217,6 +217,8 @@ impl Session<'_> {
                 self.device = Backend::Flex.device()?;
                 self.ray_chunk = None;
                 self.manifest.backend = Backend::Flex.to_string();
+                self.manifest.device = "CPU".to_owned();
+                self.manifest.decisions.retain(|d| d.setting != "backend");
                 "the CPU".to_owned()
             }
             Replacement::None => {

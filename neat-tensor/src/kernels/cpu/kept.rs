@@ -107,3 +107,17 @@ impl KnownRows {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_booked_up_to_its_end_and_given_back() {
+        let memory = KeptMemory::of_bytes(10);
+        let first = memory.book(6).unwrap();
+        assert!(memory.clone().book(5).is_none());
+        drop(first);
+        assert!(memory.book(10).is_some());
+    }
+}
