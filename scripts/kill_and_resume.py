@@ -54,7 +54,7 @@ TEMPORARY = re.compile(r"\..+\.\d+\.\d+\.tmp")
 CHECKPOINT = re.compile(r"step-(\d{8})\.safetensors")
 # Quick, with checkpoints often enough that most kills have one to go on from.
 SETTINGS = ("train.checkpoint_interval=10", "train.warm_up_steps=10", "train.rays=128")
-# A reconstruction of the toy scene takes a second or two; this one is stuck.
+# A reconstruction of the toy scene takes some seconds; this one is stuck.
 PATIENCE_IN_SECONDS = 600
 
 
@@ -66,7 +66,7 @@ def arguments():
     parser.add_argument("--in-a-row", type=int, default=10, help="kills of one run")
     parser.add_argument("--share-in-a-row", type=float, default=0.4, help="of all kills")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--steps", type=int, default=120)
+    parser.add_argument("--steps", type=int, default=200)
     parser.add_argument("--views", type=int, default=12)
     parser.add_argument("--threads", type=int, default=2, help="of a run")
     parser.add_argument("--jobs", type=int, default=1, help="runs at the same time")
