@@ -12,13 +12,13 @@ use neat_pipeline::plan::{Machine, settle};
 use neat_pipeline::scene::scaled_for;
 use neat_sdf::ImplicitNetwork;
 use neat_tensor::backend::{gpu_name, software_driver};
+use neat_tensor::host::host_vec;
 use neat_tensor::random::{Purpose, stream};
 use neat_tensor::{Backend, Kernels};
 use neat_train::TrainError;
 use neat_train::config::ModelConfig;
 use neat_train::flops::{StepFlops, StepRows};
-use neat_train::model::host_vec;
-use neat_train::trainer::{StepTimings, Trainer};
+use neat_train::{StepTimings, Trainer};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -201,8 +201,7 @@ impl Bench<'_> {
         };
         let (plan, _) = settle(&asked, &scene, machine, None)?;
         let config = plan.config();
-        let mut training = config.training();
-        training.kernels = self.kernels.clone();
+        let training = config.training(self.kernels.clone());
         let mut trainer = Trainer::new(&scene, &training, 0, self.device)?;
         let mut run = Run::default();
         warm_up(&mut trainer, self.backend, progress)?;
@@ -488,7 +487,7 @@ mod tests {
                 memory_limit: MemoryLimit::NONE,
             };
             let (plan, _) = settle(&asked, &scene, machine, None).unwrap();
-            let training = plan.config().training();
+            let training = plan.config().training(Kernels::default());
             let mut trainer = Trainer::new(&scene, &training, 0, &Device::flex()).unwrap();
             trainer.step(SCHEDULE).unwrap();
             let rows = trainer.rows();

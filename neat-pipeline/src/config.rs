@@ -53,15 +53,15 @@ pub struct Config {
 }
 
 impl Config {
-    /// What training needs of it.
-    pub fn training(&self) -> TrainingConfig {
+    /// What training needs of it, with the operations that it is to run.
+    pub fn training(&self, kernels: Kernels) -> TrainingConfig {
         TrainingConfig {
             model: self.model.clone(),
             train: self.train.clone(),
             min_segment_score: self.data.min_segment_score,
             attraction_distance: self.data.attraction_distance,
             scene_radius: self.data.scene_radius,
-            kernels: Kernels::default(),
+            kernels,
         }
     }
 }

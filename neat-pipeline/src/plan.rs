@@ -10,15 +10,13 @@ mod step_memory;
 mod without_effect;
 
 pub use step_memory::{bytes_per_ray, rows_of_step};
-pub(crate) use without_effect::{
-    changes_of_presets, settings_of_training, settings_without_effect,
-};
+pub(crate) use without_effect::{Given, changes_of_presets, settings_without_effect};
 
 use crate::config::{Assembler, Background, Choice, Config};
 use crate::event::Decision;
 use neat_core::{MemoryLimit, Scene, SceneError};
 use neat_gjp::JunctionCount;
-use neat_tensor::Backend;
+use neat_tensor::{Backend, Kernels};
 use neat_train::TrainError;
 use std::fmt;
 
@@ -77,7 +75,7 @@ impl Plan {
         if config.model.perceiver.junctions.fixed().is_none() {
             return Err(PlanError::Open("model.perceiver.junctions"));
         }
-        config.training().validate()?;
+        config.training(Kernels::default()).validate()?;
         Ok(Self {
             config,
             background,

@@ -3,9 +3,9 @@
 use image::RgbImage;
 use neat_core::Camera;
 use neat_sdf::RayBundle;
+use neat_tensor::host::{host_points, host_vec};
 use neat_train::TrainedField;
-use neat_train::model::{host_points, host_vec};
-use neat_train::training_data::push_ray;
+use neat_train::batch::push_ray;
 
 /// Rays per rendering call: bounds the memory.
 const RAY_CHUNK: usize = 2048;

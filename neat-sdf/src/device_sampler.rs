@@ -15,6 +15,7 @@ use crate::ray_sampler::{
 };
 use burn::tensor::{Device, Tensor, TensorData, s};
 use neat_tensor::Kernels;
+use neat_tensor::host::host_vec;
 use neat_tensor::sampling::{DrawNumbers, GridNumbers, RefineNumbers};
 
 /// Points per pass of the network: bounds the memory of a query.
@@ -235,8 +236,7 @@ impl DeviceGrid {
 
     /// Reads the grid back.
     pub fn values(&self) -> Vec<f32> {
-        let data = self.values.clone().into_data().convert::<f32>();
-        data.try_into_vec_as().expect("just converted to float32")
+        host_vec(self.values.clone())
     }
 }
 
@@ -276,12 +276,16 @@ impl GridCachedConfig {
     }
 
     /// [`crate::RaySampler::sample`] where the grid is.
+    ///
+    /// # Panics
+    /// If `kernels` cannot place samples there.
     pub fn sample_on_device(
         &self,
         rays: &DeviceRays,
         beta: Tensor<1>,
         like: &DistanceGrid,
         grid: &DeviceGrid,
+        kernels: &Kernels,
         noise: &mut impl SamplingNoise,
     ) -> DeviceSamples {
         let count = rays.len();
@@ -300,7 +304,6 @@ impl GridCachedConfig {
             min_beta: 0.5 * like.cell(),
             weight_floor: self.weight_floor as f32,
         };
-        let kernels = Kernels::default();
         let (rays_there, values) = (rays.columns.clone(), grid.values.clone());
         let backend = kernels.of(&values);
         let placed = backend.sample_grid(rays_there, values, beta, noise, numbers);

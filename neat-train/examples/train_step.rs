@@ -13,9 +13,10 @@ use neat_gjp::candidates::JunctionView;
 use neat_sdf::ray_sampler::Deterministic;
 use neat_tensor::Backend;
 use neat_tensor::adam::Adam;
+use neat_tensor::host::host_vec;
+use neat_train::batch::{Batch, push_ray_through};
 use neat_train::config::{ModelConfig, TrainConfig};
-use neat_train::model::{NeatModel, PlacedSamples, host_vec};
-use neat_train::training_data::{Batch, push_ray_through};
+use neat_train::model::{NeatModel, PlacedSamples};
 use neat_train::{StepInput, step_loss};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

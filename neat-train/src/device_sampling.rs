@@ -95,8 +95,11 @@ impl DeviceSampling {
             }
             (RaySampler::GridCached(config, like), Some(grid)) => {
                 let asked = config.refresh_on_device(like, grid, iteration, network);
+                let kernels = &network.mlp.kernels;
+                let samples =
+                    config.sample_on_device(&on_device, beta, like, grid, kernels, &mut noise);
                 SamplesOnDevice {
-                    samples: config.sample_on_device(&on_device, beta, like, grid, &mut noise),
+                    samples,
                     progress: None,
                     asked,
                 }

@@ -3,14 +3,13 @@
 use crate::checkpoint_metadata::metadata;
 use crate::config::TrainingConfig;
 use crate::error::TrainError;
-use crate::model::{
-    NeatModel, PlacedSamples, RenderRequest, Rendering, host_points, host_vec, point_tensor,
-};
+use crate::model::{NeatModel, PlacedSamples, RenderRequest, Rendering};
 use burn::tensor::{Device, Tensor};
 use nalgebra::Vector3;
 use neat_sdf::ray_sampler::{Deterministic, DistanceGrid, RaySampler, RaySamples};
 use neat_sdf::{Distances, RayBundle};
 use neat_tensor::checkpoint::Checkpoint;
+use neat_tensor::host::{host_points, host_vec, point_tensor};
 use neat_tensor::parameters::load_parameters;
 use neat_wireframe::SignedDistance;
 use std::collections::BTreeMap;

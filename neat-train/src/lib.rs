@@ -20,7 +20,7 @@
 #![forbid(unsafe_code)]
 
 mod awake;
-mod batch;
+pub mod batch;
 mod checkpoint_metadata;
 pub mod config;
 mod device_sampling;
@@ -33,7 +33,7 @@ mod step;
 pub mod step_log;
 mod surface_points;
 pub mod trainer;
-pub mod training_data;
+mod training_data;
 mod validation;
 
 pub use checkpoint_metadata::AVERAGE_LOSS;

@@ -126,7 +126,7 @@ pub struct LossTerm {
 /// What a term is a mean over: of rays and gradients, the mean over a batch is the
 /// weighted mean of those over its parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum MeanOver {
+enum MeanOver {
     Rays,
     Gradients,
     /// It looks at all rays of a batch at once.
@@ -134,7 +134,7 @@ pub(crate) enum MeanOver {
 }
 
 /// All terms, in the order in which they are added up and logged.
-pub const LOSS_TERMS: [LossTerm; 7] = [
+pub static LOSS_TERMS: [LossTerm; 7] = [
     LossTerm {
         name: "rgb",
         what: "colour of rays, mean L1: `neat_sdf::losses::rgb_loss`",
@@ -250,18 +250,17 @@ pub(crate) type TermValues = [Option<Tensor<1>>; LOSS_TERMS.len()];
 impl TermInput<'_> {
     /// All terms.
     pub fn all_values(&self) -> TermValues {
-        LOSS_TERMS.map(|term| (term.function)(self))
+        LOSS_TERMS.each_ref().map(|term| (term.function)(self))
     }
 
-    /// The terms that parts of a batch have a share in, or those that they have none in;
-    /// the others are `None`.
-    pub fn values(&self, of_parts: bool) -> TermValues {
-        let wanted = |term: &LossTerm| (term.mean_over != MeanOver::Batch) == of_parts;
-        LOSS_TERMS.map(|term| {
-            Some(term)
-                .filter(wanted)
-                .and_then(|term| (term.function)(self))
-        })
+    /// The terms that a part of a batch has a share in, those of rays and of gradients
+    /// being given, or those of the whole batch; with that share and their value `[1]`.
+    pub fn shares(&self, of_part: Option<[f64; 2]>) -> Vec<(&'static LossTerm, f64, Tensor<1>)> {
+        let of_term = |term: &'static LossTerm| {
+            let share = term.mean_over.share(of_part)?;
+            Some((term, share, (term.function)(self)?))
+        };
+        LOSS_TERMS.iter().filter_map(of_term).collect()
     }
 
     /// The eikonal term; `None` where no gradient is asked for.
@@ -299,14 +298,15 @@ impl TermInput<'_> {
     }
 }
 
-impl LossTerm {
-    /// The share of a whole batch that a part of it has in this term, if it has shares:
-    /// those of rays and of gradients are given.
-    pub(crate) fn share(&self, [of_rays, of_gradients]: [f64; 2]) -> Option<f64> {
-        match self.mean_over {
-            MeanOver::Rays => Some(of_rays),
-            MeanOver::Gradients => Some(of_gradients),
-            MeanOver::Batch => None,
+impl MeanOver {
+    /// The share of a whole batch that its part has in the mean, where it is one over
+    /// parts; all of it for the whole batch.
+    fn share(self, of_part: Option<[f64; 2]>) -> Option<f64> {
+        match (self, of_part) {
+            (Self::Rays, Some([of_rays, _])) => Some(of_rays),
+            (Self::Gradients, Some([_, of_gradients])) => Some(of_gradients),
+            (Self::Batch, None) => Some(1.0),
+            _ => None,
         }
     }
 }
@@ -367,7 +367,9 @@ mod tests {
 
     #[test]
     fn the_documentation_has_the_table() {
-        let rows = LOSS_TERMS.map(|term| format!("| `{}` | {} |\n", term.name, term.what));
+        let rows = LOSS_TERMS
+            .each_ref()
+            .map(|term| format!("| `{}` | {} |\n", term.name, term.what));
         let documentation = include_str!("../../docs/method.md");
         let expected = format!(
             "| term | what, and by which function |\n| --- | --- |\n{}",

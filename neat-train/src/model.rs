@@ -13,8 +13,7 @@ use neat_sdf::{
     ImplicitOutput, LaplaceDensity, RayBundle, RaySamples, RenderingNetwork,
     RenderingNetworkConfig,
 };
-use neat_tensor::host::{constant_on, index_tensor};
-pub use neat_tensor::host::{host_points, host_vec, point_tensor};
+use neat_tensor::host::{constant_on, host_vec, index_tensor, point_tensor};
 use neat_tensor::random::{Purpose, stream};
 use neat_tensor::{Kernels, KnownRows, NetworkSizeError};
 use serde::{Deserialize, Serialize};

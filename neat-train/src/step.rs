@@ -10,7 +10,7 @@ use crate::batch::Batch;
 use crate::config::TrainConfig;
 use crate::device_sampling::DeviceSampling;
 use crate::flops::StepRows;
-use crate::losses::{LOSS_TERMS, Losses, StepInput, TermInput};
+use crate::losses::{Losses, StepInput, TermInput};
 use crate::model::{NeatModel, PlacedSamples, RenderRequest, Rendering};
 use burn::module::Module;
 use burn::optim::{GradientsAccumulator, GradientsParams};
@@ -158,10 +158,8 @@ impl StepExecutor {
         let (mut eikonal_points, picked) = step.eikonal_points(samples.per_ray);
         let picked = picked.into_iter().enumerate();
         eikonal_points.extend(picked.map(|(ray, row)| rays.point(ray, samples.z[row])));
-        let input = StepInput {
-            eikonal_points: &eikonal_points,
-            ..step.input(PlacedSamples::OnHost(&samples, &distances))
-        };
+        let placed = PlacedSamples::OnHost(&samples, &distances);
+        let input = step.input(placed, &eikonal_points, None);
         let mut outcome = match self.chunk {
             None => at_once(step, &input, None, &self.device)?.0,
             Some(chunk) => in_passes(step, &input, (&samples, &distances), chunk, &self.device)?,
@@ -217,11 +215,8 @@ fn with_samples_on_device(
             let rows = index_tensor(picked.into_iter(), &points.device());
             points.select(0, rows)
         });
-        let input = StepInput {
-            eikonal_points: &eikonal_points,
-            eikonal_samples: picked.as_ref(),
-            ..step.input(PlacedSamples::OnDevice(&placed.samples))
-        };
+        let samples = PlacedSamples::OnDevice(&placed.samples);
+        let input = step.input(samples, &eikonal_points, picked.as_ref());
         let (mut outcome, progress) = at_once(step, &input, placed.progress, device)?;
         if let Some(progress) = progress
             && !sampling.sufficed(progress)
@@ -277,13 +272,18 @@ impl Step<'_> {
         (points, picked)
     }
 
-    fn input<'a>(&'a self, samples: PlacedSamples<'a>) -> StepInput<'a> {
+    fn input<'a>(
+        &'a self,
+        samples: PlacedSamples<'a>,
+        eikonal_points: &'a [[f32; 3]],
+        eikonal_samples: Option<&'a Tensor<2>>,
+    ) -> StepInput<'a> {
         let interval = self.train.junction_interval.max(1);
         StepInput {
             batch: self.batch,
             samples,
-            eikonal_points: &[],
-            eikonal_samples: None,
+            eikonal_points,
+            eikonal_samples,
             surface_points: self.surface_points,
             views: self.views,
             junctions_due: (self.iteration + 1).is_multiple_of(interval),
@@ -340,7 +340,7 @@ fn at_once(
 pub struct StepLoss {
     /// The weighted sum, `[1]`.
     pub total: Tensor<1>,
-    /// `total`, then the terms in the order of [`LOSS_TERMS`], without gradient.
+    /// `total`, then the terms in the order of [`crate::LOSS_TERMS`], without gradient.
     pub terms: Tensor<1>,
     /// Rendered colour `[R, 3]`, without gradient.
     pub color: Tensor<2>,
@@ -436,7 +436,7 @@ fn in_passes(
         (targets, of_batch.junctions) = match_junctions(&rays, global, &in_world, input, config)?;
         assignment = start.elapsed();
     }
-    if let Some(loss) = add_batch_terms(&of_batch, &mut losses) {
+    if let Some(loss) = add_terms(&of_batch, None, &mut losses) {
         sum.add(loss);
     }
 
@@ -453,14 +453,20 @@ fn in_passes(
         let part_gradients = config.eikonal_rows(&part_rows);
         let of_gradients = part_gradients as f64 / gradient_rows.max(1) as f64;
         let of_part = term_input(model, &part_input, config, Some(&rendering), device);
-        let shares = [of_rays, of_gradients];
-        let mut loss = add_shares(&of_part, shares, &mut losses);
-        if let Some((ends, _)) = segments(&rendering) {
+        let terms = add_terms(&of_part, Some([of_rays, of_gradients]), &mut losses);
+        let of_segments = segments(&rendering).map(|(ends, _)| {
             let gradient = of_ends.by_ref().take(ends.dims()[0]).flatten().copied();
-            let linear = linear_in(ends, gradient.collect());
-            loss = loss + linear.mul_scalar(config.loss.segment);
+            linear_in(ends, gradient.collect()).mul_scalar(config.loss.segment)
+        });
+        // What the gradients do not need is given back before they are taken.
+        drop(rendering);
+        if let Some(loss) = terms
+            .into_iter()
+            .chain(of_segments)
+            .reduce(|sum, term| sum + term)
+        {
+            sum.add(loss);
         }
-        sum.add(loss);
     }
     let (gradients, backward) = sum.finish();
     losses.total = losses.weighted_sum(&config.loss);
@@ -482,29 +488,30 @@ fn in_passes(
     })
 }
 
-/// The terms that look at the whole batch: added to `losses`, and weighted and added up.
-fn add_batch_terms(of_batch: &TermInput<'_>, losses: &mut Losses) -> Option<Tensor<1>> {
-    let values = of_batch.values(false);
-    let weighted = LOSS_TERMS.iter().zip(values).filter_map(|(term, value)| {
-        let value = value?;
-        *(term.value)(losses) += f64::from(host_vec(value.clone())[0]);
-        Some(value.mul_scalar((term.weight)(of_batch.weights)))
-    });
+/// The terms that a part of a batch has shares in (of rays and of gradients), or those of
+/// the whole batch: their values added to `losses`, and weighted and added up.
+fn add_terms(
+    input: &TermInput<'_>,
+    of_part: Option<[f64; 2]>,
+    losses: &mut Losses,
+) -> Option<Tensor<1>> {
+    let shares = input.shares(of_part);
+    let mut transfer = Transfer::default();
+    let places: Vec<_> = (shares.iter())
+        .map(|(_, _, value)| transfer.add(value.clone().detach()))
+        .collect();
+    if places.is_empty() {
+        return None;
+    }
+    let numbers = transfer.read();
+    let weighted = shares
+        .into_iter()
+        .zip(places)
+        .map(|((term, share, value), place)| {
+            *(term.value)(losses) += f64::from(numbers[place.start]) * share;
+            value.mul_scalar((term.weight)(input.weights) * share)
+        });
     weighted.reduce(|sum, term| sum + term)
-}
-
-/// The terms of a part of a batch as their shares of those of the whole, of rays and of
-/// gradients: added to `losses`, and weighted and added up.
-fn add_shares(of_part: &TermInput<'_>, shares: [f64; 2], losses: &mut Losses) -> Tensor<1> {
-    let values = of_part.values(true);
-    let weighted = LOSS_TERMS.iter().zip(values).filter_map(|(term, value)| {
-        let share = term.share(shares)?;
-        let value = value.unwrap_or_else(|| Tensor::zeros([1], of_part.device));
-        *(term.value)(losses) += f64::from(host_vec(value.clone())[0]) * share;
-        Some(value.mul_scalar((term.weight)(of_part.weights) * share))
-    });
-    let total = weighted.reduce(|sum, term| sum + term);
-    total.expect("some terms are means over rays")
 }
 
 /// Some rays of a batch.

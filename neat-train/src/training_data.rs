@@ -1,7 +1,7 @@
 //! What training needs of a scene, prepared once: attraction regions, segments
 //! and the pixels to draw rays through.
 
-pub use crate::batch::{Batch, push_ray, push_ray_through};
+use crate::batch::{Batch, push_ray};
 use crate::config::{BatchViews, TrainConfig, TrainingConfig};
 use nalgebra::Vector2;
 use neat_core::{Camera, Scene, SceneError, ScoredSegment2, ViewImage};

@@ -17,10 +17,11 @@ use neat_field::attraction_region::AttractionRegions;
 use neat_pipeline::config::Preset;
 use neat_sdf::RayBundle;
 use neat_sdf::ray_sampler::Deterministic;
+use neat_tensor::host::host_vec;
 use neat_tensor::{CoordinateMlp, Field, FieldQuery, Plain};
 use neat_tests::finite_differences::normal;
 use neat_train::flops::{StepFlops, StepRows};
-use neat_train::model::{NeatModel, host_vec};
+use neat_train::model::NeatModel;
 use rayon::prelude::*;
 
 const PRESETS: [Preset; 2] = [Preset::Fast, Preset::PaperAbc];

@@ -6,7 +6,7 @@ use neat_lab::compare_backends::compare_backends;
 use neat_pipeline::config::Config;
 use neat_pipeline::config::Preset;
 use neat_pipeline::config::apply_overrides;
-use neat_tensor::Backend;
+use neat_tensor::{Backend, Kernels};
 use neat_tests::backends::tested;
 
 const STEPS: u64 = 20;
@@ -47,7 +47,7 @@ fn twenty_steps() {
     backends.insert(0, Backend::Flex);
 
     let quiet = &mut |_: &str, _: f64| {};
-    let training = config().training();
+    let training = config().training(Kernels::default());
     let comparison = compare_backends(&scene, &training, 0, STEPS, &backends, false, quiet)
         .expect("every backend takes every step");
     let table = comparison.to_markdown();

@@ -4,6 +4,7 @@ use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
 use neat_core::synthetic::{SyntheticScene, generate};
 use neat_pipeline::config::Preset;
+use neat_tensor::Kernels;
 use neat_tensor::linear::{Linear, LinearInit};
 use neat_tensor::parameters::GradientCheck;
 use neat_tests::backends::{on_each_backend, on_each_cpu_backend};
@@ -47,7 +48,8 @@ fn a_failed_step_moves_nothing() {
         config.train.learning_rate = 1e30;
         config.train.junction_learning_rate = 1e30;
         config.train.warm_up_steps = 0;
-        let mut trainer = Trainer::new(&scene, &config.training(), 0, &device).expect("it trains");
+        let mut trainer = Trainer::new(&scene, &config.training(Kernels::default()), 0, &device)
+            .expect("it trains");
         trainer.step(0.0).expect("the start is finite");
         let before = trainer.checkpoint();
         let failure = trainer.step(0.0).expect_err("no number");

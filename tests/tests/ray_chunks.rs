@@ -5,6 +5,7 @@ use neat_core::synthetic::{SyntheticScene, generate};
 use neat_gjp::JunctionCount;
 use neat_pipeline::config::Config;
 use neat_pipeline::config::Preset;
+use neat_tensor::Kernels;
 use neat_tests::backends::on_each_cpu_backend;
 use neat_tests::comparison::{assert_close_in_l2, assert_relatively_close};
 use neat_train::Trainer;
@@ -30,7 +31,8 @@ fn train(
         .collect();
     let mut config = config.clone();
     config.train.ray_chunk = chunk;
-    let mut trainer = Trainer::new(&scene, &config.training(), 0, device).expect("it trains");
+    let mut trainer =
+        Trainer::new(&scene, &config.training(Kernels::default()), 0, device).expect("it trains");
     let step = trainer.step(0.1).expect("a step").losses;
     assert!(step.points > 0.0, "the term of sparse points is taken");
     let losses = vec![

@@ -8,7 +8,7 @@ fn the_estimate_is_of_the_right_order() {
     use neat_core::synthetic::{SyntheticScene, generate};
     use neat_lab::estimate::estimate;
     use neat_pipeline::config::Preset;
-    use neat_tensor::Backend;
+    use neat_tensor::{Backend, Kernels};
     use neat_train::Trainer;
 
     /// The largest resident memory of this process so far, in bytes.
@@ -32,7 +32,8 @@ fn the_estimate_is_of_the_right_order() {
     let step = |rays: usize| {
         let mut config = Preset::PaperAbc.config();
         config.train.rays = rays;
-        let mut trainer = Trainer::new(&scene, &config.training(), 0, &device).expect("it trains");
+        let mut trainer = Trainer::new(&scene, &config.training(Kernels::default()), 0, &device)
+            .expect("it trains");
         trainer.step(0.1).expect("a step");
         (estimate(&config, &scene, 1.0).bytes, peak())
     };

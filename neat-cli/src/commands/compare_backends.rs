@@ -14,7 +14,7 @@ use neat_pipeline::reconstruct::software_warning;
 use neat_pipeline::resources::{Resources, default_limit};
 use neat_pipeline::run_dir::RunDir;
 use neat_pipeline::scene::prepare_scene;
-use neat_tensor::Backend;
+use neat_tensor::{Backend, Kernels};
 use std::path::PathBuf;
 
 /// Enough to see the speed; losses of different backends drift apart later anyway.
@@ -91,7 +91,7 @@ impl CompareBackendsArgs {
         file::create_dir(&self.out)?;
         let comparison = compare_backends(
             &scene,
-            &plan.config().training(),
+            &plan.config().training(Kernels::default()),
             self.seed,
             self.method.steps.unwrap_or(DEFAULT_STEPS),
             &backends,

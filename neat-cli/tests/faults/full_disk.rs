@@ -110,11 +110,13 @@ fn a_full_disk_at_any_write_is_reported_and_loses_nothing() {
         "overlays/",
         "report.html",
     ] {
-        // A file of one page may get the page that the failed one before it left.
+        // The smallest disk has a page for the first file, and where the manifest is
+        // written anew its old pages are there for the next.
         let path = reference.join(file);
-        let is_small = path.is_file() && fs::metadata(&path).unwrap().len() <= PAGE;
+        let has_space = ["plan.toml", "wireframe.json"].contains(&file)
+            && fs::metadata(&path).unwrap().len() <= PAGE;
         assert!(
-            is_small || full_at.iter().any(|path| path.starts_with(file)),
+            has_space || full_at.iter().any(|path| path.starts_with(file)),
             "{file} always had space: {full_at:?}"
         );
     }

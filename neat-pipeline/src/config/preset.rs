@@ -122,6 +122,7 @@ mod tests {
     use super::*;
     use crate::config::apply_overrides;
     use neat_gjp::JunctionCount;
+    use neat_tensor::Kernels;
     use neat_train::config::TrainingConfig;
 
     #[test]
@@ -146,7 +147,7 @@ mod tests {
     #[test]
     fn the_default_of_training_is_the_published_one() {
         let (preset, default) = (
-            Preset::PaperAbc.config().training(),
+            Preset::PaperAbc.config().training(Kernels::default()),
             TrainingConfig::default(),
         );
         assert_eq!((preset.model, preset.train), (default.model, default.train));
@@ -157,7 +158,7 @@ mod tests {
     #[test]
     fn presets_are_accepted() {
         for preset in Preset::ALL {
-            let mut config = preset.config().training();
+            let mut config = preset.config().training(Kernels::default());
             // "auto" is decided by the scene.
             config.model.perceiver.junctions = JunctionCount::Fixed(1024);
             config.validate().unwrap();

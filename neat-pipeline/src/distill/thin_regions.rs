@@ -5,7 +5,7 @@ use nalgebra::Vector2;
 use neat_core::{Camera, LineSegment2, Wireframe2d};
 use neat_field::attraction_region::AttractionRegions;
 use neat_sdf::RayBundle;
-use neat_train::training_data::{push_ray, push_ray_through};
+use neat_train::batch::{push_ray, push_ray_through};
 use neat_wireframe::ViewObservation;
 
 /// Half the width of the thin regions that are queried, in pixels (paper §4.3).

@@ -10,23 +10,37 @@ pub(crate) fn changes_of_presets(asked: &Config) -> Vec<Difference> {
     presets.into_iter().min_by_key(Vec::len).unwrap_or_default()
 }
 
-/// A warning for every change that does nothing under `plan`; `sparse_points` and
-/// `detected` say whether the scene has sparse points, and whether its 2D wireframes
-/// were detected.
+/// What decides beside the plan whether a setting does anything.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Given {
+    /// The scene has sparse points.
+    pub sparse_points: bool,
+    /// Its 2D wireframes were detected.
+    pub detected: bool,
+    /// The field is trained already.
+    pub trained: bool,
+}
+
+/// A warning for every change that does nothing under `plan`.
 pub(crate) fn settings_without_effect(
     changes: &[Difference],
     plan: &Plan,
-    sparse_points: bool,
-    detected: bool,
+    given: Given,
 ) -> Vec<Warning> {
-    let idle = idle_settings(plan, sparse_points, detected);
-    let reason = |key: &str| idle.iter().find(|(idle, _)| key.starts_with(idle));
+    let idle = idle_settings(plan, given);
+    let reason = |key: &str| {
+        if given.trained && only_trains(key) {
+            return Some("the field is trained");
+        }
+        let (_, reason) = idle.iter().find(|(idle, _)| key.starts_with(idle))?;
+        Some(*reason)
+    };
     changes
         .iter()
         // What a photograph's plan has.
         .filter(|change| (change.key.as_str(), change.now.as_str()) != ("train.loss.mask", "0.0"))
         .filter_map(|change| {
-            let (_, reason) = reason(&change.key)?;
+            let reason = reason(&change.key)?;
             let (key, value) = (&change.key, &change.now);
             let message = format!("{key} = {value} has no effect: {reason}");
             Some(Warning::new(WarningKind::NoEffect, message))
@@ -34,29 +48,16 @@ pub(crate) fn settings_without_effect(
         .collect()
 }
 
-/// A warning for every change of a setting that only training looks at, for a run whose
-/// field is trained.
-pub(crate) fn settings_of_training(changes: &[Difference]) -> Vec<Warning> {
-    changes
-        .iter()
-        .filter(|change| change.key.starts_with("train."))
-        // Rays are sampled, and samples left out, in every rendering.
-        .filter(|change| !change.key.starts_with("train.sampler."))
-        .filter(|change| change.key != "train.min_sample_weight")
-        .map(|change| {
-            let (key, value) = (&change.key, &change.now);
-            let message = format!("{key} = {value} has no effect: the field is trained");
-            Warning::new(WarningKind::NoEffect, message)
-        })
-        .collect()
+/// Whether nothing but training looks at a setting: rays are sampled, and samples left
+/// out, in every rendering.
+fn only_trains(key: &str) -> bool {
+    key.starts_with("train.")
+        && !key.starts_with("train.sampler.")
+        && key != "train.min_sample_weight"
 }
 
 /// How the keys of settings begin that do nothing, and why.
-fn idle_settings(
-    plan: &Plan,
-    sparse_points: bool,
-    detected: bool,
-) -> Vec<(&'static str, &'static str)> {
+fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)> {
     let mut idle = match plan.assembler() {
         Assembler::Paper => vec![
             ("distill.fast.", PAPER_RUNS),
@@ -75,14 +76,14 @@ fn idle_settings(
     if plan.background() == Some(Background::Photo) {
         idle.push(("train.loss.mask", "photographs show no silhouettes"));
     }
-    if !sparse_points {
+    if !given.sparse_points {
         let reason = "the scene has no sparse points";
         idle.extend([
             ("train.loss.points", reason),
             ("train.surface_points", reason),
         ]);
     }
-    if !detected {
+    if !given.detected {
         idle.push(("detect.", "the scene has 2D wireframes"));
     }
     idle
@@ -106,7 +107,7 @@ mod tests {
             let asked = apply_overrides(&config, &sets).unwrap();
             let plan = Plan::new(asked.clone()).unwrap();
             let changes = changes_of_presets(&asked);
-            let warnings = settings_without_effect(&changes, &plan, false, false);
+            let warnings = settings_without_effect(&changes, &plan, Given::default());
             warnings
                 .into_iter()
                 .map(|warning| warning.message)
@@ -129,9 +130,14 @@ mod tests {
             "train.steps=5".to_owned(),
             "train.sampler.lookups=32".to_owned(),
         ];
-        let fast = Preset::Fast.config();
+        let mut fast = Preset::Fast.config();
+        fast.data.background = Some(Choice::Given(black));
         let changes = differences(&fast, &apply_overrides(&fast, &sets).unwrap());
-        let told_of_run = settings_of_training(&changes);
+        let trained = Given {
+            trained: true,
+            ..Given::default()
+        };
+        let told_of_run = settings_without_effect(&changes, &Plan::new(fast).unwrap(), trained);
         assert_eq!(told_of_run.len(), 1);
         assert!(told_of_run[0].message.contains("train.steps = 5"));
         let points = told(black, &["train.surface_points=8"]);

@@ -4,7 +4,7 @@ use crate::config::{Config, differences};
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Warning, WarningKind};
 use crate::manifest::Manifest;
-use crate::plan::{Machine, Plan, settings_of_training, settings_without_effect, settle};
+use crate::plan::{Given, Machine, Plan, settings_without_effect, settle};
 use crate::resources::Resources;
 use crate::run_dir::{RunDir, RunDirError};
 use crate::scene::prepare_scene;
@@ -99,11 +99,12 @@ fn read_run(
     };
     let (plan, _) = settle(&asked, &prepared.scene, machine, Some(&planned))?;
     let changes = differences(then, &asked);
-    let sparse_points = !prepared.scene.sparse_points.is_empty();
-    for warning in settings_of_training(&changes) {
-        on_event(Event::Warning(warning));
-    }
-    for warning in settings_without_effect(&changes, &plan, sparse_points, prepared.detected) {
+    let given = Given {
+        sparse_points: !prepared.scene.sparse_points.is_empty(),
+        detected: prepared.detected,
+        trained: true,
+    };
+    for warning in settings_without_effect(&changes, &plan, given) {
         on_event(Event::Warning(warning));
     }
     let no_checkpoint = || RunDirError::NoCheckpoint(dir.root().into());
@@ -113,8 +114,8 @@ fn read_run(
         let warning = Warning::new(WarningKind::DamagedCheckpoint, text);
         on_event(Event::Warning(warning));
     }
-    let mut training = plan.config().training();
-    training.kernels = Kernels::within(resources.memory_limit.bytes());
+    let kernels = Kernels::within(resources.memory_limit.bytes());
+    let training = plan.config().training(kernels);
     let field = TrainedField::load(&training, &usable.checkpoint, &device)?;
     Ok(OpenedRun {
         dir,

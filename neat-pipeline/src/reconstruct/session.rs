@@ -7,7 +7,7 @@ use crate::config::Config;
 use crate::error::PipelineError;
 use crate::event::{Decision, Event, OnEvent, Stage, Warning, WarningKind, timed};
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
-use crate::plan::{Machine, Plan, changes_of_presets, settings_without_effect, settle};
+use crate::plan::{Given, Machine, Plan, changes_of_presets, settings_without_effect, settle};
 use crate::resources::Resources;
 use crate::run_dir::{Existing, RunDir, RunLock};
 use crate::scene::{PreparedScene, examine_quickly, prepare_scene};
@@ -257,8 +257,12 @@ fn prepare(
         on_event(Event::Decided(decision));
     }
     let changes = changes_of_presets(asked);
-    let sparse_points = !prepared.scene.sparse_points.is_empty();
-    for warning in settings_without_effect(&changes, &plan, sparse_points, prepared.detected) {
+    let given = Given {
+        sparse_points: !prepared.scene.sparse_points.is_empty(),
+        detected: prepared.detected,
+        trained: false,
+    };
+    for warning in settings_without_effect(&changes, &plan, given) {
         on_event(Event::Warning(warning));
     }
     if options.examine && earlier.is_none() {

@@ -190,8 +190,8 @@ impl Session<'_> {
 
     /// A trainer that continues from the last checkpoint, or a new one.
     fn trainer(&self, options: &RunOptions) -> Result<Trainer, PipelineError> {
-        let mut config = self.plan.config().training();
-        config.kernels = Kernels::within(options.memory_limit.bytes());
+        let kernels = Kernels::within(options.memory_limit.bytes());
+        let mut config = self.plan.config().training(kernels);
         if let Some(chunk) = self.ray_chunk {
             config.train.ray_chunk = Some(chunk);
         }

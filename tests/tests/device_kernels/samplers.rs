@@ -173,7 +173,9 @@ fn a_cached_grid_places_the_same_samples() {
                 let beta = Tensor::<1>::from_data([beta], &device.clone().inner());
                 let mut noise = Seeded(stream(2, Purpose::Samples, 0));
                 let on_device = DeviceRays::new(&rays, &device);
-                let samples = config.sample_on_device(&on_device, beta, &like, &grid, &mut noise);
+                let kernels = &network.mlp.kernels;
+                let samples =
+                    config.sample_on_device(&on_device, beta, &like, &grid, kernels, &mut noise);
                 assert_samples_agree("grid", &numbers(samples.z.clone()), &host.z, &weights);
                 assert_belongs_together(samples, &rays, false);
             });

@@ -21,8 +21,8 @@ use neat_tests::golden::Golden;
 use neat_tests::named_gradients::{assert_gradients_close, named_gradients};
 use neat_tests::published_names::{model_gradients, model_parameters};
 use neat_tests::tensors::numbers;
+use neat_train::batch::{Batch, push_ray_through};
 use neat_train::model::{NeatModel, PlacedSamples, RenderRequest};
-use neat_train::training_data::{Batch, push_ray_through};
 use neat_train::{StepInput, StepLoss, step_loss};
 
 /// How local junctions are found, by the names of the golden tensors.
