@@ -31,8 +31,15 @@ struct Element {
 }
 
 enum Property {
-    Scalar { name: String, of: Scalar },
-    List { count: Scalar, of: Scalar },
+    Scalar {
+        name: String,
+        of: Scalar,
+    },
+    List {
+        name: String,
+        count: Scalar,
+        of: Scalar,
+    },
 }
 
 /// A number type and its bytes.
@@ -107,11 +114,59 @@ impl<'a> Ply<'a> {
             .map_err(|reason| SceneError::malformed(self.path, reason))
     }
 
+    /// Shows the list of an element that has one of `names`, row by row; what `visit`
+    /// says against a row is the reason why the file is refused.
+    ///
+    /// # Errors
+    /// If there is no such element or list, the file ends early, or `visit` refuses a row.
+    pub fn lists(
+        &self,
+        element: &str,
+        names: &[&str],
+        visit: impl FnMut(&[f64]) -> Result<(), String>,
+    ) -> Result<(), SceneError> {
+        self.read_lists(element, names, visit)
+            .map_err(|reason| SceneError::malformed(self.path, reason))
+    }
+
     fn read_columns<const N: usize>(
         &self,
         wanted: &str,
         names: [&str; N],
     ) -> Result<Vec<[f64; N]>, String> {
+        let (element, mut body) = self.body_of(wanted)?;
+        body.rows(element, names)
+    }
+
+    fn read_lists(
+        &self,
+        wanted: &str,
+        names: &[&str],
+        mut visit: impl FnMut(&[f64]) -> Result<(), String>,
+    ) -> Result<(), String> {
+        let (element, mut body) = self.body_of(wanted)?;
+        let is_named = |property: &Property| match property {
+            Property::List { name, .. } => names.contains(&name.as_str()),
+            Property::Scalar { .. } => false,
+        };
+        let at = (element.properties.iter().position(is_named)).ok_or_else(|| {
+            format!(
+                "its element `{wanted}` has no list `{}`",
+                names.join("` or `")
+            )
+        })?;
+        let mut list = Vec::new();
+        for index in 0..element.rows {
+            list.clear();
+            body.row::<0>(&element.properties, &[], Some((at, &mut list)))
+                .map_err(|reason| element.in_row(reason, index))?;
+            visit(&list).map_err(|reason| format!("its {wanted} {index} {reason}"))?;
+        }
+        Ok(())
+    }
+
+    /// An element, and the numbers from its first row on.
+    fn body_of(&self, wanted: &str) -> Result<(&Element, Body<'_>), String> {
         let is_wanted = |element: &Element| element.name == wanted;
         let at = (self.elements.iter().position(is_wanted))
             .ok_or_else(|| format!("it has no element `{wanted}`"))?;
@@ -123,7 +178,14 @@ impl<'a> Ply<'a> {
         for element in &self.elements[..at] {
             body.rows(element, [])?;
         }
-        body.rows(&self.elements[at], names)
+        Ok((&self.elements[at], body))
+    }
+}
+
+impl Element {
+    /// A reason with the row that it is about.
+    fn in_row(&self, reason: String, index: u64) -> String {
+        format!("{reason} `{}`, in row {index} of {}", self.name, self.rows)
     }
 }
 
@@ -192,7 +254,8 @@ fn parse_header<'a>(bytes: &'a [u8], path: &'a Path) -> Result<Ply<'a>, String> 
             ["property", ref property @ ..] => {
                 let element = elements.last_mut().ok_or("a property has no element")?;
                 element.properties.push(match *property {
-                    ["list", count, of, _] => Property::List {
+                    ["list", count, of, name] => Property::List {
+                        name: name.into(),
                         count: Scalar::named(count)?,
                         of: Scalar::named(of)?,
                     },
@@ -248,9 +311,8 @@ impl Body<'_> {
         // A row of nothing takes no bytes: there could be as many as one likes.
         let count = if columns.is_empty() { 0 } else { element.rows };
         for index in 0..count {
-            let row = self.row(&element.properties, &columns).map_err(|reason| {
-                format!("{reason} `{}`, in row {index} of {count}", element.name)
-            })?;
+            let row = (self.row(&element.properties, &columns, None))
+                .map_err(|reason| element.in_row(reason, index))?;
             if let Some(bad) = row.iter().position(|number| !number.is_finite()) {
                 let (name, wanted) = (&element.name, names[bad]);
                 return Err(format!(
@@ -263,25 +325,30 @@ impl Body<'_> {
         Ok(rows)
     }
 
-    /// One row; of a property of column `i` the number is its `i`-th element.
+    /// One row; of a property of column `i` the number is its `i`-th element. The
+    /// numbers of the property that `list` names are added to the vector beside it.
     fn row<const N: usize>(
         &mut self,
         properties: &[Property],
         columns: &[Option<usize>],
+        mut list: Option<(usize, &mut Vec<f64>)>,
     ) -> Result<[f64; N], String> {
         self.start_row()?;
         let mut row = [0.0; N];
-        for (property, column) in properties.iter().zip(columns) {
+        for (index, property) in properties.iter().enumerate() {
             match property {
                 Property::Scalar { of, .. } => {
                     let number = self.number(*of)?;
-                    if let Some(column) = column {
+                    if let Some(Some(column)) = columns.get(index) {
                         row[*column] = number;
                     }
                 }
-                Property::List { count, of } => {
+                Property::List { count, of, .. } => {
                     for _ in 0..self.number(*count)? as u64 {
-                        self.number(*of)?;
+                        let number = self.number(*of)?;
+                        if let Some((_, numbers)) = list.as_mut().filter(|(at, _)| *at == index) {
+                            numbers.push(number);
+                        }
                     }
                 }
             }
@@ -399,6 +466,28 @@ mod tests {
             parse(text.as_bytes()).unwrap(),
             [Vector3::new(1.0, 2.0, -3.0)]
         );
+    }
+
+    #[test]
+    fn lists_are_shown_row_by_row() {
+        for bytes in [text().into_bytes(), binary(false), binary(true)] {
+            let ply = Ply::parse(&bytes, Path::new("scan.ply")).unwrap();
+            let mut lists = Vec::new();
+            let mut read = |names: &[&str]| {
+                ply.lists("face", names, |list| {
+                    lists.push(list.to_vec());
+                    (lists.len() < 2)
+                        .then_some(())
+                        .ok_or("is one too many".into())
+                })
+            };
+            read(&["vertex_index", "vertex_indices"]).unwrap();
+            let message = read(&["vertex_indices"]).unwrap_err().to_string();
+            assert!(message.contains("its face 0 is one too many"), "{message}");
+            let message = read(&["x", "y"]).unwrap_err().to_string();
+            assert!(message.contains("no list `x` or `y`"), "{message}");
+            assert_eq!(lists, [[0.0, -1.0], [0.0, -1.0]]);
+        }
     }
 
     #[test]
