@@ -32,6 +32,22 @@ pub enum EvalError {
         /// Distance of the points.
         spacing: f64,
     },
+    /// Edges so long, or coordinates so large, that something else must be meant.
+    #[error(
+        "the {what} is too large for points every {spacing}: bring it into the frame and unit of the scene, or check `scale` in its truth/stats.json"
+    )]
+    OutOfScale {
+        /// The result, or a part of the truth.
+        what: &'static str,
+        /// Distance of the points.
+        spacing: f64,
+    },
+    /// A surface whose triangles do not fit its vertices.
+    #[error("triangle {triangle} of the true surface names a vertex that does not exist")]
+    BrokenSurface {
+        /// Index of the triangle.
+        triangle: usize,
+    },
     /// A file whose ending says nothing about its format.
     #[error(
         "{path}: no reader for this ending; give .json, .obj, .ply, .npz, .npy, or the .txt of Line3D++"

@@ -1,4 +1,4 @@
-//! How good a 3D wireframe is, by the published protocols, each under its name.
+//! How good a 3D wireframe is, by the published protocols and one of ours, each under its name.
 //!
 //! Numbers of different papers look alike and are not: "precision at 20 mm" is
 //! one thing with one-to-one matching of segments, another with points sampled
@@ -14,6 +14,7 @@
 //! | `limap-hypersim`, `limap-tnt` | [`LimapLength`] | a scanned surface |
 //! | `hss` | [`StructureScore`] | a true wireframe |
 //! | `wed` | [`EditDistance`] | a true wireframe |
+//! | `surface-and-creases` | [`SurfaceAndCreases`] | the exact truth of a rendered scene |
 //!
 //! All take plain points and segments, so that anything can be measured; results
 //! of other programs come in through [`foreign::read`]. An [`EvaluationReport`]
@@ -58,6 +59,7 @@ pub mod image_quality;
 pub mod mat_file;
 
 mod abc_nef;
+mod box_tree;
 mod counts;
 mod edge_model;
 mod edge_points;
@@ -70,9 +72,12 @@ mod observation_mask;
 mod protocol;
 mod report;
 mod structure_score;
+mod surface_and_creases;
 mod table;
 mod thinning;
 mod total;
+mod triangle;
+mod triangle_mesh;
 
 pub use abc_nef::{EdgePointScores, EdgePoints, PointPrecisionRecall};
 pub use counts::WireframeCounts;
@@ -84,9 +89,16 @@ pub use limap_length::{LengthRecall, LengthScores, LimapLength};
 pub use neat_abc::{GraphScores, NeatAbc, NeatAbcScores};
 pub use neat_dtu::{NeatSurface, ScannedSurface, SurfaceScores};
 pub use observation_mask::{GroundPlane, ObservationMask};
-pub use protocol::{EvaluationInput, EvaluationOptions, Protocol, Scores, UnknownProtocol};
+pub use protocol::{
+    EvaluationInput, EvaluationOptions, Protocol, Scores, TruthKind, UnknownProtocol,
+};
 pub use report::EvaluationReport;
 pub use structure_score::{StructureScore, StructureScores};
+pub use surface_and_creases::{
+    CreaseCounts, CreaseScores, CreaseShares, MeanAndMedian, RecallBin, SceneTruth,
+    SurfaceAndCreases,
+};
+pub use triangle_mesh::TriangleMesh;
 
 /// The example of the README compiles.
 #[cfg(doctest)]

@@ -11,6 +11,7 @@ use crate::limap_length::{LengthScores, LimapLength};
 use crate::neat_abc::{NeatAbc, NeatAbcScores};
 use crate::neat_dtu::{NeatSurface, ScannedSurface, SurfaceScores};
 use crate::structure_score::{StructureScore, StructureScores};
+use crate::surface_and_creases::{CreaseScores, SceneTruth, SurfaceAndCreases};
 use crate::table::Table;
 use neat_core::ground_truth::GroundTruth;
 use neat_wireframe::metrics::Matching;
@@ -45,6 +46,19 @@ pub enum Protocol {
     Hss,
     /// [`EditDistance`](crate::EditDistance).
     Wed,
+    /// [`SurfaceAndCreases`](crate::SurfaceAndCreases).
+    SurfaceAndCreases,
+}
+
+/// What a protocol compares a result with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TruthKind {
+    /// True edges: [`EvaluationInput::truth`].
+    Edges,
+    /// Points on a surface: [`EvaluationInput::surface`].
+    SurfacePoints,
+    /// The exact truth of a rendered scene: [`EvaluationInput::scene`].
+    Scene,
 }
 
 /// The numbers, by protocol.
@@ -73,6 +87,8 @@ pub enum Scores {
     Hss(StructureScores),
     /// Wireframe edit distance.
     Wed(EditScores),
+    /// Surfaces and creases of rendered scenes.
+    SurfaceAndCreases(CreaseScores),
 }
 
 impl Scores {
@@ -90,6 +106,7 @@ impl Scores {
             Self::LimapTnt(_) => Protocol::LimapTnt,
             Self::Hss(_) => Protocol::Hss,
             Self::Wed(_) => Protocol::Wed,
+            Self::SurfaceAndCreases(_) => Protocol::SurfaceAndCreases,
         }
     }
 
@@ -104,6 +121,7 @@ impl Scores {
             Self::LimapHypersim(scores) | Self::LimapTnt(scores) => vec![scores.table()],
             Self::Hss(scores) => vec![scores.table()],
             Self::Wed(scores) => vec![scores.table()],
+            Self::SurfaceAndCreases(scores) => scores.tables(),
         }
     }
 }
@@ -118,8 +136,10 @@ pub struct EvaluationInput {
     pub before: Option<EdgeModel>,
     /// True edges.
     pub truth: GroundTruth,
-    /// A scanned surface, for the protocols with [`Protocol::needs_surface`].
+    /// A scanned surface, for the protocols with [`TruthKind::SurfacePoints`].
     pub surface: ScannedSurface,
+    /// The exact truth of a rendered scene, for those with [`TruthKind::Scene`].
+    pub scene: SceneTruth,
 }
 
 /// What is asked otherwise than published; a protocol passes over what it does not know.
@@ -144,19 +164,20 @@ type Evaluate = fn(&Measurement) -> Result<Scores, EvalError>;
 struct Row {
     protocol: Protocol,
     name: &'static str,
-    needs_surface: bool,
+    truth: TruthKind,
     evaluate: Evaluate,
     explanation: &'static str,
     source: &'static str,
 }
 
-const SURFACE: bool = true;
-const TRUE_EDGES: bool = false;
+const SURFACE: TruthKind = TruthKind::SurfacePoints;
+const TRUE_EDGES: TruthKind = TruthKind::Edges;
+const SCENE: TruthKind = TruthKind::Scene;
 
 /// Every protocol, in the order of [`Protocol`]: what it needs, its constants with its
 /// function, what it measures, and where it is published.
 #[rustfmt::skip] // A table.
-static PROTOCOLS: [Row; 11] = [
+static PROTOCOLS: [Row; 12] = [
     row(Protocol::NeatAbc, "neat-abc", TRUE_EDGES, |m| m.neat_abc().map(Scores::NeatAbc),
         "precision and recall of junctions and segments at 0.01, 0.02 and 0.05, paired one to one",
         "NEAT, CVPR 2024, Table 6; evaluation/eval-abc.py of cherubicXN/neat"),
@@ -190,12 +211,15 @@ static PROTOCOLS: [Row; 11] = [
     row(Protocol::Wed, "wed", TRUE_EDGES, |m| m.edits().map(Scores::Wed),
         "wireframe edit distance of buildings, by the length of the truth",
         "S23DR challenge 2024; hoho/wed.py of s23dr/hoho2025"),
+    row(Protocol::SurfaceAndCreases, "surface-and-creases", SCENE, |m| m.creases().map(Scores::SurfaceAndCreases),
+        "distance to the exact surface (ACC), completeness and precision by length of exact creases, at 1, 2 and 5 cm times the scale",
+        "neat, for rendered scenes with their truth; ACC as in NEAT, CVPR 2024, eq. 9"),
 ];
 
 const fn row(
     protocol: Protocol,
     name: &'static str,
-    needs_surface: bool,
+    truth: TruthKind,
     evaluate: Evaluate,
     explanation: &'static str,
     source: &'static str,
@@ -203,7 +227,7 @@ const fn row(
     Row {
         protocol,
         name,
-        needs_surface,
+        truth,
         evaluate,
         explanation,
         source,
@@ -258,6 +282,12 @@ impl Measurement<'_> {
         let (predicted, truth) = (&self.input.predicted, &self.input.truth);
         EditDistance::default().evaluate(&predicted.wireframe, &truth.wireframe)
     }
+
+    fn creases(&self) -> Result<CreaseScores, EvalError> {
+        let mut protocol = SurfaceAndCreases::default();
+        replace(&mut protocol.thresholds, &self.options.thresholds);
+        protocol.evaluate(&self.input.predicted.wireframe, &self.input.scene)
+    }
 }
 
 /// Puts a value that was given in the place of a published one.
@@ -298,9 +328,9 @@ impl Protocol {
         self.row().source
     }
 
-    /// Whether it compares with points on a surface, not with true edges.
-    pub fn needs_surface(self) -> bool {
-        self.row().needs_surface
+    /// What it compares a result with.
+    pub fn truth(self) -> TruthKind {
+        self.row().truth
     }
 
     /// Measures a result, with the published constants but for what `options` say.

@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use crate::{
         EdgeModel, EdgePoints, EditDistance, LimapLength, NeatAbc, NeatSurface, ScannedSurface,
-        StructureScore,
+        SceneTruth, StructureScore, SurfaceAndCreases, TriangleMesh,
     };
     use nalgebra::Vector3;
     use neat_core::Wireframe3d;
@@ -143,6 +143,15 @@ Wireframe: 2 junctions, 1 segments of mean length 2.0150. Truth: 2 junctions, 1 
             ..Default::default()
         };
         let of_surface = |protocol: NeatSurface| protocol.evaluate(&predicted, &surface).unwrap();
+        let scene = SceneTruth {
+            edge_views: Some(vec![3]),
+            surface: TriangleMesh {
+                vertices: vec![Vector3::zeros(), truth.junctions[1], Vector3::y()],
+                triangles: vec![[0, 1, 2]],
+            },
+            wireframe: truth.clone(),
+            ..SceneTruth::default()
+        };
         let model = EdgeModel::from(predicted.clone());
         let edges = GroundTruth {
             wireframe: truth.clone(),
@@ -176,6 +185,11 @@ Wireframe: 2 junctions, 1 segments of mean length 2.0150. Truth: 2 junctions, 1 
             Scores::Wed(
                 EditDistance::default()
                     .evaluate(&predicted, &truth)
+                    .unwrap(),
+            ),
+            Scores::SurfaceAndCreases(
+                SurfaceAndCreases::default()
+                    .evaluate(&predicted, &scene)
                     .unwrap(),
             ),
         ]
