@@ -11,7 +11,7 @@ use neat_core::layout::{self, Layout};
 use neat_core::npz::{NpzReader, parse_npy};
 use neat_core::{LoadOptions, ground_truth, hawp_json, load_scene, ply};
 use neat_detect::{edge_map, segment_file};
-use neat_eval::{EdgeModel, foreign, mat_file};
+use neat_eval::{EdgeModel, SceneTruth, TriangleMesh, foreign, mat_file};
 use neat_wireframe::export;
 use neat_wireframe::validity::check_wireframe;
 use std::fs;
@@ -42,7 +42,7 @@ readers! {
     abc dtu cameras_json transforms_json colmap_binary colmap_text meta_data_json openmvg openmvs
     nvm bundler strecha points_of_scene hawp wireframe_of_truth ply npy npz picture
     segments_npz segments_text edge_picture
-    mat obj ply_edges numpy_lines neat_npz line3dpp parametric_edges
+    mat obj ply_edges numpy_lines neat_npz line3dpp parametric_edges true_edges triangle_mesh
     wireframe_json limap_tracks limap_track limap_images
 }
 
@@ -318,6 +318,27 @@ fn parametric_edges(bytes: &[u8]) -> bool {
             check_model(model);
         },
     )
+}
+
+/// The straight edges of a rendered scene's truth.
+fn true_edges(bytes: &[u8]) -> bool {
+    let path = Path::new("wireframe.json");
+    accepted(SceneTruth::parse_wireframe(bytes, path), |truth| {
+        let views = truth.edge_views.map_or(0, |views| views.len());
+        assert!(views <= truth.wireframe.edges.len());
+        check_model(truth.wireframe.into());
+    })
+}
+
+fn triangle_mesh(bytes: &[u8]) -> bool {
+    accepted(TriangleMesh::parse(bytes, Path::new("mesh.ply")), |mesh| {
+        let corners = mesh.triangles.iter().flatten();
+        assert!(
+            corners
+                .max()
+                .is_none_or(|corner| (*corner as usize) < mesh.vertices.len())
+        );
+    })
 }
 
 fn wireframe_json(bytes: &[u8]) -> bool {

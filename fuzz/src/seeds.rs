@@ -384,6 +384,31 @@ pub fn obj() -> Vec<Vec<u8>> {
     ]
 }
 
+pub fn true_edges() -> Vec<Vec<u8>> {
+    let text = r#"{"junctions": [[0, 0, 0], [1.5, 0, -2]], "edges": [[0, 1]],
+        "cut_end": [false, true], "edge_views": [[0, 3, 12]]}"#;
+    vec![text.into(), text.replace("edge_views", "other").into()]
+}
+
+pub fn triangle_mesh() -> Vec<Vec<u8>> {
+    let header = "ply\nformat FORMAT 1.0\nelement vertex 4\nproperty float x\n\
+        property float y\nproperty float z\nelement face 2\n\
+        property list uchar int vertex_indices\nend_header\n";
+    let text =
+        header.replace("FORMAT", "ascii") + "0 0 0\n1 0 0\n1 1 0\n0 1 2\n4 0 1 2 3\n3 0 1 3\n";
+    let mut binary = header
+        .replace("FORMAT", "binary_little_endian")
+        .into_bytes();
+    for x in [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 2.0] {
+        binary.extend(x.to_le_bytes());
+    }
+    for face in [&[0, 1, 2, 3][..], &[0, 1, 3]] {
+        binary.push(face.len() as u8);
+        binary.extend(u32s(face));
+    }
+    vec![text.into(), binary]
+}
+
 pub fn ply_edges() -> Vec<Vec<u8>> {
     let header = |format: &str| {
         format!(

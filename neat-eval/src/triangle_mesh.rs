@@ -99,9 +99,14 @@ impl Surface {
 
     /// Distance of a point from the surface; infinite without triangles.
     pub(crate) fn distance(&self, point: &Vector3<f64>) -> f64 {
-        let to = |index: usize| triangle::squared_distance(&self.triangles[index], point);
-        let nearest = self.tree.nearest(point, f64::INFINITY, to);
+        let nearest = self.distance_within(point, f64::INFINITY);
         nearest.unwrap_or(f64::INFINITY)
+    }
+
+    /// The same, where the surface is at most `reach` away: far points cost nothing.
+    pub(crate) fn distance_within(&self, point: &Vector3<f64>, reach: f64) -> Option<f64> {
+        let to = |index: usize| triangle::squared_distance(&self.triangles[index], point);
+        self.tree.nearest(point, reach, to)
     }
 
     /// Whether the surface lies between the two points.

@@ -75,6 +75,25 @@ fn jpeg_that_claims() -> Vec<u8> {
     overwritten(jpeg, &[0xff, 0xc0], 5, &[0xff, 0xdc, 0xff, 0xdc])
 }
 
+/// A mesh of one face whose corners take a byte each.
+fn face_of_many(binary_mesh: &[u8]) -> Vec<u8> {
+    let mesh = replaced(binary_mesh, b"list uchar int", b"list uint uchar");
+    let vertices = mesh
+        .windows(11)
+        .position(|window| window == b"end_header\n");
+    let faces = vertices.expect("a header") + 11 + 48;
+    let corners = 60_000_u32;
+    let count = corners.to_le_bytes();
+    [
+        &mesh[..faces],
+        &count,
+        &vec![1; corners as usize],
+        &count,
+        &vec![2; 60_000],
+    ]
+    .concat()
+}
+
 /// Two thousand views that share one large camera with a long name.
 fn openmvg_that_shares() -> Vec<u8> {
     let numbers = vec!["0"; 50_000].join(",");
@@ -103,6 +122,7 @@ fn hostile_files() -> Vec<(&'static str, &'static str, Vec<u8>)> {
     };
     let ascii_ply = first(seeds::ply());
     let edges = seeds::ply_edges();
+    let meshes = seeds::triangle_mesh();
     vec![
         (
             "npy",
@@ -246,6 +266,26 @@ fn hostile_files() -> Vec<(&'static str, &'static str, Vec<u8>)> {
             "ply_edges",
             "a list without end",
             replaced(&edges[0], b"\n2 0 -1\n", b"\n1e300 0 -1\n"),
+        ),
+        (
+            "triangle_mesh",
+            "many faces",
+            replaced(&meshes[0], b"face 2", b"face 99999999999999"),
+        ),
+        (
+            "triangle_mesh",
+            "a list without end",
+            replaced(&meshes[0], b"\n3 0 1 3\n", b"\n1e300 0 1 3\n"),
+        ),
+        (
+            "triangle_mesh",
+            "a face of very many corners",
+            face_of_many(&meshes[1]),
+        ),
+        (
+            "true_edges",
+            "lists",
+            within(r#"{"junctions":[],"edges":[],"edge_views":"#, &lists, "}"),
         ),
         (
             "mat",

@@ -208,12 +208,6 @@ impl SurfaceAndCreases {
         truth: &SceneTruth,
         surface: &Surface,
     ) -> Result<Distances, EvalError> {
-        let to_surface = |points: &[Vector3<f64>]| -> Vec<f64> {
-            points
-                .par_iter()
-                .map(|point| surface.distance(point))
-                .collect()
-        };
         let nearest = |from: &[Vector3<f64>], to: &[Vector3<f64>]| -> Result<_, EvalError> {
             let cloud = PointCloud::new(to)?;
             Ok(from
@@ -221,8 +215,9 @@ impl SurfaceAndCreases {
                 .map(|point| cloud.distance(point))
                 .collect::<Vec<_>>())
         };
+        let reach = self.reach(truth.scale);
         let to_lines = |lines: &[LineSegment3], angle: f64| -> Result<_, EvalError> {
-            let cover = LineCover::new(lines, self.reach(truth.scale), angle, "truth")?;
+            let cover = LineCover::new(lines, reach, angle, "truth")?;
             Ok(samples.distances(&cover))
         };
         let straight = to_lines(&truth.wireframe.segments(), self.max_angle)?;
@@ -235,13 +230,17 @@ impl SurfaceAndCreases {
             points.iter().map(|point| surface.distance(point)).collect()
         };
         Ok(Distances {
-            junctions: to_surface(&prediction.junctions),
+            junctions: (prediction.junctions.par_iter())
+                .map(|point| surface.distance(point))
+                .collect(),
             points: (prediction.segments.par_iter())
                 .flat_map_iter(on_line)
                 .collect(),
             corners: nearest(&truth.corners(), &prediction.junctions)?,
             at_truth: nearest(&prediction.junctions, &truth.wireframe.junctions)?,
-            surface: to_surface(&samples.points).into_iter().map(Some).collect(),
+            surface: (samples.points.par_iter())
+                .map(|point| surface.distance_within(point, reach))
+                .collect(),
             line: nearer(&crease, &painted),
             straight,
             crease,
