@@ -6,15 +6,15 @@ use crate::error::CliError;
 use crate::output;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use neat_core::file;
 use neat_core::ply::read_points;
+use neat_core::{Camera, LoadOptions, SceneError, View, file, load_scene};
 use neat_eval::{
     EvalError, EvaluationInput, EvaluationOptions, EvaluationReport, GroundPlane, NeatAbc,
-    ObservationMask, Protocol, ScannedSurface, Scores, foreign,
+    ObservationMask, Protocol, ScannedSurface, SceneTruth, Scores, TruthKind, foreign,
 };
 use neat_pipeline::config::Preset;
 use neat_pipeline::resources::{Resources, default_limit};
-use neat_pipeline::scene::prepare_scene;
+use neat_pipeline::scene::{load_options, prepare_scene};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::evidence::required_views;
 use neat_wireframe::metrics::Matching;
@@ -23,7 +23,8 @@ use std::path::{Path, PathBuf};
 
 /// Measure a wireframe against the truth or a scanned surface, by a published protocol
 ///
-/// Without --protocol, a true wireframe asks for neat-abc and points for neat-blended-mvs.
+/// Without --protocol, a true wireframe asks for neat-abc, points for neat-blended-mvs, and the
+/// truth of a rendered scene for surface-and-creases.
 /// Everything must be in one frame and unit: that of the protocol, where it names one.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -34,6 +35,7 @@ Examples:
   neat eval --pred parametric_edges.json --gt gt_wireframe.json --protocol emap,edge-gaussians
   neat eval --pred RUN/wireframe.json --points stl024_total.ply --protocol neat-dtu \\
       --obs-mask ObsMask24_10.mat --plane Plane24.mat
+  neat eval --pred RUN/wireframe.json --truth SCENE
 
 Results and truths are wireframe.json, parametric_edges.json (EMAP), .obj, .ply with edges, the
 .npz of the published NEAT, LIMAP's .npy, and Line3D++'s .txt.")]
@@ -45,11 +47,15 @@ pub struct EvalArgs {
     #[arg(long, value_name = "FILE")]
     before: Option<PathBuf>,
     /// True wireframe
-    #[arg(long, value_name = "FILE", required_unless_present = "points")]
+    #[arg(long, value_name = "FILE", required_unless_present_any = ["points", "truth"])]
     gt: Option<PathBuf>,
     /// Points on the true surface, as PLY
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
+    /// Rendered scene with its exact truth in the folder `truth`: stats.json, wireframe.json,
+    /// curved.json, mesh.ply, and perhaps texture_lines.json (surface-and-creases)
+    #[arg(long, value_name = "SCENE")]
+    truth: Option<PathBuf>,
     /// How to measure; several with commas
     #[arg(long = "protocol", value_name = "NAME,...", value_delimiter = ',', value_parser = protocol_parser())]
     protocols: Vec<Protocol>,
@@ -63,7 +69,8 @@ pub struct EvalArgs {
     /// Plane of DTU's table, PlaneN.mat (neat-dtu)
     #[arg(long, value_name = "FILE")]
     plane: Option<PathBuf>,
-    /// Distances at which shares are taken instead of the protocol's
+    /// Distances at which shares are taken instead of the protocol's; of surface-and-creases they
+    /// are multiplied by the scale of the scene
     #[arg(long, value_name = "D,D,...", value_delimiter = ',', value_parser = positive)]
     thresholds: Option<Vec<f64>>,
     /// How predictions are paired with the truth (neat-abc)
@@ -162,24 +169,25 @@ impl EvalArgs {
         }
         let for_wireframe = self.gt.is_some().then_some(Protocol::NeatAbc);
         let for_points = self.points.is_some().then_some(Protocol::NeatBlendedMvs);
-        for_wireframe.into_iter().chain(for_points).collect()
+        let for_scene = self.truth.is_some().then_some(Protocol::SurfaceAndCreases);
+        let suggested = [for_wireframe, for_points, for_scene];
+        suggested.into_iter().flatten().collect()
     }
 
     /// Refuses what is missing, and options that no protocol would look at.
     fn check(&self, protocols: &[Protocol]) -> Result<(), CliError> {
         let usage = |message: String| Err(CliError::Usage(message));
         for protocol in protocols {
-            if protocol.needs_surface() && self.points.is_none() {
-                return usage(format!(
-                    "{protocol} measures against a surface: give --points"
-                ));
-            }
-            if !protocol.needs_surface() && self.gt.is_none() {
-                return usage(format!(
-                    "{protocol} measures against a wireframe: give --gt"
-                ));
+            let (what, remedy, is_given) = match protocol.truth() {
+                TruthKind::SurfacePoints => ("a surface", "--points", self.points.is_some()),
+                TruthKind::Edges => ("a wireframe", "--gt", self.gt.is_some()),
+                TruthKind::Scene => ("a scene with truth", "--truth", self.truth.is_some()),
+            };
+            if !is_given {
+                return usage(format!("{protocol} measures against {what}: give {remedy}"));
             }
         }
+        let compares = |truth: TruthKind| protocols.iter().any(|p| p.truth() == truth);
         let any = |wanted: &[Protocol]| protocols.iter().any(|p| wanted.contains(p));
         if any(&[Protocol::NeatDtu]) && (self.obs_mask.is_none() || self.plane.is_none()) {
             return usage(
@@ -195,16 +203,13 @@ impl EvalArgs {
         let without_thresholds =
             |p: &Protocol| surfaces.contains(p) || matches!(p, Protocol::Hss | Protocol::Wed);
         for (option, given, is_used) in [
-            (
-                "--gt",
-                self.gt.is_some(),
-                protocols.iter().any(|p| !p.needs_surface()),
-            ),
+            ("--gt", self.gt.is_some(), compares(TruthKind::Edges)),
             (
                 "--points",
                 self.points.is_some(),
-                protocols.iter().any(|p| p.needs_surface()),
+                compares(TruthKind::SurfacePoints),
             ),
+            ("--truth", self.truth.is_some(), compares(TruthKind::Scene)),
             (
                 "--seed",
                 self.seed.is_some(),
@@ -255,12 +260,42 @@ impl EvalArgs {
             surface.ground_plane = Some(GroundPlane::read(plane)?);
         }
         let truth = self.gt.as_deref().map(foreign::read_truth).transpose()?;
+        let scene = self.truth.as_deref().map(|dir| self.read_scene(dir));
         Ok(EvaluationInput {
             predicted: foreign::read(&self.pred)?,
             before: self.before.as_deref().map(foreign::read).transpose()?,
             truth: truth.unwrap_or_default(),
             surface,
+            scene: scene.transpose()?.unwrap_or_default(),
         })
+    }
+
+    /// The truth of a rendered scene. If it does not say which views see an edge, the cameras of
+    /// the scene do, where there are any.
+    fn read_scene(&self, dir: &Path) -> Result<SceneTruth, EvalError> {
+        let mut truth = SceneTruth::read(dir)?;
+        if truth.edge_views.is_some() {
+            return Ok(truth);
+        }
+        let cache = self.cache.open();
+        let data = Preset::default().config().data;
+        let options = LoadOptions {
+            require_wireframes: false,
+            ..load_options(&data, cache.as_ref(), default_limit())
+        };
+        let scene = match load_scene(dir, &options) {
+            Ok(loaded) => loaded.scene,
+            // A truth without photographs: nobody knows what they show.
+            Err(SceneError::UnknownLayout { .. }) => return Ok(truth),
+            Err(error) => return Err(error.into()),
+        };
+        // Turned as before; only the origin and the unit are others.
+        let in_files = |view: &View| Camera {
+            center_in_world: (scene.original_from_world).apply(&view.camera.center_in_world),
+            ..view.camera
+        };
+        truth.cameras = scene.views.iter().map(in_files).collect();
+        Ok(truth)
     }
 
     fn options(&self) -> EvaluationOptions {

@@ -81,6 +81,18 @@ fn evaluations() {
                 names: &["limap-tnt", "--points"],
             },
             Case {
+                kind: "a protocol that needs a scene with truth",
+                spoil: |_| (),
+                command: "eval --pred scene/gt_wireframe.json --gt scene/gt_wireframe.json --protocol surface-and-creases",
+                names: &["surface-and-creases", "--truth"],
+            },
+            Case {
+                kind: "a scene without truth",
+                spoil: |_| (),
+                command: "eval --pred scene/gt_wireframe.json --truth scene",
+                names: &["scene/truth/stats.json does not exist", "mesh.ply"],
+            },
+            Case {
                 kind: "an option without meaning for the protocol",
                 spoil: |_| (),
                 command: "eval --pred scene/gt_wireframe.json --gt scene/gt_wireframe.json --plane Plane24.mat",
