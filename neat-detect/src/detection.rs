@@ -143,7 +143,7 @@ fn clipped(segment: &LineSegment2, size: Vector2<u32>) -> Option<LineSegment2> {
 }
 
 /// An image with what its noise and texture ask for.
-struct PreparedImage {
+pub(crate) struct PreparedImage {
     smoothed: SmoothedImage,
     /// Standard deviation of its smoothing, in pixels.
     sigma: f64,
@@ -152,7 +152,7 @@ struct PreparedImage {
 }
 
 impl PreparedImage {
-    fn new(image: &RgbImage, config: &DetectorConfig) -> Self {
+    pub(crate) fn new(image: &RgbImage, config: &DetectorConfig) -> Self {
         let noise = noise::estimate(image);
         let sigma = noise::smoothing(noise);
         let smoothed = SmoothedImage::new(image, sigma);
@@ -164,6 +164,14 @@ impl PreparedImage {
             sigma,
             min_gradient,
         }
+    }
+
+    pub(crate) fn smoothed(&self) -> &SmoothedImage {
+        &self.smoothed
+    }
+
+    pub(crate) fn min_gradient(&self) -> f64 {
+        self.min_gradient
     }
 }
 

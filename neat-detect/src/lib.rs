@@ -29,6 +29,7 @@ mod detection;
 mod edge_completion;
 pub mod edge_map;
 mod edge_profile;
+mod edgels;
 mod junction_graph;
 mod line_fitting;
 mod merging;
@@ -42,6 +43,7 @@ mod smoothed_image;
 
 pub use config::{DetectorConfig, DetectorConfigError};
 pub use detection::{detect, wireframe_from_segments};
+pub use edgels::edgel_map;
 
 /// The example of the README compiles.
 #[cfg(doctest)]

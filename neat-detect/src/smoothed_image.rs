@@ -69,6 +69,21 @@ impl SmoothedImage {
         Vector3::new(sum[0], sum[1], sum[2])
     }
 
+    /// Change of each channel per pixel to the right and downwards at an inner pixel, by
+    /// central differences.
+    pub(crate) fn differences(&self, column: usize, row: usize) -> [[f32; 2]; 3] {
+        let at = row * self.width + column;
+        let change = |next: usize, last: usize, channel: usize| {
+            0.5 * (self.pixels[next][channel] - self.pixels[last][channel])
+        };
+        std::array::from_fn(|channel| {
+            [
+                change(at + 1, at - 1, channel),
+                change(at + self.width, at - self.width, channel),
+            ]
+        })
+    }
+
     /// The components of all colours along a direction of the colour space, in
     /// row order.
     pub(crate) fn projected(&self, direction: &Vector3<f32>) -> Vec<f64> {

@@ -4,7 +4,7 @@
 //!
 //! | to | see |
 //! | --- | --- |
-//! | build a graph from 2D segments alone, as of photographs | [`line_tracks`] |
+//! | build a graph from 2D segments and edgels, as of photographs | [`mod@assemble`] |
 //! | build one from proposals, junctions and a surface, as of an object | [`fast`] |
 //! | build one as the paper does | [`paper`] |
 //! | make one robust proposal of what several rays rendered | [`proposals`] |
@@ -18,11 +18,11 @@
 //! use neat_core::synthetic::{SyntheticScene, generate};
 //! use neat_wireframe::ViewObservation;
 //! use neat_wireframe::confidence::{ConfidenceConfig, assess};
-//! use neat_wireframe::line_tracks::{LineTracksConfig, run};
+//! use neat_wireframe::assemble::{AssembleConfig, assemble};
 //!
 //! let scene = SyntheticScene { views: 12, image_size: 256, ..Default::default() };
 //! let views = ViewObservation::from_scene(&generate(&scene)?.scene, 0.05);
-//! let built = run(&views, &[], None, 1.0, &LineTracksConfig::default());
+//! let built = assemble(&views, &[], 1.0, &AssembleConfig::default());
 //! let confidence = assess(&built.wireframe, &views, None, 1.0, &ConfidenceConfig::default())?;
 //! assert!(confidence.edges.iter().any(|edge| edge.probability > 0.9));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -30,13 +30,13 @@
 
 #![forbid(unsafe_code)]
 
+pub mod assemble;
 pub mod bundle_adjustment;
 pub mod confidence;
 pub mod curved_rims;
 pub mod evidence;
 pub mod export;
 pub mod fast;
-pub mod line_tracks;
 pub mod metrics;
 pub mod paper;
 pub mod projection;

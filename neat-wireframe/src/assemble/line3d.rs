@@ -1,6 +1,6 @@
 //! The baseline: 3D segments by the plain scheme of Hofer, Maurer and Bischof,
 //! *Efficient 3D scene abstraction using line segments* (Line3D++, 2017), without
-//! junctions, consensus, tracks and adjustment of [`super::run`].
+//! the images, junctions and adjustment of [`super::assemble`].
 //!
 //! The constants are those of the program that its authors published, where this
 //! has the same.
@@ -20,7 +20,6 @@ use super::graph_segmentation::{Link, segment_graph};
 use super::hypothesis_scoring::{Hypothesis, Scoring, score_hypotheses};
 use super::neighbours::neighbours;
 use super::projected_line::ProjectedLine;
-use super::report::SegmentSupport;
 use super::view_segments::{SegmentId, TrackView, segment_of};
 use crate::{ViewObservation, Wireframe3d};
 use nalgebra::{Matrix3, Vector3};
@@ -28,6 +27,15 @@ use neat_core::LineSegment3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+
+/// Names a 2D segment of the observations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct SegmentSupport {
+    /// Index of the view.
+    pub view: usize,
+    /// Index into that view's [`ViewObservation::segments`].
+    pub segment_in_view: usize,
+}
 
 /// Settings of [`line3d`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -115,14 +123,8 @@ pub fn line3d(
         alternatives: 1,
         ..Default::default()
     };
-    let alternatives = score_hypotheses(
-        &views,
-        &neighbours,
-        &[],
-        config.ball_margin,
-        min_views,
-        &scoring,
-    );
+    let alternatives =
+        score_hypotheses(&views, &neighbours, config.ball_margin, min_views, &scoring);
     let positioned: Vec<Positioned> = (alternatives.into_iter().enumerate())
         .flat_map(|(view, lists)| {
             let best = lists.into_iter().enumerate();

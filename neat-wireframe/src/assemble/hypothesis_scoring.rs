@@ -11,9 +11,6 @@ use super::view_segments::{SegmentId, TrackView};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Depth tolerance of a prior as a share of the depth, beside its own spread.
-const PRIOR_RELATIVE_TOLERANCE: f64 = 0.01;
-
 /// Settings of the scores of hypotheses, which the two users of them choose.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Scoring {
@@ -21,8 +18,6 @@ pub(super) struct Scoring {
     pub tolerance_in_pixels: f64,
     /// Hypotheses kept per segment, for the choice by mutual agreement.
     pub alternatives: usize,
-    /// What a prior that fully agrees adds, where a view adds 1.
-    pub prior_weight: f64,
 }
 
 impl Default for Scoring {
@@ -30,20 +25,8 @@ impl Default for Scoring {
         Self {
             tolerance_in_pixels: 3.0,
             alternatives: 4,
-            prior_weight: 1.0,
         }
     }
-}
-
-/// What something else than the images thinks of a segment's depths.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct DepthPrior {
-    /// The segment.
-    pub id: SegmentId,
-    /// Distances along the rays of its ends.
-    pub depths: [f64; 2],
-    /// How sure they are.
-    pub spreads: [f64; 2],
 }
 
 /// A partner that agrees with a hypothesis.
@@ -62,7 +45,7 @@ pub(super) struct Hypothesis {
     pub depths: [f64; 2],
     /// How far one pixel of noise in all its supports moves them.
     pub depth_noise: [f64; 2],
-    /// Sum of the agreements, one per view at most, and of the prior's.
+    /// Sum of the agreements, one per view at most.
     pub score: f64,
     /// The best partner of each view that agrees, by ascending id.
     pub supports: Vec<Support>,
@@ -71,11 +54,10 @@ pub(super) struct Hypothesis {
 /// The best hypotheses of every segment of every view, best first.
 pub(super) type Alternatives = Vec<Vec<Vec<Hypothesis>>>;
 
-/// Matches and scores all segments. `priors` must be sorted by id.
+/// Matches and scores all segments.
 pub(super) fn score_hypotheses(
     views: &[TrackView],
     neighbours: &[Vec<usize>],
-    priors: &[DepthPrior],
     ball_radius: f64,
     min_views: usize,
     scoring: &Scoring,
@@ -96,12 +78,7 @@ pub(super) fn score_hypotheses(
                     for pair in &pairs {
                         pair.append_matches(segment, ball_radius, &mut matches);
                     }
-                    let id = SegmentId { view: i, segment };
-                    let prior = priors
-                        .binary_search_by_key(&id, |prior| prior.id)
-                        .ok()
-                        .map(|at| priors[at]);
-                    Scorer::new(matches, &neighbours[i], prior, scoring).best(min_views)
+                    Scorer::new(matches, &neighbours[i], scoring).best(min_views)
                 })
                 .collect()
         })
@@ -115,7 +92,6 @@ struct Scorer<'a> {
     /// The part of `matches` of each neighbour.
     slots: Vec<Slot>,
     neighbours: &'a [usize],
-    prior: Option<DepthPrior>,
     config: &'a Scoring,
 }
 
@@ -131,12 +107,7 @@ struct Slot {
 type BestPerSlot = Vec<Option<(f64, usize)>>;
 
 impl<'a> Scorer<'a> {
-    fn new(
-        mut matches: Vec<LineMatch>,
-        neighbours: &'a [usize],
-        prior: Option<DepthPrior>,
-        config: &'a Scoring,
-    ) -> Self {
+    fn new(mut matches: Vec<LineMatch>, neighbours: &'a [usize], config: &'a Scoring) -> Self {
         matches.sort_by(|a, b| {
             (a.slot.cmp(&b.slot))
                 .then(a.depths[0].total_cmp(&b.depths[0]))
@@ -160,7 +131,6 @@ impl<'a> Scorer<'a> {
             matches,
             slots,
             neighbours,
-            prior,
             config,
         }
     }
@@ -168,15 +138,13 @@ impl<'a> Scorer<'a> {
     /// The alternatives with support in enough views.
     fn best(&self, min_views: usize) -> Vec<Hypothesis> {
         let mut nearest = vec![(f64::INFINITY, 0); self.neighbours.len()];
-        let from_matches = self.matches.iter().map(|m| m.depths);
-        let from_prior = self.prior.iter().map(|prior| prior.depths);
-        let mut ranked: Vec<([f64; 2], f64)> = from_matches
-            .chain(from_prior)
-            .map(|depths| {
+        let mut ranked: Vec<([f64; 2], f64)> = (self.matches.iter())
+            .map(|partner| {
+                let depths = partner.depths;
                 nearest.fill((f64::INFINITY, 0));
                 self.find_nearest(&depths, &mut nearest);
                 let weights = nearest.iter().filter_map(|(d, _)| self.weight(*d));
-                (depths, self.score(&depths, weights))
+                (depths, weights.sum())
             })
             .filter(|(_, score)| *score > 1.0)
             .collect();
@@ -256,21 +224,6 @@ impl<'a> Scorer<'a> {
         (relative <= 2.0).then(|| (-0.5 * relative * relative).exp())
     }
 
-    fn score(&self, depths: &[f64; 2], weights: impl Iterator<Item = f64>) -> f64 {
-        let views: f64 = weights.sum();
-        let prior = self.prior.map_or(0.0, |prior| {
-            let relative = (0..2)
-                .map(|side| {
-                    let tolerance =
-                        prior.spreads[side] + PRIOR_RELATIVE_TOLERANCE * prior.depths[side].abs();
-                    (depths[side] - prior.depths[side]).abs() / tolerance
-                })
-                .fold(0.0, f64::max);
-            self.config.prior_weight * (-0.5 * relative * relative).exp()
-        });
-        views + prior
-    }
-
     /// The mean of the partners that agree, by their certainty.
     fn refine(&self, depths: &[f64; 2]) -> Option<Hypothesis> {
         let mut depths = *depths;
@@ -293,10 +246,7 @@ impl<'a> Scorer<'a> {
             }
         }
         let agreements = self.agreements(&depths);
-        let score = self.score(
-            &depths,
-            agreements.iter().flatten().map(|(weight, _)| *weight),
-        );
+        let score = agreements.iter().flatten().map(|(weight, _)| weight).sum();
         let mut supports: Vec<Support> = agreements
             .into_iter()
             .flatten()
@@ -346,7 +296,7 @@ mod tests {
         ];
         let neighbours = [4, 2, 9];
         let config = Scoring::default();
-        let best = Scorer::new(matches.clone(), &neighbours, None, &config).best(3);
+        let best = Scorer::new(matches.clone(), &neighbours, &config).best(3);
         assert_eq!(best.len(), 2);
         assert!((best[0].depths[0] - 5.0).abs() < 0.005);
         let ids: Vec<_> = best[0]
@@ -357,41 +307,15 @@ mod tests {
         assert_eq!(ids, [(2, 4), (4, 3), (9, 5)]);
         assert!((best[1].depths[0] - 7.005).abs() < 1e-3);
         assert!(
-            Scorer::new(matches, &neighbours, None, &config)
+            Scorer::new(matches, &neighbours, &config)
                 .best(5)
                 .is_empty()
         );
     }
 
     #[test]
-    fn a_prior_breaks_ties() {
-        let matches = vec![
-            partner(0, 3, 5.0),
-            partner(1, 4, 5.0),
-            partner(0, 6, 7.0),
-            partner(1, 7, 7.0),
-        ];
-        let prior = DepthPrior {
-            id: SegmentId {
-                view: 0,
-                segment: 0,
-            },
-            depths: [6.98, 8.02],
-            spreads: [0.02; 2],
-        };
-        let config = Scoring::default();
-        let best = Scorer::new(matches, &[1, 2], Some(prior), &config).best(3);
-        assert!((best[0].depths[0] - 7.0).abs() < 1e-9);
-        assert_eq!(best.len(), 2);
-    }
-
-    #[test]
     fn nothing_in_nothing_out() {
         let config = Scoring::default();
-        assert!(
-            Scorer::new(Vec::new(), &[], None, &config)
-                .best(3)
-                .is_empty()
-        );
+        assert!(Scorer::new(Vec::new(), &[], &config).best(3).is_empty());
     }
 }

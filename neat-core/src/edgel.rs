@@ -1,0 +1,247 @@
+//! Points of image edges, to a fraction of a pixel: what segments are made of, and what
+//! remains where no detector found a segment.
+
+use crate::LineSegment2;
+use nalgebra::Vector2;
+
+/// Side of a cell of the index, in pixels: a search of a few pixels visits four at most.
+const CELL: f64 = 4.0;
+
+/// A point of an image edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edgel {
+    /// In image coordinates.
+    pub position: Vector2<f32>,
+    /// Unit vector across the edge.
+    pub normal: Vector2<f32>,
+}
+
+/// All edge points of an image, by where they are.
+#[derive(Clone, Debug, Default)]
+pub struct EdgelMap {
+    columns: usize,
+    rows: usize,
+    /// First edgel of each cell, row by row, and the end.
+    starts: Vec<u32>,
+    edgels: Vec<Edgel>,
+}
+
+impl EdgelMap {
+    /// Indexes the edgels of a `width × height` image; those outside it, and those that
+    /// are not finite, are left out.
+    pub fn new(edgels: &[Edgel], width: u32, height: u32) -> Self {
+        let cells = |size: u32| ((f64::from(size) / CELL).ceil() as usize).max(1);
+        let (columns, rows) = (cells(width), cells(height));
+        let cell_of = |edgel: &Edgel| {
+            let [x, y] = [edgel.position.x, edgel.position.y].map(f64::from);
+            let inside = x >= 0.0 && y >= 0.0 && x < f64::from(width) && y < f64::from(height);
+            let finite = edgel.normal.iter().all(|value| value.is_finite());
+            (inside && finite).then(|| (y / CELL) as usize * columns + (x / CELL) as usize)
+        };
+        let mut starts = vec![0_u32; columns * rows + 1];
+        for cell in edgels.iter().filter_map(cell_of) {
+            starts[cell + 1] += 1;
+        }
+        for cell in 0..columns * rows {
+            starts[cell + 1] += starts[cell];
+        }
+        let mut next = starts.clone();
+        let placeholder = Edgel {
+            position: Vector2::zeros(),
+            normal: Vector2::zeros(),
+        };
+        let mut sorted = vec![placeholder; starts[columns * rows] as usize];
+        for edgel in edgels {
+            if let Some(cell) = cell_of(edgel) {
+                sorted[next[cell] as usize] = *edgel;
+                next[cell] += 1;
+            }
+        }
+        Self {
+            columns,
+            rows,
+            starts,
+            edgels: sorted,
+        }
+    }
+
+    /// The edgels that segments stand for, one per pixel of their lengths: for images that
+    /// are known by their segments only.
+    pub fn of_segments(segments: &[LineSegment2], width: u32, height: u32) -> Self {
+        /// No image is longer; a hostile segment must not fill the memory.
+        const MOST: f64 = 1e5;
+        let mut edgels = Vec::new();
+        for segment in segments {
+            let offset = segment.end - segment.start;
+            let length = offset.norm();
+            if !(length > 0.0 && length < MOST) {
+                continue;
+            }
+            let normal = Vector2::new(-offset.y, offset.x) / length;
+            let count = length.ceil();
+            edgels.extend((0..count as usize).map(|i| Edgel {
+                position: segment.point_at((i as f64 + 0.5) / count).cast(),
+                normal: normal.cast(),
+            }));
+        }
+        Self::new(&edgels, width, height)
+    }
+
+    /// The edgel with this index.
+    pub fn get(&self, index: usize) -> &Edgel {
+        &self.edgels[index]
+    }
+
+    /// Number of edgels.
+    pub fn len(&self) -> usize {
+        self.edgels.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.edgels.is_empty()
+    }
+
+    /// The edgel nearest to `point` across an edge whose unit normal is `normal`: its signed
+    /// distance along the normal, at most `reach` pixels, and its index. Only those count
+    /// that lie beside `point`, whose own normal has at least the cosine `min_cosine` to
+    /// `normal`, and that are `wanted`.
+    pub fn nearest(
+        &self,
+        point: &Vector2<f64>,
+        normal: &Vector2<f64>,
+        reach: f64,
+        min_cosine: f64,
+        wanted: impl Fn(usize) -> bool,
+    ) -> Option<(f64, usize)> {
+        /// Edgels are about a pixel apart along an edge.
+        const ALONG: f64 = 0.75;
+        let box_of = |axis: usize, count: usize| {
+            let half = reach * normal[axis].abs() + ALONG;
+            let cell = |x: f64| (x / CELL).floor();
+            let (low, high) = (cell(point[axis] - half), cell(point[axis] + half));
+            // Not so for NaN.
+            (high >= 0.0 && low < count as f64)
+                .then(|| (low.max(0.0) as usize, (high as usize).min(count - 1)))
+        };
+        if self.edgels.is_empty() {
+            return None;
+        }
+        let (columns, rows) = Option::zip(box_of(0, self.columns), box_of(1, self.rows))?;
+        let mut nearest: Option<(f64, usize)> = None;
+        for row in rows.0..=rows.1 {
+            let first = self.starts[row * self.columns + columns.0] as usize;
+            let last = self.starts[row * self.columns + columns.1 + 1] as usize;
+            for (index, edgel) in (first..last).zip(&self.edgels[first..last]) {
+                let offset = edgel.position.cast::<f64>() - point;
+                let across = offset.dot(normal);
+                let along = (offset.x * normal.y - offset.y * normal.x).abs();
+                if across.abs() <= reach
+                    && along <= ALONG
+                    && edgel.normal.cast::<f64>().dot(normal).abs() >= min_cosine
+                    && nearest.is_none_or(|(best, _)| across.abs() < best.abs())
+                    && wanted(index)
+                {
+                    nearest = Some((across, index));
+                }
+            }
+        }
+        nearest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn map() -> EdgelMap {
+        let segment = |a: [f64; 2], b: [f64; 2]| LineSegment2::new(a.into(), b.into());
+        // Two upright lines, and one across.
+        let segments = [
+            segment([20.25, 5.0], [20.25, 45.0]),
+            segment([22.0, 5.0], [22.0, 45.0]),
+            segment([5.0, 30.0], [60.0, 30.0]),
+        ];
+        EdgelMap::of_segments(&segments, 64, 48)
+    }
+
+    #[test]
+    fn the_nearest_edgel_of_an_edge_is_found_across_it() {
+        let map = map();
+        let normal = Vector2::x();
+        let find =
+            |x: f64, reach: f64| map.nearest(&Vector2::new(x, 20.3), &normal, reach, 0.9, |_| true);
+        let (distance, _) = find(20.0, 1.0).unwrap();
+        assert!((distance - 0.25).abs() < 1e-5);
+        let (distance, index) = find(21.5, 2.0).unwrap();
+        assert!((distance - 0.5).abs() < 1e-5);
+        assert_eq!(map.get(index).position.x, 22.0);
+        assert!(find(25.0, 2.0).is_none());
+        // What runs across is another edge.
+        let on_cross = Vector2::new(40.0, 30.0);
+        assert!(
+            map.nearest(&on_cross, &normal, 2.0, 0.9, |_| true)
+                .is_none()
+        );
+        // The unwanted is passed over.
+        let other = map.nearest(&Vector2::new(21.5, 20.3), &normal, 2.0, 0.9, |i| i != index);
+        assert!(other.is_none_or(|(_, i)| i != index));
+    }
+
+    #[test]
+    fn every_place_finds_what_all_edgels_together_tell() {
+        let map = map();
+        let normal = Vector2::new(0.8, 0.6);
+        for step in 0..2000_u32 {
+            let point = Vector2::new(
+                f64::from(step * 37 % 700) / 10.0 - 3.0,
+                f64::from(step * 53 % 540) / 10.0 - 3.0,
+            );
+            let beside = |edgel: &Edgel| {
+                let offset = edgel.position.cast::<f64>() - point;
+                let along = (offset.x * normal.y - offset.y * normal.x).abs();
+                (along <= 0.75 && edgel.normal.cast::<f64>().dot(&normal).abs() >= 0.5)
+                    .then(|| offset.dot(&normal).abs())
+            };
+            let expected = (0..map.len())
+                .filter_map(|i| beside(map.get(i)))
+                .filter(|d| *d <= 3.0)
+                .reduce(f64::min);
+            let found = map
+                .nearest(&point, &normal, 3.0, 0.5, |_| true)
+                .map(|(d, _)| d.abs());
+            assert_eq!(found, expected);
+        }
+    }
+
+    #[test]
+    fn what_is_no_edgel_is_left_out() {
+        let edgel = |x: f32, y: f32| Edgel {
+            position: Vector2::new(x, y),
+            normal: Vector2::x(),
+        };
+        let edgels = [
+            edgel(f32::NAN, 1.0),
+            edgel(-1.0, 1.0),
+            edgel(1.0, 1e30),
+            edgel(9.0, 9.0),
+        ];
+        assert_eq!(EdgelMap::new(&edgels, 10, 10).len(), 1);
+        assert!(EdgelMap::new(&edgels, 0, 0).is_empty());
+        let empty = EdgelMap::default();
+        assert!(
+            empty
+                .nearest(&Vector2::zeros(), &Vector2::x(), 1.0, 0.5, |_| true)
+                .is_none()
+        );
+        let far = EdgelMap::new(&edgels, 10, 10);
+        for x in [f64::NAN, f64::INFINITY, -1e300, 1e300] {
+            assert!(
+                far.nearest(&Vector2::new(x, x), &Vector2::x(), 1.0, 0.5, |_| true)
+                    .is_none()
+            );
+        }
+        let endless = LineSegment2::new(Vector2::zeros(), Vector2::new(1e300, 0.0));
+        assert!(EdgelMap::of_segments(&[endless], 10, 10).is_empty());
+    }
+}

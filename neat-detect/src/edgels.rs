@@ -1,0 +1,103 @@
+//! Points where colours change fastest, to a fraction of a pixel.
+
+use crate::config::DetectorConfig;
+use crate::detection::PreparedImage;
+use image::RgbImage;
+use nalgebra::{Matrix2, Vector2};
+use neat_core::{Edgel, EdgelMap};
+
+/// The edgels of `image`: local maxima of the gradient of colours (di Zenzo 1986) across the
+/// edge, at least as strong as the weakest edge of a segment may be. The centre of the first
+/// pixel is at (`pixel_center`, `pixel_center`).
+///
+/// Runs on the calling thread.
+///
+/// ```
+/// use image::{Rgb, RgbImage};
+/// use nalgebra::Vector2;
+/// use neat_detect::{DetectorConfig, edgel_map};
+///
+/// // A step between the columns 29 and 30.
+/// let image = RgbImage::from_fn(64, 64, |x, _| Rgb([if x < 30 { 20 } else { 200 }; 3]));
+/// let map = edgel_map(&image, &DetectorConfig::default(), 0.0);
+/// let found = map.nearest(&Vector2::new(29.0, 20.0), &Vector2::x(), 1.0, 0.9, |_| true);
+/// assert!((found.unwrap().0 - 0.5).abs() < 0.05);
+/// ```
+pub fn edgel_map(image: &RgbImage, config: &DetectorConfig, pixel_center: f64) -> EdgelMap {
+    let mut edgels = edgels(image, config);
+    for edgel in &mut edgels {
+        edgel.position = edgel.position.add_scalar(pixel_center as f32);
+    }
+    EdgelMap::new(&edgels, image.width(), image.height())
+}
+
+/// The edgels with pixel centres at integers.
+fn edgels(image: &RgbImage, config: &DetectorConfig) -> Vec<Edgel> {
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    if width < 5 || height < 5 {
+        return Vec::new();
+    }
+    let prepared = PreparedImage::new(image, config);
+    let gradients = gradients(&prepared, width, height);
+    let min_strength = prepared.min_gradient() as f32;
+    let mut found = Vec::new();
+    for row in 2..height - 2 {
+        for column in 2..width - 2 {
+            let (strength, normal) = gradients[row * width + column];
+            if strength < min_strength {
+                continue;
+            }
+            let at = |side: f32| {
+                let place = Vector2::new(column as f32, row as f32) + side * normal;
+                interpolated(&gradients, width, &place)
+            };
+            let (before, after) = (at(-1.0), at(1.0));
+            if strength < before || strength <= after {
+                continue;
+            }
+            // The vertex of the parabola through the three.
+            let curvature = before - 2.0 * strength + after;
+            let shift = if curvature < 0.0 {
+                (0.5 * (before - after) / curvature).clamp(-0.5, 0.5)
+            } else {
+                0.0
+            };
+            found.push(Edgel {
+                position: Vector2::new(column as f32, row as f32) + shift * normal,
+                normal,
+            });
+        }
+    }
+    found
+}
+
+/// Strength, in grey levels per pixel, and direction of the fastest change of each pixel.
+fn gradients(prepared: &PreparedImage, width: usize, height: usize) -> Vec<(f32, Vector2<f32>)> {
+    let mut gradients = vec![(0.0, Vector2::x()); width * height];
+    for row in 1..height - 1 {
+        for column in 1..width - 1 {
+            let mut tensor = Matrix2::<f32>::zeros();
+            for [x, y] in prepared.smoothed().differences(column, row) {
+                tensor += Matrix2::new(x * x, x * y, x * y, y * y);
+            }
+            let tensor = tensor / 3.0;
+            let half_difference = 0.5 * (tensor[(0, 0)] - tensor[(1, 1)]);
+            let mixed = tensor[(0, 1)];
+            let root = half_difference.hypot(mixed);
+            let largest = 0.5 * tensor.trace() + root;
+            let angle = 0.5 * mixed.atan2(half_difference);
+            gradients[row * width + column] =
+                (largest.sqrt(), Vector2::new(angle.cos(), angle.sin()));
+        }
+    }
+    gradients
+}
+
+/// Strength between pixels, linearly.
+fn interpolated(gradients: &[(f32, Vector2<f32>)], width: usize, place: &Vector2<f32>) -> f32 {
+    let (column, row) = (place.x.floor(), place.y.floor());
+    let (u, v) = (place.x - column, place.y - row);
+    let first = row as usize * width + column as usize;
+    let at = |offset: usize| gradients[first + offset].0;
+    (1.0 - v) * ((1.0 - u) * at(0) + u * at(1)) + v * ((1.0 - u) * at(width) + u * at(width + 1))
+}

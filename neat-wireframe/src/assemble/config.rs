@@ -1,0 +1,53 @@
+//! Configuration of the assembler.
+
+use serde::{Deserialize, Serialize};
+
+/// What of [`super::assemble`] there is a reason to change. The constants of its steps
+/// stand beside them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AssembleConfig {
+    /// Evidence that a line needs beyond what its own position takes, in nats: the
+    /// logarithm of how much likelier the images are with the line than without it.
+    pub min_evidence: f64,
+    /// Shorter 2D segments propose no line.
+    pub min_segment_length_in_pixels: f64,
+    /// Structure lies within the scene ball times this.
+    pub ball_margin: f64,
+    /// Views that each view is compared with, at most.
+    pub neighbours: usize,
+}
+
+impl Default for AssembleConfig {
+    fn default() -> Self {
+        Self {
+            min_evidence: 3.0,
+            min_segment_length_in_pixels: 8.0,
+            ball_margin: 1.5,
+            neighbours: 10,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_configuration_names_only_what_it_changes_and_nothing_unknown() {
+        let text = r#"{"min_evidence": 4.0, "neighbours": 12}"#;
+        let config: AssembleConfig = serde_json::from_str(text).unwrap();
+        let expected = AssembleConfig {
+            min_evidence: 4.0,
+            neighbours: 12,
+            ..Default::default()
+        };
+        assert_eq!(config, expected);
+        let text = serde_json::to_string(&config).unwrap();
+        assert_eq!(
+            serde_json::from_str::<AssembleConfig>(&text).unwrap(),
+            config
+        );
+        assert!(serde_json::from_str::<AssembleConfig>(r#"{"min_view": 4}"#).is_err());
+    }
+}

@@ -1,0 +1,257 @@
+//! Corners: where the ends of lines meet in space.
+//!
+//! Ends are joined where one point lies on all their lines, as well as these are known, and
+//! near their ends, which edgels tell less well than the lines. The nearest go first.
+
+use super::edge_samples::Images;
+use super::line_selection::ChosenLine;
+use nalgebra::{Matrix3, Vector3};
+use neat_core::LineSegment3;
+use rayon::prelude::*;
+
+/// Lines meet where so many reaches lie between them at most.
+const MAX_GAP: f64 = 2.5;
+/// An end may be off along its line by so many pixels: corners are round and hidden …
+const WINDOW_IN_PIXELS: f64 = 16.0;
+/// … or by this share of the line, whose ends grow uncertain with its depth …
+const WINDOW_SHARE: f64 = 0.1;
+/// … but never by so much of it that its other end would be meant.
+const MAX_WINDOW_SHARE: f64 = 0.4;
+/// Squared sine of the least angle under which lines meet in a point, about 10°.
+const MIN_SQUARED_SINE: f64 = 0.03;
+/// How much an end's own place counts along its line, where nothing else fixes it.
+const ALONG: f64 = 1e-3;
+
+/// Lines with the junctions that they run between.
+pub(super) struct Corners {
+    pub junctions: Vec<Vector3<f64>>,
+    /// The junctions at start and end of each line.
+    pub ends: Vec<[usize; 2]>,
+    /// Where lines come near each other.
+    pub meetings: Vec<Meeting>,
+    /// Per line, how far off its ends may be.
+    pub windows: Vec<f64>,
+    /// Per line, the size of a pixel.
+    pub pixels: Vec<f64>,
+}
+
+/// Two lines that come near each other within their lengths.
+pub(super) struct Meeting {
+    pub lines: [usize; 2],
+    /// Parameters of the nearest points.
+    pub places: [f64; 2],
+    /// Distance by the largest allowed one.
+    gap: f64,
+}
+
+/// Parameters of the nearest points of two lines, and their distance; `None` for lines that
+/// are all but parallel.
+pub(super) fn nearest_points(a: &LineSegment3, b: &LineSegment3) -> Option<([f64; 2], f64)> {
+    let (u, v) = (a.end - a.start, b.end - b.start);
+    let offset = a.start - b.start;
+    let (uu, uv, vv) = (u.dot(&u), u.dot(&v), v.dot(&v));
+    let determinant = uu * vv - uv * uv;
+    if determinant.is_nan() || determinant <= MIN_SQUARED_SINE * uu * vv {
+        return None;
+    }
+    let (along_u, along_v) = (u.dot(&offset), v.dot(&offset));
+    let s = (uv * along_v - vv * along_u) / determinant;
+    let t = (uu * along_v - uv * along_u) / determinant;
+    Some(([s, t], (offset + s * u - t * v).norm()))
+}
+
+/// How far a place lies beyond the nearest end of a line (inside: negative), and that end.
+pub(super) fn beyond_end(place: f64, length: f64) -> (f64, usize) {
+    if place > 0.5 {
+        ((place - 1.0) * length, 1)
+    } else {
+        (-place * length, 0)
+    }
+}
+
+/// Joins the ends of lines.
+pub(super) fn find_corners(images: &Images, lines: &[ChosenLine]) -> Corners {
+    let pixels: Vec<f64> = (lines.iter())
+        .map(|line| images.pixel_size(&line.line, line.evidence.views()))
+        .collect();
+    let windows: Vec<f64> = (lines.iter().zip(&pixels))
+        .map(|(line, pixel)| {
+            let length = line.line.length();
+            (WINDOW_IN_PIXELS * pixel)
+                .max(WINDOW_SHARE * length)
+                .min(MAX_WINDOW_SHARE * length)
+        })
+        .collect();
+    let max_gaps: Vec<f64> = pixels.iter().map(|p| MAX_GAP * images.reach * p).collect();
+    let meetings = find_meetings(lines, &windows, &max_gaps);
+    let mut joints: Vec<(f64, [usize; 2])> = (meetings.iter())
+        .filter_map(|meeting| {
+            let mut cost = meeting.gap;
+            let mut ends = [0; 2];
+            for side in 0..2 {
+                let line = meeting.lines[side];
+                let (beyond, end) = beyond_end(meeting.places[side], lines[line].line.length());
+                cost += beyond.abs() / windows[line];
+                ends[side] = 2 * line + end;
+                if beyond.abs() > windows[line] {
+                    return None;
+                }
+            }
+            Some((cost, ends))
+        })
+        .collect();
+    joints.sort_by(|(a, i), (b, j)| a.total_cmp(b).then(i.cmp(j)));
+    let mut joining = Joining::new(lines, &pixels, &windows, &max_gaps);
+    for (_, [a, b]) in joints {
+        joining.join(a, b);
+    }
+    let (junctions, ends) = joining.junctions();
+    Corners {
+        junctions,
+        ends,
+        meetings,
+        windows,
+        pixels,
+    }
+}
+
+fn find_meetings(lines: &[ChosenLine], windows: &[f64], max_gaps: &[f64]) -> Vec<Meeting> {
+    let reach = |k: usize| 0.5 * lines[k].line.length() + windows[k];
+    let middles: Vec<Vector3<f64>> = lines.iter().map(|line| line.line.point_at(0.5)).collect();
+    let of_line = |i: usize| -> Vec<Meeting> {
+        (i + 1..lines.len())
+            .filter(|j| (middles[i] - middles[*j]).norm() <= reach(i) + reach(*j))
+            .filter_map(|j| {
+                let (places, gap) = nearest_points(&lines[i].line, &lines[j].line)?;
+                let max_gap = max_gaps[i].max(max_gaps[j]);
+                let within = |k: usize, place: f64| {
+                    beyond_end(place, lines[k].line.length()).0 <= windows[k]
+                };
+                (gap <= max_gap && within(i, places[0]) && within(j, places[1])).then_some(
+                    Meeting {
+                        lines: [i, j],
+                        places,
+                        gap: gap / max_gap,
+                    },
+                )
+            })
+            .collect()
+    };
+    let meetings: Vec<Vec<Meeting>> = (0..lines.len()).into_par_iter().map(of_line).collect();
+    meetings.into_iter().flatten().collect()
+}
+
+/// Clusters of ends that grow by joining. End `2 k + side` belongs to line `k`.
+struct Joining<'a> {
+    points: Vec<Vector3<f64>>,
+    directions: Vec<Vector3<f64>>,
+    pixels: &'a [f64],
+    windows: &'a [f64],
+    max_gaps: &'a [f64],
+    cluster_of: Vec<usize>,
+    /// Members of each cluster, ascending, and where it is.
+    clusters: Vec<(Vec<usize>, Vector3<f64>)>,
+}
+
+impl<'a> Joining<'a> {
+    fn new(
+        lines: &[ChosenLine],
+        pixels: &'a [f64],
+        windows: &'a [f64],
+        max_gaps: &'a [f64],
+    ) -> Self {
+        let points: Vec<Vector3<f64>> = lines.iter().flat_map(|line| line.line.ends()).collect();
+        let direction = |line: &ChosenLine| (line.line.end - line.line.start).normalize();
+        Self {
+            directions: lines.iter().map(direction).collect(),
+            pixels,
+            windows,
+            max_gaps,
+            cluster_of: (0..points.len()).collect(),
+            clusters: (points.iter().enumerate())
+                .map(|(end, point)| (vec![end], *point))
+                .collect(),
+            points,
+        }
+    }
+
+    /// Joins the clusters of two ends if one point fits all their lines.
+    fn join(&mut self, a: usize, b: usize) {
+        let [a, b] = [self.cluster_of[a], self.cluster_of[b]];
+        if a == b {
+            return;
+        }
+        let mut members = [self.clusters[a].0.as_slice(), &self.clusters[b].0].concat();
+        members.sort_unstable();
+        let both_ends = members.windows(2).any(|pair| pair[0] / 2 == pair[1] / 2);
+        if both_ends {
+            return;
+        }
+        let Some(point) = self.meeting_point(&members) else {
+            return;
+        };
+        if members.iter().all(|end| self.fits(*end, &point)) {
+            for end in &members {
+                self.cluster_of[*end] = a;
+            }
+            self.clusters[a] = (members, point);
+            self.clusters[b].0.clear();
+        }
+    }
+
+    /// The point nearest to all lines, in pixels.
+    fn meeting_point(&self, members: &[usize]) -> Option<Vector3<f64>> {
+        let mut matrix = Matrix3::zeros();
+        let mut right = Vector3::zeros();
+        for end in members {
+            let direction = self.directions[end / 2];
+            let along = direction * direction.transpose();
+            let block =
+                (Matrix3::identity() - (1.0 - ALONG) * along) * self.pixels[end / 2].powi(-2);
+            matrix += block;
+            right += block * self.points[*end];
+        }
+        matrix.cholesky().map(|factor| factor.solve(&right))
+    }
+
+    fn fits(&self, end: usize, point: &Vector3<f64>) -> bool {
+        let line = end / 2;
+        let offset = point - self.points[end];
+        let along = offset.dot(&self.directions[line]);
+        let gap = (offset - along * self.directions[line]).norm();
+        gap <= self.max_gaps[line] && along.abs() <= self.windows[line]
+    }
+
+    /// The junctions, and those at the ends of each line.
+    fn junctions(self) -> (Vec<Vector3<f64>>, Vec<[usize; 2]>) {
+        let mut new_index = vec![0; self.clusters.len()];
+        let mut junctions = Vec::new();
+        for (cluster, (members, point)) in self.clusters.iter().enumerate() {
+            if !members.is_empty() {
+                new_index[cluster] = junctions.len();
+                junctions.push(*point);
+            }
+        }
+        let ends = (self.cluster_of.chunks_exact(2))
+            .map(|pair| [new_index[pair[0]], new_index[pair[1]]])
+            .collect();
+        (junctions, ends)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nearest_points_of_crossing_lines() {
+        let line = |a: [f64; 3], b: [f64; 3]| LineSegment3::new(a.into(), b.into());
+        let a = line([0.0, 0.0, 0.0], [2.0, 0.0, 0.0]);
+        let b = line([0.5, -1.0, 0.25], [0.5, 3.0, 0.25]);
+        let ([s, t], gap) = nearest_points(&a, &b).unwrap();
+        assert!((s - 0.25).abs() < 1e-12 && (t - 0.25).abs() < 1e-12);
+        assert!((gap - 0.25).abs() < 1e-12);
+        assert!(nearest_points(&a, &line([0.0, 1.0, 0.0], [2.0, 1.01, 0.0])).is_none());
+        assert!(nearest_points(&a, &line([0.0; 3], [0.0; 3])).is_none());
+    }
+}

@@ -1,0 +1,114 @@
+//! Edges are cut where corners and free ends lie on them.
+
+use super::corners::{Corners, beyond_end, nearest_points};
+use super::edge_samples::Images;
+use neat_core::{LineSegment3, Wireframe3d};
+use std::collections::BTreeSet;
+
+/// A junction lies on an edge within so many reaches: less than where ends meet, since a cut
+/// bends the edge.
+const MAX_GAP: f64 = 1.5;
+/// Nearer to an end of the edge nothing is cut, in pixels …
+const MARGIN_IN_PIXELS: f64 = 3.0;
+/// … or as a share of the edge, if that is less.
+const MAX_MARGIN: f64 = 0.3;
+
+/// The graph of lines between corners.
+pub(super) fn cut_edges(images: &Images, mut corners: Corners) -> Wireframe3d {
+    let count = corners.ends.len();
+    let mut degrees = vec![0; corners.junctions.len()];
+    for junction in corners.ends.iter().flatten() {
+        degrees[*junction] += 1;
+    }
+    // For each line where it is cut, and by which junction.
+    let mut cuts: Vec<Vec<(f64, usize)>> = vec![Vec::new(); count];
+    for meeting in &corners.meetings {
+        for side in 0..2 {
+            let [stem, bar] = [meeting.lines[side], meeting.lines[1 - side]];
+            let line = |k: usize| {
+                let [start, end] = corners.ends[k].map(|end| corners.junctions[end]);
+                LineSegment3::new(start, end)
+            };
+            let (beyond, end) = beyond_end(meeting.places[side], line(stem).length());
+            let junction = corners.ends[stem][end];
+            let is_end = beyond.abs() <= corners.windows[stem];
+            if !is_end
+                || corners.ends[bar].contains(&junction)
+                || cuts[bar].iter().any(|(_, other)| *other == junction)
+            {
+                continue;
+            }
+            let [stem_line, bar_line] = [line(stem), line(bar)];
+            let place = if degrees[junction] > 1 {
+                bar_line.line_parameter(&corners.junctions[junction])
+            } else {
+                let Some(([_, place], _)) = nearest_points(&stem_line, &bar_line) else {
+                    continue;
+                };
+                place
+            };
+            let pixel = corners.pixels[stem].max(corners.pixels[bar]);
+            let margin = (MARGIN_IN_PIXELS * pixel / bar_line.length()).min(MAX_MARGIN);
+            let foot = bar_line.point_at(place);
+            let from = if degrees[junction] > 1 {
+                corners.junctions[junction]
+            } else {
+                stem_line.point_at(stem_line.line_parameter(&foot))
+            };
+            let near = (from - foot).norm() <= MAX_GAP * images.reach * pixel;
+            if !near || !(margin < place && place < 1.0 - margin) {
+                continue;
+            }
+            if degrees[junction] == 1 {
+                // The end of the stem comes to the bar, which stays straight.
+                corners.junctions[junction] = foot;
+                degrees[junction] += 2;
+            }
+            cuts[bar].push((place, junction));
+        }
+    }
+    let mut edges = BTreeSet::new();
+    for (ends, cuts) in corners.ends.iter().zip(&mut cuts) {
+        cuts.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let inner = cuts.iter().map(|(_, junction)| *junction);
+        let along: Vec<usize> = std::iter::once(ends[0])
+            .chain(inner)
+            .chain([ends[1]])
+            .collect();
+        for pair in along.windows(2) {
+            let [a, b] = [pair[0].min(pair[1]), pair[0].max(pair[1])];
+            let apart = corners.junctions[a] != corners.junctions[b];
+            if a != b && apart {
+                edges.insert([a, b]);
+            }
+        }
+    }
+    in_order(&corners, &edges)
+}
+
+/// The used junctions in lexicographic order of their coordinates, and the edges, sorted.
+fn in_order(corners: &Corners, edges: &BTreeSet<[usize; 2]>) -> Wireframe3d {
+    let used: BTreeSet<usize> = edges.iter().flatten().copied().collect();
+    let mut order: Vec<usize> = used.into_iter().collect();
+    let at = |junction: &usize| -> [f64; 3] { corners.junctions[*junction].into() };
+    order.sort_by(|a, b| {
+        let pairs = at(a).into_iter().zip(at(b));
+        let first = pairs.map(|(x, y)| x.total_cmp(&y)).find(|o| o.is_ne());
+        first.unwrap_or(std::cmp::Ordering::Equal)
+    });
+    let mut new_index = vec![0; corners.junctions.len()];
+    for (new, old) in order.iter().enumerate() {
+        new_index[*old] = new;
+    }
+    let mut edges: Vec<[usize; 2]> = (edges.iter())
+        .map(|edge| {
+            let [a, b] = edge.map(|junction| new_index[junction]);
+            [a.min(b), a.max(b)]
+        })
+        .collect();
+    edges.sort_unstable();
+    Wireframe3d {
+        junctions: order.iter().map(|old| corners.junctions[*old]).collect(),
+        edges,
+    }
+}

@@ -1,0 +1,181 @@
+//! Where a 3D line ought to show in the images, and whether edgels are there.
+
+use super::view_segments::TrackView;
+use crate::projection::project_in_front;
+use nalgebra::Vector2;
+use neat_core::{EdgelMap, LineSegment2, LineSegment3};
+
+/// Edgels of a line have at most this angle to its normal (cosine): about 20°, what noise
+/// does to the gradient of a weak edge.
+const MIN_COSINE: f64 = 0.93;
+/// Distance between samples in pixels: the smoothing before gradients correlates nearer
+/// ones.
+const SPACING: f64 = 3.0;
+/// Samples per view: more say nothing new.
+const COUNTS: [usize; 2] = [4, 40];
+/// Shorter projections have no direction that an edgel could agree with, in pixels.
+const MIN_PROJECTED_LENGTH: f64 = 5.0;
+/// No image is larger, in pixels.
+const MAX_PROJECTED_LENGTH: f64 = 1e5;
+/// Edgels nearer to the border are those of the border, in pixels.
+const BORDER: f64 = 3.0;
+/// A view counts if it holds at least this share of the samples.
+const MIN_INSIDE: f64 = 1.0 / 3.0;
+
+/// All that the assembler knows of the images.
+#[derive(Clone, Copy)]
+pub(super) struct Images<'a> {
+    pub views: &'a [TrackView],
+    /// The edgels of each view.
+    pub maps: &'a [EdgelMap],
+    /// Farther beside a line no edgel is its own, in pixels.
+    pub reach: f64,
+}
+
+/// Places along the projection of a 3D line.
+pub(super) struct EdgeSamples {
+    /// Parameter along the line, and pixel.
+    pub points: Vec<(f64, Vector2<f64>)>,
+    /// Across the projection.
+    pub normal: Vector2<f64>,
+}
+
+impl Images<'_> {
+    /// Samples of the part of `line` between two parameters; `None` where the view does
+    /// not see enough of it. `count` is chosen by the length in pixels unless given.
+    pub(super) fn samples(
+        &self,
+        view: usize,
+        line: &LineSegment3,
+        [low, high]: [f64; 2],
+        count: Option<usize>,
+    ) -> Option<EdgeSamples> {
+        let camera = &self.views[view].camera;
+        let part = LineSegment3::new(line.point_at(low), line.point_at(high));
+        let (length, normal) = across(&project_segment(&self.views[view], &part)?)?;
+        let count =
+            count.unwrap_or_else(|| ((length / SPACING) as usize).clamp(COUNTS[0], COUNTS[1]));
+        let points: Vec<(f64, Vector2<f64>)> = (0..count)
+            .filter_map(|i| {
+                let place = low + (high - low) * ((i as f64 + 0.5) / count as f64);
+                let pixel = project_in_front(camera, &line.point_at(place))?;
+                self.is_inside(view, &pixel).then_some((place, pixel))
+            })
+            .collect();
+        let enough = points.len() >= COUNTS[0] && points.len() as f64 >= MIN_INSIDE * count as f64;
+        enough.then_some(EdgeSamples { points, normal })
+    }
+
+    /// Whether a pixel is far enough from the image's border.
+    pub(super) fn is_inside(&self, view: usize, pixel: &Vector2<f64>) -> bool {
+        let camera = &self.views[view].camera;
+        pixel.x > BORDER
+            && pixel.y > BORDER
+            && pixel.x < f64::from(camera.width) - BORDER
+            && pixel.y < f64::from(camera.height) - BORDER
+    }
+
+    /// The index of the nearest edgel within `reach` pixels across a line at `pixel`.
+    pub(super) fn edgel(
+        &self,
+        view: usize,
+        pixel: &Vector2<f64>,
+        normal: &Vector2<f64>,
+        reach: f64,
+    ) -> Option<usize> {
+        self.maps[view]
+            .nearest(pixel, normal, reach, MIN_COSINE, |_| true)
+            .map(|(_, index)| index)
+    }
+
+    /// The share of the samples, moved by `shift` pixels across the line, that have an
+    /// edgel; edgels that are `taken` by another line do not count.
+    pub(super) fn share(
+        &self,
+        view: usize,
+        samples: &EdgeSamples,
+        shift: f64,
+        taken: Option<&[Vec<bool>]>,
+    ) -> f64 {
+        let offset = samples.normal * shift;
+        let is_free = |index: usize| taken.is_none_or(|taken| !taken[view][index]);
+        let hits = samples.points.iter().filter(|(_, pixel)| {
+            self.maps[view]
+                .nearest(
+                    &(pixel + offset),
+                    &samples.normal,
+                    self.reach,
+                    MIN_COSINE,
+                    is_free,
+                )
+                .is_some()
+        });
+        hits.count() as f64 / samples.points.len() as f64
+    }
+
+    /// Positions of the edgels within `reach` pixels beside a line in a view, in order.
+    pub(super) fn edgels_beside(
+        &self,
+        view: usize,
+        line: &LineSegment3,
+        reach: f64,
+    ) -> Vec<Vector2<f64>> {
+        let Some(samples) = self.samples(view, line, [0.0, 1.0], None) else {
+            return Vec::new();
+        };
+        (samples.points.iter())
+            .filter_map(|(_, pixel)| self.edgel(view, pixel, &samples.normal, reach))
+            .map(|index| self.maps[view].get(index).position.cast())
+            .collect()
+    }
+
+    /// Median size of a pixel at the middle of a line, over some views.
+    pub(super) fn pixel_size(
+        &self,
+        line: &LineSegment3,
+        views: impl Iterator<Item = usize>,
+    ) -> f64 {
+        let middle = line.point_at(0.5);
+        median(
+            views
+                .map(|view| self.views[view].pixel_size_at(&middle))
+                .collect(),
+        )
+    }
+
+    /// Median length of a line's projections, in pixels.
+    pub(super) fn projected_length(
+        &self,
+        line: &LineSegment3,
+        views: impl Iterator<Item = usize>,
+    ) -> f64 {
+        let lengths = views.filter_map(|view| project_segment(&self.views[view], line));
+        median(lengths.map(|segment| segment.length()).collect())
+    }
+}
+
+/// The upper median; 0 of nothing.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() {
+        return 0.0;
+    }
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The projection of a 3D segment, `None` unless it lies in front of the camera.
+pub(super) fn project_segment(view: &TrackView, line: &LineSegment3) -> Option<LineSegment2> {
+    Some(LineSegment2::new(
+        project_in_front(&view.camera, &line.start)?,
+        project_in_front(&view.camera, &line.end)?,
+    ))
+}
+
+/// Length and unit normal of a 2D segment of a useful length.
+pub(super) fn across(segment: &LineSegment2) -> Option<(f64, Vector2<f64>)> {
+    let offset = segment.end - segment.start;
+    let length = offset.norm();
+    (MIN_PROJECTED_LENGTH..MAX_PROJECTED_LENGTH)
+        .contains(&length)
+        .then(|| (length, Vector2::new(-offset.y, offset.x) / length))
+}

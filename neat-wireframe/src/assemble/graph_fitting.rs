@@ -1,0 +1,131 @@
+//! Junctions moved until the edges between them lie on the edgels of all views.
+
+use super::edge_samples::{Images, project_segment};
+use super::line_selection::ChosenLine;
+use crate::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, adjust_observed};
+use crate::projection::project_in_front;
+use crate::solve::Cauchy;
+use nalgebra::{Matrix2, Vector2, Vector3};
+use neat_core::{LineSegment2, LineSegment3};
+use rayon::prelude::*;
+
+/// Edgels are sought again after the first adjustment.
+const ROUNDS: usize = 2;
+/// Where they are sought, in reaches: junctions have moved the lines.
+const SEARCH: f64 = 1.5;
+/// Weight of the places of the ends along the edges, which only keeps free ends in place.
+const END_WEIGHT: f64 = 0.05;
+/// Scale of the Cauchy loss, in reaches: as for lines.
+const LOSS_SCALE: f64 = 0.6;
+/// Fewer edgels of a view determine no segment.
+const MIN_EDGELS: usize = 4;
+/// A segment of edgels is longer than this, in pixels.
+const MIN_LENGTH: f64 = 3.0;
+
+/// Moves `junctions`; `ends` are those of each line.
+pub(super) fn fit_graph(
+    images: &Images,
+    lines: &[ChosenLine],
+    ends: &[[usize; 2]],
+    junctions: &mut Vec<Vector3<f64>>,
+) {
+    let loss = Loss {
+        cauchy: Cauchy {
+            scale: LOSS_SCALE * images.reach,
+        },
+        end_weight: END_WEIGHT,
+    };
+    for _ in 0..ROUNDS {
+        let observed: Vec<ObservedEdge> = (lines.par_iter().zip(ends))
+            .map(|(chosen, ends)| ObservedEdge {
+                junctions: *ends,
+                observations: observations(images, chosen, ends.map(|end| junctions[end])),
+            })
+            .collect();
+        *junctions = adjust_observed(&observed, junctions, loss).junctions;
+    }
+}
+
+fn observations(
+    images: &Images,
+    chosen: &ChosenLine,
+    [start, end]: [Vector3<f64>; 2],
+) -> Vec<EdgeObservation> {
+    let edge = LineSegment3::new(start, end);
+    (chosen.evidence.views())
+        .filter_map(|view| {
+            let camera = images.views[view].camera;
+            let edgels = images.edgels_beside(view, &edge, SEARCH * images.reach);
+            let projected = project_segment(&images.views[view], &edge)?;
+            Some(EdgeObservation {
+                camera,
+                detection: segment_through(&edgels, &projected, images.reach)?,
+                ends: [start, end].map(|end| project_in_front(&camera, &end)),
+                // As in the fit of a line.
+                weight: (edgels.len() as f64).sqrt(),
+            })
+        })
+        .collect()
+}
+
+/// The segment through points beside another, as far as they reach, by iteratively
+/// reweighted least squares.
+fn segment_through(
+    points: &[Vector2<f64>],
+    beside: &LineSegment2,
+    scale: f64,
+) -> Option<LineSegment2> {
+    const ROUNDS: usize = 5;
+    if points.len() < MIN_EDGELS {
+        return None;
+    }
+    let direction = (beside.end - beside.start).try_normalize(1e-9)?;
+    let normal = Vector2::new(-direction.y, direction.x);
+    let places: Vec<[f64; 2]> = (points.iter())
+        .map(|point| {
+            let offset = point - beside.start;
+            [offset.dot(&direction), offset.dot(&normal)]
+        })
+        .collect();
+    let mut line = Vector2::zeros();
+    for _ in 0..ROUNDS {
+        let mut matrix = Matrix2::zeros();
+        let mut right = Vector2::zeros();
+        for [along, across] in &places {
+            let row = Vector2::new(1.0, *along);
+            let residual = across - row.dot(&line);
+            let weight = 1.0 / (1.0 + (residual / (0.5 * scale)).powi(2));
+            matrix += weight * row * row.transpose();
+            right += weight * *across * row;
+        }
+        line = matrix.cholesky()?.solve(&right);
+    }
+    let at = |along: f64| {
+        beside.start + direction * along + normal * line.dot(&Vector2::new(1.0, along))
+    };
+    let first = places.iter().map(|p| p[0]).fold(f64::INFINITY, f64::min);
+    let last = places
+        .iter()
+        .map(|p| p[0])
+        .fold(f64::NEG_INFINITY, f64::max);
+    (last - first > MIN_LENGTH).then(|| LineSegment2::new(at(first), at(last)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_segment_runs_through_most_points() {
+        let beside = LineSegment2::new(Vector2::new(10.0, 10.0), Vector2::new(50.0, 10.0));
+        let mut points: Vec<_> = (0..30)
+            .map(|k| Vector2::new(12.0 + f64::from(k), 10.3 + 0.01 * f64::from(k)))
+            .collect();
+        points[7].y += 3.0;
+        let found = segment_through(&points, &beside, 0.5).unwrap();
+        assert!((found.start - Vector2::new(12.0, 10.3)).norm() < 0.02);
+        assert!((found.end - Vector2::new(41.0, 10.59)).norm() < 0.02);
+        assert!(segment_through(&points[..3], &beside, 0.5).is_none());
+        assert!(segment_through(&[points[0]; 5], &beside, 0.5).is_none());
+    }
+}

@@ -1,0 +1,160 @@
+//! How much likelier the images are with a 3D line than without it.
+//!
+//! A view shows a line, shows parts of it, or does not. How often it would do so by
+//! chance, lines beside it tell, parallel and of the same length: much in leaves and
+//! brickwork, little on a wall. What a view says is the logarithm of the ratio of both
+//! probabilities, where a line that exists may still be hidden. Two views show a line
+//! wherever they want, since any two planes meet in one: the two that say most do not
+//! count.
+
+use super::edge_samples::{EdgeSamples, Images};
+use nalgebra::Vector3;
+use neat_core::LineSegment3;
+
+/// The ends of an edge are round and hidden: this share of it at each end is not asked.
+const ENDS: f64 = 0.03;
+/// A view shows a line along which edgels are at this share of the samples …
+const SHOWN: f64 = 0.6;
+/// … and parts of it from this share on.
+const PARTLY_SHOWN: f64 = 0.3;
+/// Lines beside a line that tell of chance, in pixels: farther than an edge is wide, and
+/// near enough to lie on the same thing.
+const DECOYS: [f64; 8] = [-11.0, -9.0, -7.0, -5.0, 5.0, 7.0, 9.0, 11.0];
+/// How many decoys do what by chance where none does: two decoys' worth of a flat image.
+const PRIOR_DECOYS: [f64; 3] = [0.1, 0.2, 1.7];
+/// Probability that an unhidden line is shown, partly shown, not shown: weak contrast and
+/// noise, as detections of the true edges of synthetic scenes.
+const OF_VISIBLE: [f64; 3] = [0.8, 0.13, 0.07];
+/// Probability that a line is hidden in a view beside one that shows it …
+const HIDDEN_BESIDE: f64 = 0.5;
+/// … and in any other: one sees it from its own side only.
+const HIDDEN_ELSEWHERE: f64 = 0.97;
+/// Views under at most this angle are beside each other, in degrees.
+const BESIDE: f64 = 15.0;
+/// Bounds of the probability that an edgel lies beside a sample by chance.
+const CHANCE_OF_EDGEL: [f64; 2] = [0.02, 0.8];
+
+/// A view that shows a line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Showing {
+    pub view: usize,
+    /// Probability that an edgel lies beside a sample of it by chance.
+    pub chance: f64,
+}
+
+/// What the images say about a line.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct LineEvidence {
+    /// In nats, without the two views that say most; negative if they say no.
+    pub gain: f64,
+    /// The views that show it, ascending.
+    pub showing: Vec<Showing>,
+}
+
+impl LineEvidence {
+    pub(super) fn views(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.showing.iter().map(|showing| showing.view)
+    }
+}
+
+/// What one view does with a line.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum State {
+    Shown,
+    PartlyShown,
+    NotShown,
+}
+
+impl State {
+    fn of(share: f64) -> Self {
+        match share {
+            SHOWN.. => Self::Shown,
+            PARTLY_SHOWN.. => Self::PartlyShown,
+            _ => Self::NotShown,
+        }
+    }
+}
+
+impl Images<'_> {
+    /// What all views say about a line; edgels that are `taken` do not count for it.
+    pub(super) fn evidence(
+        &self,
+        line: &LineSegment3,
+        taken: Option<&[Vec<bool>]>,
+    ) -> LineEvidence {
+        let states: Vec<(usize, State, EdgeSamples)> = (0..self.views.len())
+            .filter(|view| !self.maps[*view].is_empty())
+            .filter_map(|view| {
+                let samples = self.samples(view, line, [ENDS, 1.0 - ENDS], None)?;
+                let state = State::of(self.share(view, &samples, 0.0, taken));
+                Some((view, state, samples))
+            })
+            .collect();
+        let middle = line.point_at(0.5);
+        let toward = |view: usize| -> Vector3<f64> {
+            (self.views[view].camera.center_in_world - middle).normalize()
+        };
+        let shown: Vec<Vector3<f64>> = (states.iter())
+            .filter(|(_, state, _)| *state == State::Shown)
+            .map(|(view, ..)| toward(*view))
+            .collect();
+        let mut evidence = LineEvidence {
+            gain: f64::NEG_INFINITY,
+            showing: Vec::new(),
+        };
+        if shown.len() < 2 {
+            return evidence;
+        }
+        let min_cosine = BESIDE.to_radians().cos();
+        let mut gain = 0.0;
+        let mut best = [0.0_f64; 2];
+        for (view, state, samples) in &states {
+            if *state == State::NotShown {
+                let here = toward(*view);
+                let beside = shown.iter().any(|there| there.dot(&here) > min_cosine);
+                let hidden = if beside {
+                    HIDDEN_BESIDE
+                } else {
+                    HIDDEN_ELSEWHERE
+                };
+                let [.., by_chance] = PRIOR_DECOYS;
+                let by_chance = by_chance / PRIOR_DECOYS.iter().sum::<f64>();
+                gain += (hidden + (1.0 - hidden) * OF_VISIBLE[2] / by_chance).ln();
+                continue;
+            }
+            let (of_view, chance) = self.gain_of_view(*view, *state, samples);
+            gain += of_view;
+            if *state == State::Shown {
+                evidence.showing.push(Showing {
+                    view: *view,
+                    chance,
+                });
+                let [first, second] = best;
+                best = [first.max(of_view), first.min(of_view).max(second)];
+            }
+        }
+        evidence.gain = gain - best[0] - best[1];
+        evidence
+    }
+
+    /// What a view that shows at least parts says, and how likely an edgel lies beside a
+    /// sample by chance.
+    fn gain_of_view(&self, view: usize, state: State, samples: &EdgeSamples) -> (f64, f64) {
+        let mut decoys = PRIOR_DECOYS;
+        let mut edgels = 0.0;
+        for shift in DECOYS {
+            let share = self.share(view, samples, shift, None);
+            edgels += share;
+            decoys[State::of(share) as usize] += 1.0;
+        }
+        // A decoy that is shown whole would do for a part, too, but worse.
+        let (visible, alike) = match state {
+            State::Shown => (OF_VISIBLE[0], decoys[0]),
+            _ => (OF_VISIBLE[1], decoys[1] + 0.5 * decoys[0]),
+        };
+        let by_chance = alike / decoys.iter().sum::<f64>();
+        let gain = (HIDDEN_BESIDE + (1.0 - HIDDEN_BESIDE) * visible / by_chance).ln();
+        let chance = edgels / DECOYS.len() as f64;
+        (gain, chance.clamp(CHANCE_OF_EDGEL[0], CHANCE_OF_EDGEL[1]))
+    }
+}

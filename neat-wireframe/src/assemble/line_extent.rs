@@ -1,0 +1,94 @@
+//! From where to where along a 3D line the images show an edge.
+
+use super::edge_samples::{Images, across, project_segment};
+use super::line_evidence::Showing;
+use neat_core::LineSegment3;
+
+/// Probability that there is an edgel beside an edge that is not hidden.
+const HIT: f64 = 0.9;
+/// What a sample without an edgel says, in nats: the edge ends there, or something hides it
+/// in this view; the odds against the end are those of a view beside the line.
+const MISS: f64 = -1.2;
+/// The least that an edgel says where they are everywhere.
+const LEAST_HIT: f64 = 0.05;
+/// The line is followed by this share of its length beyond each end.
+const BEYOND: f64 = 0.5;
+/// Samples along it: one for two pixels, within these bounds.
+const PIXELS_PER_SAMPLE: f64 = 2.0;
+const COUNTS: [usize; 2] = [12, 400];
+/// A shorter stretch is noise, in samples.
+const MIN_STRETCH: usize = 3;
+
+impl Images<'_> {
+    /// The stretch of a line that the views which show it speak for most; `None` if there
+    /// is none.
+    pub(super) fn extent(&self, line: &LineSegment3, showing: &[Showing]) -> Option<LineSegment3> {
+        let length = self.projected_length(line, showing.iter().map(|s| s.view));
+        let whole = 1.0 + 2.0 * BEYOND;
+        let count = ((whole * length / PIXELS_PER_SAMPLE) as usize).clamp(COUNTS[0], COUNTS[1]);
+        let place = |k: f64| whole * k / count as f64 - BEYOND;
+        let mut gains = vec![0.0; count];
+        let direction = line.end - line.start;
+        for Showing { view, chance } in showing {
+            let hit = (HIT / chance).ln().max(LEAST_HIT);
+            for (k, gain) in gains.iter_mut().enumerate() {
+                // Long enough for a direction.
+                let middle = line.point_at(place(k as f64 + 0.5));
+                let short = LineSegment3::new(middle - 0.3 * direction, middle + 0.3 * direction);
+                let Some(projected) = project_segment(&self.views[*view], &short) else {
+                    continue;
+                };
+                let Some(pixel) =
+                    crate::projection::project_in_front(&self.views[*view].camera, &middle)
+                else {
+                    continue;
+                };
+                if let Some((_, normal)) = across(&projected)
+                    && self.is_inside(*view, &pixel)
+                {
+                    let edgel = self.edgel(*view, &pixel, &normal, self.reach);
+                    *gain += if edgel.is_some() { hit } else { MISS };
+                }
+            }
+        }
+        let [start, end] = best_stretch(&gains);
+        (end >= start + MIN_STRETCH).then(|| {
+            LineSegment3::new(
+                line.point_at(place(start as f64)),
+                line.point_at(place(end as f64)),
+            )
+        })
+    }
+}
+
+/// The stretch with the largest sum (Bentley, *Programming Pearls*, 1984).
+fn best_stretch(gains: &[f64]) -> [usize; 2] {
+    let (mut best, mut best_range) = (0.0, [0, 0]);
+    let (mut sum, mut start) = (0.0, 0);
+    for (k, gain) in gains.iter().enumerate() {
+        if sum <= 0.0 {
+            (sum, start) = (0.0, k);
+        }
+        sum += gain;
+        if sum > best {
+            (best, best_range) = (sum, [start, k + 1]);
+        }
+    }
+    best_range
+}
+
+#[cfg(test)]
+mod tests {
+    use super::best_stretch;
+
+    #[test]
+    fn the_best_stretch_bridges_what_costs_less_than_it_brings() {
+        assert_eq!(
+            best_stretch(&[-1.0, 2.0, 2.0, -1.0, 3.0, -4.0, 5.0]),
+            [1, 7]
+        );
+        assert_eq!(best_stretch(&[-1.0, 2.0, -5.0, 3.0, -1.0]), [3, 4]);
+        assert_eq!(best_stretch(&[-1.0, -2.0]), [0, 0]);
+        assert_eq!(best_stretch(&[]), [0, 0]);
+    }
+}

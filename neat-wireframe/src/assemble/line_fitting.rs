@@ -1,0 +1,146 @@
+//! A 3D line through the edgels beside its projections, in all views at once.
+
+use super::edge_samples::Images;
+use super::projected_line::ProjectedLine;
+use super::view_segments::TrackView;
+use crate::solve::{Cauchy, LeastSquares, Options, minimise};
+use nalgebra::{Matrix3x2, Matrix4, Vector2, Vector3, Vector4};
+use neat_core::LineSegment3;
+
+/// Fewer edgels determine no line in space.
+const MIN_EDGELS: usize = 8;
+/// Scale of the Cauchy loss, as a share of the reach: edgels near its end are likelier
+/// those of something else.
+const LOSS_SCALE: f64 = 0.6;
+const OPTIONS: Options = Options {
+    max_iterations: 10,
+    max_attempts: 6,
+    initial_damping: 1e-3,
+    min_damping: 1e-9,
+    decrease: 0.2,
+    relative_tolerance: 1e-4,
+};
+
+impl Images<'_> {
+    /// The line through the edgels within `reach` pixels beside `line` in `views`. Its ends
+    /// move across it only.
+    pub(super) fn fit(
+        &self,
+        line: &LineSegment3,
+        views: impl Iterator<Item = usize>,
+        reach: f64,
+    ) -> LineSegment3 {
+        let mut observations = Vec::new();
+        for view in views {
+            let edgels = self.edgels_beside(view, line, reach);
+            // Errors of one view are alike: it weighs as the root of its samples.
+            let weight = (edgels.len() as f64).sqrt().recip();
+            let observed = edgels.into_iter().map(|pixel| Observation {
+                view,
+                pixel,
+                weight,
+            });
+            observations.extend(observed);
+        }
+        if observations.len() < MIN_EDGELS {
+            return *line;
+        }
+        let problem = LineProblem {
+            views: self.views,
+            observations,
+            loss: Cauchy {
+                scale: LOSS_SCALE * self.reach,
+            },
+        };
+        minimise(&problem, *line, &OPTIONS).0
+    }
+}
+
+/// An edgel of the line.
+struct Observation {
+    view: usize,
+    pixel: Vector2<f64>,
+    weight: f64,
+}
+
+struct LineProblem<'a> {
+    views: &'a [TrackView],
+    /// By view.
+    observations: Vec<Observation>,
+    loss: Cauchy,
+}
+
+struct LineEquations {
+    across: Matrix3x2<f64>,
+    hessian: Matrix4<f64>,
+    gradient: Vector4<f64>,
+}
+
+impl LeastSquares for LineProblem<'_> {
+    type State = LineSegment3;
+    type Equations = LineEquations;
+
+    fn cost(&self, line: &LineSegment3) -> f64 {
+        let of_view = |observations: &[Observation]| {
+            let camera = &self.views[observations[0].view].camera;
+            ProjectedLine::new(camera, line).map_or(f64::INFINITY, |line| {
+                let cost = |o: &Observation| o.weight * self.loss.cost(line.distance(&o.pixel));
+                observations.iter().map(cost).sum()
+            })
+        };
+        (self.observations)
+            .chunk_by(|a, b| a.view == b.view)
+            .map(of_view)
+            .sum()
+    }
+
+    fn linearise(&self, line: &LineSegment3) -> Option<LineEquations> {
+        let across = directions_across(line)?;
+        let mut hessian = Matrix4::zeros();
+        let mut gradient = Vector4::zeros();
+        for observations in self.observations.chunk_by(|a, b| a.view == b.view) {
+            let camera = &self.views[observations[0].view].camera;
+            let projected = ProjectedLine::new(camera, line)?;
+            for Observation { pixel, weight, .. } in observations {
+                let found = projected.distance_with_gradient(camera, pixel);
+                let [start, end] = found.by_points.map(|by_point| across.tr_mul(&by_point));
+                let row = Vector4::new(start.x, start.y, end.x, end.y);
+                let robust = weight * self.loss.weight(found.distance * found.distance);
+                hessian += robust * row * row.transpose();
+                gradient += robust * found.distance * row;
+            }
+        }
+        Some(LineEquations {
+            across,
+            hessian,
+            gradient,
+        })
+    }
+
+    fn step(
+        &self,
+        line: &LineSegment3,
+        equations: &LineEquations,
+        damping: f64,
+    ) -> Option<LineSegment3> {
+        let LineEquations {
+            across,
+            hessian,
+            gradient,
+        } = equations;
+        let damped = hessian + Matrix4::from_diagonal(&hessian.diagonal()) * damping;
+        let step = damped.cholesky()?.solve(gradient);
+        Some(LineSegment3::new(
+            line.start - across * step.fixed_rows::<2>(0),
+            line.end - across * step.fixed_rows::<2>(2),
+        ))
+    }
+}
+
+/// Two directions perpendicular to a line and to each other.
+pub(super) fn directions_across(line: &LineSegment3) -> Option<Matrix3x2<f64>> {
+    let direction = (line.end - line.start).try_normalize(1e-12)?;
+    let side = Vector3::ith(direction.iamin(), 1.0);
+    let first = direction.cross(&side).normalize();
+    Some(Matrix3x2::from_columns(&[first, direction.cross(&first)]))
+}

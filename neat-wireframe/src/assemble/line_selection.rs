@@ -1,0 +1,299 @@
+//! Lines chosen one after the other, the best explained first, each by edgels that no line
+//! before it has.
+
+use super::config::AssembleConfig;
+use super::edge_samples::{Images, median, project_segment};
+use super::hypothesis_scoring::Alternatives;
+use super::line_evidence::LineEvidence;
+use super::projected_line::ProjectedLine;
+use super::view_segments::SegmentId;
+use neat_core::{LineSegment2, LineSegment3};
+use rayon::prelude::*;
+use std::collections::BinaryHeap;
+
+/// An edgel may be off by so many standard deviations of edgels: 99.7 % are not.
+const REACH_NOISES: f64 = 3.0;
+/// Bounds of the reach in pixels: rounding and rendering, and edges side by side.
+const REACH_BOUNDS: [f64; 2] = [0.25, 1.5];
+/// The reach before the noise is known, in pixels.
+const FIRST_REACH: f64 = 1.0;
+/// So many lines tell of the noise.
+const LINES_FOR_NOISE: usize = 100;
+/// Of so many 2D segments one proposes lines for the noise.
+const SEGMENTS_FOR_NOISE: usize = 4;
+/// Edgels within so many pixels of a line tell of the noise.
+const NOISE_REACH: f64 = 2.0;
+/// Fewer do not.
+const MIN_EDGELS_FOR_NOISE: usize = 20;
+/// The noise where no line tells of it, in pixels.
+const USUAL_NOISE: f64 = 0.3;
+/// Standard deviation of a normal distribution by its median absolute value.
+const DEVIATION_BY_MEDIAN: f64 = 1.4826;
+/// Reaches of the rounds of fitting: the first line is a guess.
+const FITTING_REACHES: [f64; 3] = [1.3, 1.0, 1.0];
+/// An evidence that others have lowered by more goes back into the queue, in nats.
+const STALE: f64 = 0.5;
+/// A line has the edgels beside it whose normals have this cosine to its own …
+const CLAIM_COSINE: f64 = 0.8;
+/// … at so many samples for each of its pixels.
+const CLAIM_DENSITY: f64 = 2.0;
+/// 2D segments whose ends lie within so many reaches of a line are its own: they propose
+/// nothing else.
+const SEGMENT_REACHES: f64 = 2.0;
+
+/// A line with what speaks for it.
+#[derive(Clone, Debug)]
+pub(super) struct ChosenLine {
+    pub line: LineSegment3,
+    pub evidence: LineEvidence,
+}
+
+/// Lines, and how they came about.
+pub(super) struct Selection<'a> {
+    /// The images with the reach that their noise asks for.
+    pub images: Images<'a>,
+    pub noise: f64,
+    pub lines: Vec<ChosenLine>,
+    /// Lines that the images show and that stand for curves.
+    pub curved: usize,
+}
+
+/// A 3D position of a 2D segment.
+struct Candidate {
+    segment: SegmentId,
+    line: LineSegment3,
+}
+
+/// Chooses the lines that the images show, of all positions of all 2D segments.
+pub(super) fn select_lines<'a>(
+    images: Images<'a>,
+    alternatives: &Alternatives,
+    config: &AssembleConfig,
+) -> Selection<'a> {
+    let first = Images {
+        reach: FIRST_REACH,
+        ..images
+    };
+    let some = candidates(&first, alternatives, SEGMENTS_FOR_NOISE);
+    let sure = choose(
+        first,
+        &some,
+        config.min_evidence,
+        LINES_FOR_NOISE,
+        USUAL_NOISE,
+    );
+    let noise = noise_of_edgels(&first, &sure.lines);
+    let reach = (REACH_NOISES * noise).clamp(REACH_BOUNDS[0], REACH_BOUNDS[1]);
+    let images = Images { reach, ..images };
+    let all = candidates(&images, alternatives, 1);
+    tracing::debug!(noise, candidates = all.len(), "lines are proposed");
+    choose(images, &all, config.min_evidence, usize::MAX, noise)
+}
+
+/// The candidates of one of `step` segments of each view.
+fn candidates(images: &Images, alternatives: &Alternatives, step: usize) -> Vec<Candidate> {
+    let mut candidates = Vec::new();
+    for (view, lists) in alternatives.iter().enumerate() {
+        for (segment, list) in lists.iter().enumerate().step_by(step) {
+            candidates.extend(list.iter().map(|hypothesis| Candidate {
+                segment: SegmentId { view, segment },
+                line: images.views[view].back_project(segment, hypothesis.depths),
+            }));
+        }
+    }
+    candidates
+}
+
+/// The median over lines of the standard deviation of their edgels, in pixels; lines that
+/// stand for curves do not count.
+fn noise_of_edgels(images: &Images, lines: &[ChosenLine]) -> f64 {
+    let deviations: Vec<f64> = lines
+        .par_iter()
+        .filter_map(|chosen| {
+            let mut distances = Vec::new();
+            for view in chosen.evidence.views() {
+                let camera = &images.views[view].camera;
+                if let Some(projected) = ProjectedLine::new(camera, &chosen.line) {
+                    let edgels = images.edgels_beside(view, &chosen.line, NOISE_REACH);
+                    distances.extend(edgels.iter().map(|pixel| projected.distance(pixel).abs()));
+                }
+            }
+            (distances.len() >= MIN_EDGELS_FOR_NOISE)
+                .then(|| DEVIATION_BY_MEDIAN * median(distances))
+        })
+        .collect();
+    if deviations.is_empty() {
+        USUAL_NOISE
+    } else {
+        median(deviations)
+    }
+}
+
+/// A candidate by its evidence; the first of equals is the larger.
+struct Ranked(f64, usize);
+
+impl PartialEq for Ranked {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Ranked {}
+
+impl PartialOrd for Ranked {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Ranked {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        (self.0.total_cmp(&other.0)).then(other.1.cmp(&self.1))
+    }
+}
+
+fn choose<'a>(
+    images: Images<'a>,
+    candidates: &[Candidate],
+    min_evidence: f64,
+    most: usize,
+    noise: f64,
+) -> Selection<'a> {
+    let gains: Vec<f64> = candidates
+        .par_iter()
+        .map(|candidate| images.evidence(&candidate.line, None).gain)
+        .collect();
+    let mut queue: BinaryHeap<Ranked> = (gains.iter().enumerate())
+        .filter(|(_, gain)| **gain > min_evidence)
+        .map(|(index, gain)| Ranked(*gain, index))
+        .collect();
+    let mut chooser = Chooser {
+        images,
+        min_evidence,
+        noise,
+        taken: images
+            .maps
+            .iter()
+            .map(|map| vec![false; map.len()])
+            .collect(),
+        explained: (images.views.iter())
+            .map(|view| vec![false; view.segments.len()])
+            .collect(),
+    };
+    let (mut lines, mut curved) = (Vec::new(), 0);
+    while let Some(Ranked(gain, index)) = queue.pop() {
+        let Candidate { segment, line } = &candidates[index];
+        if lines.len() >= most {
+            break;
+        }
+        if chooser.explained[segment.view][segment.segment] {
+            continue;
+        }
+        let evidence = images.evidence(line, Some(&chooser.taken));
+        if evidence.gain <= min_evidence {
+            continue;
+        }
+        if evidence.gain < gain - STALE {
+            queue.push(Ranked(evidence.gain, index));
+            continue;
+        }
+        let Some(found) = chooser.settle(line, evidence) else {
+            continue;
+        };
+        chooser.claim(&found, *segment);
+        if images.is_curved(&found.line, &found.evidence, noise) {
+            curved += 1;
+        } else {
+            lines.push(found);
+        }
+    }
+    Selection {
+        images,
+        noise,
+        lines,
+        curved,
+    }
+}
+
+struct Chooser<'a> {
+    images: Images<'a>,
+    min_evidence: f64,
+    noise: f64,
+    /// For each edgel of each view, whether a line has it.
+    taken: Vec<Vec<bool>>,
+    /// For each 2D segment of each view, whether it lies on a line.
+    explained: Vec<Vec<bool>>,
+}
+
+impl Chooser<'_> {
+    /// The line through the edgels beside a candidate, as far as they reach and are
+    /// straight; `None` if too little speaks for it.
+    fn settle(&self, line: &LineSegment3, mut evidence: LineEvidence) -> Option<ChosenLine> {
+        let images = &self.images;
+        let mut line = *line;
+        for share in FITTING_REACHES {
+            line = images.fit(&line, evidence.views(), share * images.reach);
+            line = images.extent(&line, &evidence.showing)?;
+            evidence = images.evidence(&line, Some(&self.taken));
+            if evidence.gain <= self.min_evidence {
+                return None;
+            }
+        }
+        let straight = images.straight_stretch(&line, &evidence, self.noise);
+        if let Some(straight) = straight.filter(|straight| *straight != line) {
+            let straight = images.fit(&straight, evidence.views(), images.reach);
+            let of_straight = images.evidence(&straight, Some(&self.taken));
+            if of_straight.gain > self.min_evidence {
+                (line, evidence) = (straight, of_straight);
+            }
+        }
+        Some(ChosenLine { line, evidence })
+    }
+
+    /// Takes the edgels and 2D segments beside a line, in all views: where something hides
+    /// the middle of an edge, its ends are still its own.
+    fn claim(&mut self, found: &ChosenLine, seed: SegmentId) {
+        let images = self.images;
+        self.explained[seed.view][seed.segment] = true;
+        for (view, prepared) in images.views.iter().enumerate() {
+            let Some(projected) = project_segment(prepared, &found.line) else {
+                continue;
+            };
+            let count = (CLAIM_DENSITY * projected.length())
+                .ceil()
+                .clamp(8.0, 4000.0);
+            let range = [0.0, 1.0];
+            let Some(samples) = images.samples(view, &found.line, range, Some(count as usize))
+            else {
+                continue;
+            };
+            let taken = &mut self.taken[view];
+            for (_, pixel) in &samples.points {
+                while let Some((_, edgel)) = images.maps[view].nearest(
+                    pixel,
+                    &samples.normal,
+                    images.reach,
+                    CLAIM_COSINE,
+                    |edgel| !taken[edgel],
+                ) {
+                    taken[edgel] = true;
+                }
+            }
+            for segment in prepared.index.near(&projected) {
+                let detected = &prepared.segments[segment].segment;
+                if lies_on(detected, &projected, SEGMENT_REACHES * images.reach) {
+                    self.explained[view][segment] = true;
+                }
+            }
+        }
+    }
+}
+
+/// Whether a 2D segment lies on another, for the most part of its length.
+fn lies_on(segment: &LineSegment2, on: &LineSegment2, reach: f64) -> bool {
+    let places = segment.ends().map(|end| on.line_parameter(&end));
+    let near = (segment.ends().iter().zip(places))
+        .all(|(end, place)| (end - on.point_at(place)).norm() <= reach);
+    let [low, high] = [places[0].min(places[1]), places[0].max(places[1])];
+    near && high.min(1.0) - low.max(0.0) >= 0.5 * (high - low)
+}

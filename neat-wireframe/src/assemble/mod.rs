@@ -1,0 +1,135 @@
+//! The assembler: from posed views with 2D segments and edgels to the wireframe that the
+//! images show.
+//!
+//! The 2D segments propose lines in space, matched across views by the epipolar geometry
+//! (Hofer, Maurer and Bischof, *Efficient 3D scene abstraction using line segments*,
+//! Line3D++, 2017). The images decide: the line that they speak for most is fitted to the
+//! edgels of all views at once, takes them, and the next one is chosen by those that are
+//! left. Lines that bend are curves. Ends that meet become corners, all corners are fitted
+//! to the edgels together, and edges are cut where others end on them.
+//!
+//! Nothing is compared with pixels as such: edgels are so noisy as the scene's poses and
+//! images make them, which the first lines tell, and every tolerance follows from that.
+//! All steps work in a world whose scene ball is the unit ball around the origin.
+
+mod collinear_pieces;
+mod config;
+mod corners;
+mod edge_cutting;
+mod edge_samples;
+mod epipolar_matching;
+mod graph_fitting;
+mod graph_segmentation;
+mod hypothesis_scoring;
+mod line3d;
+mod line_evidence;
+mod line_extent;
+mod line_fitting;
+mod line_selection;
+mod neighbours;
+mod projected_line;
+mod report;
+mod straightness;
+mod view_segments;
+
+pub use config::AssembleConfig;
+pub use line3d::{Line3dConfig, Line3dSegment, SegmentSupport, line3d, wireframe_of_segments};
+pub use report::{AssembleReport, Assembled};
+
+use crate::ViewObservation;
+use collinear_pieces::merge_pieces;
+use corners::find_corners;
+use edge_cutting::cut_edges;
+use edge_samples::Images;
+use graph_fitting::fit_graph;
+use hypothesis_scoring::{Scoring, score_hypotheses};
+use line_selection::select_lines;
+use neat_core::{EdgelMap, LineSegment2};
+use rayon::prelude::*;
+use view_segments::TrackView;
+
+/// Views that must agree on a position for it to be proposed; the images decide.
+const MIN_VIEWS: usize = 2;
+
+/// Builds the wireframe.
+///
+/// - `observations`: cameras and detected segments. Views without a valid camera do not
+///   count.
+/// - `edgels`: those of each image, as `neat_detect::edgel_map` finds them. Without any, the
+///   segments stand for them.
+/// - `scene_radius`: radius of the ball around the world's origin in which the structure
+///   lies.
+///
+/// The result is empty where nothing can be built: too few usable views, a radius that is
+/// not a positive number, edgels of another number of views. It does not depend on the
+/// number of threads.
+pub fn assemble(
+    observations: &[ViewObservation],
+    edgels: &[EdgelMap],
+    scene_radius: f64,
+    config: &AssembleConfig,
+) -> Assembled {
+    let usable = scene_radius.is_normal() && scene_radius > 0.0;
+    if !usable || !(edgels.is_empty() || edgels.len() == observations.len()) {
+        return Assembled::default();
+    }
+    let _span = tracing::debug_span!("assemble", views = observations.len()).entered();
+    let views: Vec<TrackView> = (observations.par_iter())
+        .map(|observation| {
+            let min_length = config.min_segment_length_in_pixels;
+            TrackView::new(observation, scene_radius.recip(), min_length)
+        })
+        .collect();
+    let of_segments: Vec<EdgelMap>;
+    let maps = if edgels.is_empty() {
+        of_segments = views.iter().map(edgels_of_segments).collect();
+        &of_segments
+    } else {
+        edgels
+    };
+    let neighbours = neighbours::neighbours(&views, config.ball_margin, config.neighbours);
+    let scoring = Scoring::default();
+    let margin = config.ball_margin;
+    let alternatives = score_hypotheses(&views, &neighbours, margin, MIN_VIEWS, &scoring);
+    let mut report = AssembleReport {
+        usable_views: views
+            .iter()
+            .filter(|view| !view.segments.is_empty())
+            .count(),
+        usable_segments: views.iter().map(|view| view.segments.len()).sum(),
+        edgels: maps.iter().map(EdgelMap::len).sum(),
+        segments_with_hypotheses: (alternatives.iter().flatten())
+            .filter(|list| !list.is_empty())
+            .count(),
+        ..AssembleReport::default()
+    };
+
+    let images = Images {
+        views: &views,
+        maps,
+        reach: 0.0,
+    };
+    let selection = select_lines(images, &alternatives, config);
+    drop(alternatives);
+    let images = selection.images;
+    report.noise_in_pixels = selection.noise;
+    report.lines = selection.lines.len();
+    report.curved_lines = selection.curved;
+
+    let lines = merge_pieces(&images, selection.lines);
+    report.merged_pieces = report.lines - lines.len();
+    let mut corners = find_corners(&images, &lines);
+    report.ends = corners.junctions.len();
+    fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
+    let wireframe = cut_edges(&images, corners).map(|junction| junction * scene_radius);
+    report.junctions = wireframe.junctions.len();
+    report.edges = wireframe.edges.len();
+    tracing::debug!(?report, "assembled");
+    Assembled { wireframe, report }
+}
+
+/// The edgels of a view that is known by its segments only.
+fn edgels_of_segments(view: &TrackView) -> EdgelMap {
+    let segments: Vec<LineSegment2> = view.segments.iter().map(|s| s.segment).collect();
+    EdgelMap::of_segments(&segments, view.camera.width, view.camera.height)
+}

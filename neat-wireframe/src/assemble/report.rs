@@ -1,0 +1,40 @@
+//! What the assembler returns.
+
+use crate::Wireframe3d;
+use serde::{Deserialize, Serialize};
+
+/// A wireframe, and how it came about.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Assembled {
+    /// Junctions in lexicographic order of their coordinates; edges `[a, b]`, a < b, sorted.
+    pub wireframe: Wireframe3d,
+    /// What each step found.
+    pub report: AssembleReport,
+}
+
+/// What each step of [`super::assemble`] found, in the order of the steps.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AssembleReport {
+    /// Views with a camera that can be used.
+    pub usable_views: usize,
+    /// 2D segments that propose lines.
+    pub usable_segments: usize,
+    /// Points of edges in all images.
+    pub edgels: usize,
+    /// 2D segments with a position in space.
+    pub segments_with_hypotheses: usize,
+    /// Standard deviation of edgels from the lines, in pixels.
+    pub noise_in_pixels: f64,
+    /// Straight lines that the images show …
+    pub lines: usize,
+    /// … and those that stand for curves, and are left out.
+    pub curved_lines: usize,
+    /// Lines that were pieces of others.
+    pub merged_pieces: usize,
+    /// Places where lines end, alone or together.
+    pub ends: usize,
+    /// Junctions of the wireframe.
+    pub junctions: usize,
+    /// Edges of the wireframe.
+    pub edges: usize,
+}
