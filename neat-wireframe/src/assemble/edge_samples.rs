@@ -100,15 +100,9 @@ impl Images<'_> {
         let offset = samples.normal * shift;
         let is_free = |index: usize| taken.is_none_or(|taken| !taken[view][index]);
         let hits = samples.points.iter().filter(|(_, pixel)| {
-            self.maps[view]
-                .nearest(
-                    &(pixel + offset),
-                    &samples.normal,
-                    self.reach,
-                    MIN_COSINE,
-                    is_free,
-                )
-                .is_some()
+            let place = pixel + offset;
+            let normal = &samples.normal;
+            (self.maps[view].nearest(&place, normal, self.reach, MIN_COSINE, is_free)).is_some()
         });
         hits.count() as f64 / samples.points.len() as f64
     }

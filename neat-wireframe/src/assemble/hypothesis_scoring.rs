@@ -24,7 +24,7 @@ impl Default for Scoring {
     fn default() -> Self {
         Self {
             tolerance_in_pixels: 3.0,
-            alternatives: 4,
+            alternatives: 2,
         }
     }
 }

@@ -75,12 +75,31 @@ impl State {
     }
 }
 
+/// What a view in this state says, by how often lines beside it are in which state.
+fn gain_of_state(state: State, decoys: [f64; 3]) -> f64 {
+    // A decoy that is shown whole would do for a part, too, but worse.
+    let (visible, alike) = match state {
+        State::Shown => (OF_VISIBLE[0], decoys[0]),
+        _ => (OF_VISIBLE[1], decoys[1] + 0.5 * decoys[0]),
+    };
+    let by_chance = alike / decoys.iter().sum::<f64>();
+    (HIDDEN_BESIDE + (1.0 - HIDDEN_BESIDE) * visible / by_chance).ln()
+}
+
+/// The most that a view in this state can say: no decoy is.
+fn most_of_view(state: State) -> f64 {
+    let [shown, partly, not] = PRIOR_DECOYS;
+    gain_of_state(state, [shown, partly, not + DECOYS.len() as f64])
+}
+
 impl Images<'_> {
-    /// What all views say about a line; edgels that are `taken` do not count for it.
+    /// What all views say about a line; edgels that are `taken` do not count for it. Where it
+    /// cannot be more than `least`, it is as good as nothing.
     pub(super) fn evidence(
         &self,
         line: &LineSegment3,
         taken: Option<&[Vec<bool>]>,
+        least: f64,
     ) -> LineEvidence {
         let states: Vec<(usize, State, EdgeSamples)> = (0..self.views.len())
             .filter(|view| !self.maps[*view].is_empty())
@@ -102,7 +121,13 @@ impl Images<'_> {
             gain: f64::NEG_INFINITY,
             showing: Vec::new(),
         };
-        if shown.len() < 2 {
+        // The most that views can say: most lines that are none end here.
+        let partly = (states.iter())
+            .filter(|(_, state, _)| *state == State::PartlyShown)
+            .count();
+        let most = shown.len().saturating_sub(2) as f64 * most_of_view(State::Shown)
+            + partly as f64 * most_of_view(State::PartlyShown);
+        if most <= least {
             return evidence;
         }
         let min_cosine = BESIDE.to_radians().cos();
@@ -147,14 +172,48 @@ impl Images<'_> {
             edgels += share;
             decoys[State::of(share) as usize] += 1.0;
         }
-        // A decoy that is shown whole would do for a part, too, but worse.
-        let (visible, alike) = match state {
-            State::Shown => (OF_VISIBLE[0], decoys[0]),
-            _ => (OF_VISIBLE[1], decoys[1] + 0.5 * decoys[0]),
-        };
-        let by_chance = alike / decoys.iter().sum::<f64>();
-        let gain = (HIDDEN_BESIDE + (1.0 - HIDDEN_BESIDE) * visible / by_chance).ln();
+        let gain = gain_of_state(state, decoys);
         let chance = edgels / DECOYS.len() as f64;
         (gain, chance.clamp(CHANCE_OF_EDGEL[0], CHANCE_OF_EDGEL[1]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::assemble::test_cube::{CubeViews, cube_edge};
+    use nalgebra::Vector3;
+    use neat_core::LineSegment3;
+
+    #[test]
+    fn views_speak_for_edges_and_against_what_is_none() {
+        let cube = CubeViews::new(20);
+        let images = cube.images();
+        for edge in 0..12 {
+            let found = images.evidence(&cube_edge(edge), None, 0.0);
+            assert!(found.gain > 20.0, "{}", found.gain);
+            assert!(found.showing.len() >= 18);
+        }
+        // The diagonal; an edge at the wrong depth for all views but two.
+        let diagonal = LineSegment3::new(cube_edge(0).start, -cube_edge(0).start);
+        assert!(images.evidence(&diagonal, None, 0.0).gain < 0.0);
+        let moved = cube_edge(0).map(|end| end + Vector3::new(0.05, -0.04, 0.03));
+        assert!(images.evidence(&moved, None, 0.0).gain < 0.0);
+    }
+
+    #[test]
+    fn edgels_of_other_lines_do_not_count() {
+        let cube = CubeViews::new(12);
+        let images = cube.images();
+        let taken: Vec<Vec<bool>> = images
+            .maps
+            .iter()
+            .map(|map| vec![true; map.len()])
+            .collect();
+        assert!(
+            images
+                .evidence(&cube_edge(3), Some(&taken), 0.0)
+                .showing
+                .is_empty()
+        );
     }
 }

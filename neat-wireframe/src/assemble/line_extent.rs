@@ -2,6 +2,7 @@
 
 use super::edge_samples::{Images, across, project_segment};
 use super::line_evidence::Showing;
+use crate::projection::project_in_front;
 use neat_core::LineSegment3;
 
 /// Probability that there is an edgel beside an edge that is not hidden.
@@ -28,24 +29,17 @@ impl Images<'_> {
         let count = ((whole * length / PIXELS_PER_SAMPLE) as usize).clamp(COUNTS[0], COUNTS[1]);
         let place = |k: f64| whole * k / count as f64 - BEYOND;
         let mut gains = vec![0.0; count];
-        let direction = line.end - line.start;
         for Showing { view, chance } in showing {
+            let prepared = &self.views[*view];
+            let Some((_, normal)) = project_segment(prepared, line).as_ref().and_then(across)
+            else {
+                continue;
+            };
             let hit = (HIT / chance).ln().max(LEAST_HIT);
             for (k, gain) in gains.iter_mut().enumerate() {
-                // Long enough for a direction.
-                let middle = line.point_at(place(k as f64 + 0.5));
-                let short = LineSegment3::new(middle - 0.3 * direction, middle + 0.3 * direction);
-                let Some(projected) = project_segment(&self.views[*view], &short) else {
-                    continue;
-                };
-                let Some(pixel) =
-                    crate::projection::project_in_front(&self.views[*view].camera, &middle)
-                else {
-                    continue;
-                };
-                if let Some((_, normal)) = across(&projected)
-                    && self.is_inside(*view, &pixel)
-                {
+                let point = line.point_at(place(k as f64 + 0.5));
+                let pixel = project_in_front(&prepared.camera, &point);
+                if let Some(pixel) = pixel.filter(|pixel| self.is_inside(*view, pixel)) {
                     let edgel = self.edgel(*view, &pixel, &normal, self.reach);
                     *gain += if edgel.is_some() { hit } else { MISS };
                 }
@@ -80,6 +74,8 @@ fn best_stretch(gains: &[f64]) -> [usize; 2] {
 #[cfg(test)]
 mod tests {
     use super::best_stretch;
+    use crate::assemble::test_cube::{CubeViews, cube_edge, end_distance};
+    use neat_core::LineSegment3;
 
     #[test]
     fn the_best_stretch_bridges_what_costs_less_than_it_brings() {
@@ -90,5 +86,16 @@ mod tests {
         assert_eq!(best_stretch(&[-1.0, 2.0, -5.0, 3.0, -1.0]), [3, 4]);
         assert_eq!(best_stretch(&[-1.0, -2.0]), [0, 0]);
         assert_eq!(best_stretch(&[]), [0, 0]);
+    }
+
+    #[test]
+    fn a_piece_of_an_edge_grows_to_all_of_it() {
+        let cube = CubeViews::new(16);
+        let images = cube.images();
+        let truth = cube_edge(4);
+        let part = LineSegment3::new(truth.point_at(0.3), truth.point_at(0.9));
+        let showing = images.evidence(&part, None, 0.0).showing;
+        let grown = images.extent(&part, &showing).unwrap();
+        assert!(end_distance(&grown, &truth) < 0.02);
     }
 }

@@ -144,3 +144,68 @@ pub(super) fn directions_across(line: &LineSegment3) -> Option<Matrix3x2<f64>> {
     let first = direction.cross(&side).normalize();
     Some(Matrix3x2::from_columns(&[first, direction.cross(&first)]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::test_cube::{CubeViews, cube_edge};
+
+    #[test]
+    fn a_line_beside_an_edge_comes_to_lie_on_it() {
+        let cube = CubeViews::new(12);
+        let images = cube.images();
+        let truth = cube_edge(5);
+        let offset = Vector3::new(0.004, -0.003, 0.002);
+        let beside = LineSegment3::new(truth.start + offset, truth.end - offset);
+        let fitted = images.fit(&beside, 0..12, 4.0);
+        for end in truth.ends() {
+            let foot = fitted.point_at(fitted.line_parameter(&end));
+            assert!((foot - end).norm() < 1e-4, "{}", (foot - end).norm());
+        }
+        // Nothing to go by: it stays.
+        let far = truth.map(|end| end * 5.0);
+        assert_eq!(images.fit(&far, 0..12, 1.0), far);
+    }
+
+    #[test]
+    fn gradients_agree_with_finite_differences() {
+        let cube = CubeViews::new(5);
+        let images = cube.images();
+        let line = cube_edge(2).map(|end| end + Vector3::new(0.002, 0.001, -0.003));
+        let observations = (0..5)
+            .flat_map(|view| {
+                let edgels = images.edgels_beside(view, &line, 4.0);
+                edgels.into_iter().map(move |pixel| Observation {
+                    view,
+                    pixel,
+                    weight: 0.5,
+                })
+            })
+            .collect();
+        let problem = LineProblem {
+            views: images.views,
+            observations,
+            loss: Cauchy { scale: 1.0 },
+        };
+        let equations = problem.linearise(&line).unwrap();
+        let step = 1e-6;
+        for k in 0..4 {
+            let moved = |sign: f64| {
+                let mut shift = Vector4::zeros();
+                shift[k] = sign * step;
+                let across = equations.across;
+                problem.cost(&LineSegment3::new(
+                    line.start + across * shift.fixed_rows::<2>(0),
+                    line.end + across * shift.fixed_rows::<2>(2),
+                ))
+            };
+            let numeric = (moved(1.0) - moved(-1.0)) / (2.0 * step);
+            // The cost of a residual r near 0 is r² / 2 or r², as the driver has it.
+            let ratio = numeric / equations.gradient[k];
+            assert!(
+                (ratio - 1.0).abs() < 1e-4 || (ratio - 2.0).abs() < 1e-4,
+                "{ratio}"
+            );
+        }
+    }
+}

@@ -27,6 +27,8 @@ const NOISE_REACH: f64 = 2.0;
 const MIN_EDGELS_FOR_NOISE: usize = 20;
 /// The noise where no line tells of it, in pixels.
 const USUAL_NOISE: f64 = 0.3;
+/// The least noise, in pixels: a bow of more tells of a curve, not of noise.
+const LEAST_NOISE: f64 = 0.05;
 /// Standard deviation of a normal distribution by its median absolute value.
 const DEVIATION_BY_MEDIAN: f64 = 1.4826;
 /// Reaches of the rounds of fitting: the first line is a guess.
@@ -80,7 +82,7 @@ pub(super) fn select_lines<'a>(
         &some,
         config.min_evidence,
         LINES_FOR_NOISE,
-        USUAL_NOISE,
+        LEAST_NOISE,
     );
     let noise = noise_of_edgels(&first, &sure.lines);
     let reach = (REACH_NOISES * noise).clamp(REACH_BOUNDS[0], REACH_BOUNDS[1]);
@@ -161,7 +163,7 @@ fn choose<'a>(
 ) -> Selection<'a> {
     let gains: Vec<f64> = candidates
         .par_iter()
-        .map(|candidate| images.evidence(&candidate.line, None).gain)
+        .map(|candidate| images.evidence(&candidate.line, None, min_evidence).gain)
         .collect();
     let mut queue: BinaryHeap<Ranked> = (gains.iter().enumerate())
         .filter(|(_, gain)| **gain > min_evidence)
@@ -170,7 +172,6 @@ fn choose<'a>(
     let mut chooser = Chooser {
         images,
         min_evidence,
-        noise,
         taken: images
             .maps
             .iter()
@@ -189,7 +190,7 @@ fn choose<'a>(
         if chooser.explained[segment.view][segment.segment] {
             continue;
         }
-        let evidence = images.evidence(line, Some(&chooser.taken));
+        let evidence = images.evidence(line, Some(&chooser.taken), min_evidence);
         if evidence.gain <= min_evidence {
             continue;
         }
@@ -218,7 +219,6 @@ fn choose<'a>(
 struct Chooser<'a> {
     images: Images<'a>,
     min_evidence: f64,
-    noise: f64,
     /// For each edgel of each view, whether a line has it.
     taken: Vec<Vec<bool>>,
     /// For each 2D segment of each view, whether it lies on a line.
@@ -226,32 +226,24 @@ struct Chooser<'a> {
 }
 
 impl Chooser<'_> {
-    /// The line through the edgels beside a candidate, as far as they reach and are
-    /// straight; `None` if too little speaks for it.
+    /// The line through the edgels beside a candidate, as far as they reach; `None` if too
+    /// little speaks for it.
     fn settle(&self, line: &LineSegment3, mut evidence: LineEvidence) -> Option<ChosenLine> {
         let images = &self.images;
         let mut line = *line;
         for share in FITTING_REACHES {
             line = images.fit(&line, evidence.views(), share * images.reach);
             line = images.extent(&line, &evidence.showing)?;
-            evidence = images.evidence(&line, Some(&self.taken));
+            evidence = images.evidence(&line, Some(&self.taken), self.min_evidence);
             if evidence.gain <= self.min_evidence {
                 return None;
-            }
-        }
-        let straight = images.straight_stretch(&line, &evidence, self.noise);
-        if let Some(straight) = straight.filter(|straight| *straight != line) {
-            let straight = images.fit(&straight, evidence.views(), images.reach);
-            let of_straight = images.evidence(&straight, Some(&self.taken));
-            if of_straight.gain > self.min_evidence {
-                (line, evidence) = (straight, of_straight);
             }
         }
         Some(ChosenLine { line, evidence })
     }
 
-    /// Takes the edgels and 2D segments beside a line, in all views: where something hides
-    /// the middle of an edge, its ends are still its own.
+    /// Takes the edgels beside a line, in all views: where something hides the middle of an
+    /// edge, its ends are still its own. And the 2D segments, where the line is shown.
     fn claim(&mut self, found: &ChosenLine, seed: SegmentId) {
         let images = self.images;
         self.explained[seed.view][seed.segment] = true;
@@ -279,6 +271,12 @@ impl Chooser<'_> {
                     taken[edgel] = true;
                 }
             }
+        }
+        for view in found.evidence.views() {
+            let prepared = &images.views[view];
+            let Some(projected) = project_segment(prepared, &found.line) else {
+                continue;
+            };
             for segment in prepared.index.near(&projected) {
                 let detected = &prepared.segments[segment].segment;
                 if lies_on(detected, &projected, SEGMENT_REACHES * images.reach) {

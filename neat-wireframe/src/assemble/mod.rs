@@ -32,6 +32,9 @@ mod report;
 mod straightness;
 mod view_segments;
 
+#[cfg(test)]
+mod test_cube;
+
 pub use config::AssembleConfig;
 pub use line3d::{Line3dConfig, Line3dSegment, SegmentSupport, line3d, wireframe_of_segments};
 pub use report::{AssembleReport, Assembled};

@@ -82,31 +82,6 @@ impl ProjectedLine {
     }
 }
 
-/// Rays under a smaller angle to a line (squared sine, about 8°) do not tell where
-/// on it they meet it: a pixel of noise moves the place by far too much.
-const MIN_SQUARED_SINE: f64 = 0.02;
-
-/// Parameter along `line` (0 at its start, 1 at its end) of its point nearest to
-/// the ray from `origin`; `None` where the ray runs too much along the line.
-pub(super) fn line_parameter_of_ray(
-    line: &LineSegment3,
-    origin: &Vector3<f64>,
-    ray: &Vector3<f64>,
-) -> Option<f64> {
-    let direction = line.end - line.start;
-    let length = direction.norm();
-    let unit = direction / length;
-    let cosine = unit.dot(ray);
-    let squared_sine = 1.0 - cosine * cosine;
-    if squared_sine.is_nan() || squared_sine < MIN_SQUARED_SINE {
-        return None;
-    }
-    let offset = origin - line.start;
-    let along = (offset.dot(&unit) - cosine * offset.dot(ray)) / squared_sine;
-    let parameter = along / length;
-    parameter.is_finite().then_some(parameter)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,16 +126,5 @@ mod tests {
                 assert!((numeric - gradient[side][axis]).abs() < 1e-5 * (1.0 + numeric.abs()));
             }
         }
-    }
-
-    #[test]
-    fn rays_meet_lines_where_they_should() {
-        let line = LineSegment3::new(Vector3::zeros(), Vector3::new(4.0, 0.0, 0.0));
-        let origin = Vector3::new(0.0, 0.0, -2.0);
-        let ray = Vector3::new(1.0, 0.0, 2.0).normalize();
-        assert!((line_parameter_of_ray(&line, &origin, &ray).unwrap() - 0.25).abs() < 1e-12);
-        assert_eq!(line_parameter_of_ray(&line, &origin, &Vector3::x()), None);
-        let point = LineSegment3::new(Vector3::zeros(), Vector3::zeros());
-        assert_eq!(line_parameter_of_ray(&point, &origin, &ray), None);
     }
 }

@@ -1,11 +1,10 @@
 //! The 2D evidence of one view, ready for geometry: back-projected rays and
-//! planes, shared vertices, and an index of where each segment lies.
+//! planes, and an index of where each segment lies.
 
 use crate::ViewObservation;
 use crate::index::SegmentGrid;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 use neat_core::{Camera, LineSegment2, LineSegment3};
-use std::collections::HashMap;
 
 /// Names one 2D segment of the prepared views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -27,19 +26,6 @@ pub(super) struct ViewSegment {
     pub rays: [Vector3<f64>; 2],
     /// Unit normal of the plane of both rays, in the world.
     pub plane_normal: Vector3<f64>,
-    /// The detector's confidence, in [0, 1].
-    pub score: f64,
-    /// Which vertices of the view the ends are.
-    pub vertices: [usize; 2],
-}
-
-/// One end of a segment at a vertex.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct VertexEnd {
-    /// Index into [`TrackView::segments`].
-    pub segment: usize,
-    /// 0 for the start, 1 for the end.
-    pub side: usize,
 }
 
 /// A camera with its prepared segments.
@@ -51,9 +37,6 @@ pub(super) struct TrackView {
     pub focal_in_pixels: f64,
     /// The usable segments, in the order of the observation.
     pub segments: Vec<ViewSegment>,
-    /// The segments' ends at each vertex. Ends with the same coordinates are
-    /// the same vertex: that is how 2D wireframes reach this crate.
-    pub vertices: Vec<Vec<VertexEnd>>,
     /// Where the segments lie.
     pub index: SegmentGrid,
 }
@@ -72,9 +55,7 @@ impl TrackView {
             ..observation.camera
         };
         let mut segments = Vec::new();
-        let mut vertices: Vec<Vec<VertexEnd>> = Vec::new();
         if camera.validate().is_ok() {
-            let mut vertex_at: HashMap<[u64; 2], usize> = HashMap::new();
             for (segment_in_view, detection) in observation.segments.iter().enumerate() {
                 let segment = detection.segment;
                 let length = segment.length();
@@ -86,25 +67,11 @@ impl TrackView {
                 let Some(plane_normal) = rays[0].cross(&rays[1]).try_normalize(1e-12) else {
                     continue;
                 };
-                let vertices = [0, 1].map(|side| {
-                    let end = segment.ends()[side];
-                    let vertex = *vertex_at
-                        .entry([end.x.to_bits(), end.y.to_bits()])
-                        .or_insert_with(|| {
-                            vertices.push(Vec::new());
-                            vertices.len() - 1
-                        });
-                    let segment = segments.len();
-                    vertices[vertex].push(VertexEnd { segment, side });
-                    vertex
-                });
                 segments.push(ViewSegment {
                     segment_in_view,
                     segment,
                     rays,
                     plane_normal,
-                    score: detection.score.clamp(0.0, 1.0),
-                    vertices,
                 });
             }
         }
@@ -114,7 +81,6 @@ impl TrackView {
             index: SegmentGrid::new(&shapes, camera.width, camera.height),
             camera,
             segments,
-            vertices,
         }
     }
 
@@ -130,12 +96,6 @@ impl TrackView {
     pub(super) fn pixel_size_at(&self, point_in_world: &Vector3<f64>) -> f64 {
         (point_in_world - self.camera.center_in_world).norm() / self.focal_in_pixels
     }
-
-    /// Image coordinates of a vertex.
-    pub(super) fn vertex_position(&self, vertex: usize) -> Vector2<f64> {
-        let VertexEnd { segment, side } = self.vertices[vertex][0];
-        self.segments[segment].segment.ends()[side]
-    }
 }
 
 /// The 2D segment that an id names.
@@ -149,13 +109,11 @@ mod tests {
     use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
 
     #[test]
-    fn ends_at_one_place_are_one_vertex_and_planes_hold_the_edges() {
+    fn planes_hold_the_edges() {
         let (junctions, edges) = cube();
         let observations = views_of_edges(&cameras_on_sphere(3), &junctions, &edges);
         for observation in &observations {
             let view = TrackView::new(observation, 1.0, 1.0);
-            assert_eq!(view.vertices.len(), 8);
-            assert!(view.vertices.iter().all(|ends| ends.len() == 3));
             for (segment, [a, b]) in view.segments.iter().zip(&edges) {
                 for junction in [junctions[*a], junctions[*b]] {
                     let offset = junction - view.camera.center_in_world;

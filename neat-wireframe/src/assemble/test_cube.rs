@@ -1,0 +1,50 @@
+//! A cube without noise, for the unit tests of the steps.
+
+use super::edge_samples::Images;
+use super::view_segments::TrackView;
+use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
+use neat_core::{EdgelMap, LineSegment3};
+
+/// Views of all edges of the cube of half side 0.5; segment e shows edge e.
+pub(super) struct CubeViews {
+    views: Vec<TrackView>,
+    maps: Vec<EdgelMap>,
+}
+
+impl CubeViews {
+    pub(super) fn new(count: usize) -> Self {
+        let (junctions, edges) = cube();
+        let views: Vec<TrackView> = views_of_edges(&cameras_on_sphere(count), &junctions, &edges)
+            .iter()
+            .map(|observation| TrackView::new(observation, 1.0, 1.0))
+            .collect();
+        Self {
+            maps: views.iter().map(super::edgels_of_segments).collect(),
+            views,
+        }
+    }
+
+    pub(super) fn images(&self) -> Images<'_> {
+        Images {
+            views: &self.views,
+            maps: &self.maps,
+            reach: 0.5,
+        }
+    }
+}
+
+/// The true segment of an edge of the cube.
+pub(super) fn cube_edge(edge: usize) -> LineSegment3 {
+    let (junctions, edges) = cube();
+    let [a, b] = edges[edge];
+    LineSegment3::new(junctions[a], junctions[b])
+}
+
+/// Larger distance of corresponding ends, in the better order.
+pub(super) fn end_distance(a: &LineSegment3, b: &LineSegment3) -> f64 {
+    let farther = |b: &LineSegment3| {
+        let [start, end] = a.end_distances(b);
+        start.max(end)
+    };
+    farther(b).min(farther(&b.reversed()))
+}
