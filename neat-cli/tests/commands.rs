@@ -84,7 +84,7 @@ fn programs_read_what_is_decided_and_what_has_no_effect() {
     let scene = TestScene::new();
     let mut command = scene.run("reconstruct", "1");
     command.args(["--progress", "json"]);
-    command.args(["--set", "distill.tracks.occlusion_test=true"]);
+    command.args(["--set", "distill.assembler.min_evidence=6"]);
     let assert = command.assert().success();
     let events: Vec<Value> = stderr(&assert)
         .lines()
@@ -104,7 +104,7 @@ fn programs_read_what_is_decided_and_what_has_no_effect() {
     let warning = warnings.iter().find(|w| w["kind"] == "no_effect").unwrap();
     let message = warning["message"].as_str().unwrap();
     assert!(
-        message.contains("distill.tracks.occlusion_test"),
+        message.contains("distill.assembler.min_evidence"),
         "{message}"
     );
     let decisions = manifest["decisions"].as_array().unwrap();

@@ -10,7 +10,7 @@ use neat_core::{Scene, Wireframe3d, file, with_causes};
 use neat_eval::image_quality::psnr;
 use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
 use neat_field::region_pixels::RegionPixels;
-use neat_pipeline::config::{Assembler, Choice, Config, apply_overrides};
+use neat_pipeline::config::{BackEnd, Choice, Config, apply_overrides};
 use neat_pipeline::distill::distill;
 use neat_pipeline::error::PipelineError;
 use neat_pipeline::event::{Event, OnEvent, Stage, Warning, WarningKind};
@@ -71,12 +71,12 @@ pub fn ablate(
     };
     folder::claim(options)?;
     let expected = match options.config.distill.back_end {
-        Choice::Given(assembler) => variants(assembler).len(),
-        Choice::Auto => variants(Assembler::Fast).len(),
+        Choice::Given(back_end) => variants(back_end).len(),
+        Choice::Auto => variants(BackEnd::Fast).len(),
     };
     let base = run_variant(&variants::BASE, options, cancelled, on_event)
         .map_err(|error| interrupted(error, 0, expected))?;
-    let all = variants(base.plan.assembler());
+    let all = variants(base.plan.back_end());
     let mut rows: Vec<Row> = Vec::with_capacity(all.len());
     for (index, variant) in all.iter().enumerate() {
         if cancelled.load(Ordering::Relaxed) {
@@ -311,27 +311,27 @@ mod tests {
 
     #[test]
     fn variants_that_change_nothing_are_known() {
-        let same = |preset: Preset, assembler| {
+        let same = |preset: Preset, back_end| {
             let mut config = preset.config();
-            config.distill.back_end = Choice::Given(assembler);
-            let all = variants(assembler).into_iter();
+            config.distill.back_end = Choice::Given(back_end);
+            let all = variants(back_end).into_iter();
             all.filter(|variant| variant.is_base(&config).unwrap())
                 .map(|variant| variant.slug)
                 .collect::<Vec<_>>()
         };
-        for assembler in [Assembler::Fast, Assembler::Tracks] {
+        for back_end in [BackEnd::Fast, BackEnd::Assembler] {
             assert_eq!(
-                same(Preset::Fast, assembler),
+                same(Preset::Fast, back_end),
                 ["base", "direction-no-clustering", "attraction-10"]
             );
         }
         assert_eq!(
-            same(Preset::PaperAbc, Assembler::Paper),
+            same(Preset::PaperAbc, BackEnd::Paper),
             ["base", "direction-clustering", "attraction-10", "paper"]
         );
         for preset in [Preset::PaperDtu, Preset::PaperBlendedmvs] {
             assert_eq!(
-                same(preset, Assembler::Paper),
+                same(preset, BackEnd::Paper),
                 ["base", "direction-clustering", "attraction-5", "paper"]
             );
         }

@@ -28,9 +28,9 @@ use neat_core::layout::PoseConvention;
 use neat_detect::DetectorConfig;
 use neat_tensor::Kernels;
 use neat_train::config::{ModelConfig, TrainConfig, TrainingConfig};
+use neat_wireframe::assemble::AssembleConfig;
 use neat_wireframe::confidence::ConfidenceConfig;
 use neat_wireframe::fast::FastBackEndConfig;
-use neat_wireframe::line_tracks::LineTracksConfig;
 use neat_wireframe::paper::PaperBackEndConfig;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -41,7 +41,8 @@ use std::fmt;
 pub struct Config {
     /// How the scene is read.
     pub data: DataConfig,
-    /// How 2D wireframes are detected in scenes that come without.
+    /// How 2D wireframes are detected in scenes that come without, and edgels in the
+    /// images that the assembler looks at.
     #[serde(default)]
     pub detect: DetectorConfig,
     /// The networks.
@@ -129,23 +130,23 @@ impl fmt::Display for Background {
 /// What assembles the wireframe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Assembler {
+pub enum BackEnd {
     /// Section 4.3 of the paper.
     Paper,
     /// Junctions from modes of the segment ends, re-triangulated and adjusted: for
     /// single objects.
     Fast,
-    /// Tracks of 2D segments over the views, with the field's segments as priors:
-    /// for photographs with thousands of segments.
-    Tracks,
+    /// Lines that the 2D segments propose and the edgels of all images choose: for
+    /// photographs. The field has no part in it.
+    Assembler,
 }
 
-impl fmt::Display for Assembler {
+impl fmt::Display for BackEnd {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Paper => "paper",
             Self::Fast => "fast",
-            Self::Tracks => "tracks",
+            Self::Assembler => "assembler",
         })
     }
 }
@@ -165,9 +166,9 @@ pub enum OverlayGround {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DistillConfig {
-    /// What assembles the wireframe; `auto` is line tracks for photographs, else the
-    /// fast back end.
-    pub back_end: Choice<Assembler>,
+    /// What assembles the wireframe; `auto` is the assembler for photographs, else
+    /// the fast back end.
+    pub back_end: Choice<BackEnd>,
     /// What the wireframe is drawn on in `overlays/`.
     #[serde(default)]
     pub overlay: OverlayGround,
@@ -180,7 +181,7 @@ pub struct DistillConfig {
     pub paper: PaperBackEndConfig,
     /// The fast back end.
     pub fast: FastBackEndConfig,
-    /// The back end of line tracks.
+    /// The assembler.
     #[serde(default)]
-    pub tracks: LineTracksConfig,
+    pub assembler: AssembleConfig,
 }

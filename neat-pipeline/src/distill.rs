@@ -2,24 +2,27 @@
 
 mod thin_regions;
 
-use crate::config::{Assembler, Config};
+use crate::config::{BackEnd, Config};
 use crate::plan::Plan;
 use nalgebra::Vector3;
-use neat_core::{LineSegment3, Scene, Wireframe3d};
+use neat_core::{EdgelMap, LineSegment3, Scene, SceneError, Wireframe3d};
+use neat_detect::{DetectorConfig, edgel_map};
 use neat_sdf::RayBundle;
 use neat_tensor::host::host_vec;
 use neat_train::TrainedField;
+use neat_wireframe::assemble::{AssembleReport, assemble};
 use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::curved_rims::curved_chains;
 use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::fast::{self, FastBackEndReport};
-use neat_wireframe::line_tracks::{self, LineTracksReport};
 use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 use neat_wireframe::paper::{PaperBackEndCounts, PaperBackEndError, SupportedSegment};
 use neat_wireframe::proposals::{WeightedSegment, robust_segment};
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::cell::LazyCell;
 pub use thin_regions::paper_regions;
 use thin_regions::{Query, spread_query};
 
@@ -40,6 +43,9 @@ pub enum DistillError {
     /// Nobody wants it any more.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
+    /// An image lies in a file that cannot be read.
+    #[error(transparent)]
+    Image(#[from] SceneError),
     /// The paper's back end refused its input.
     #[error(transparent)]
     Paper(#[from] PaperBackEndError),
@@ -56,13 +62,13 @@ pub struct Distilled {
     /// How sure every junction and edge is, and by which 2D segments.
     pub confidence: Confidence,
     /// What each step kept and removed.
-    pub report: AssemblerReport,
+    pub report: BackEndReport,
 }
 
 /// What each step of a back end kept and removed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "back_end", rename_all = "snake_case")]
-pub enum AssemblerReport {
+pub enum BackEndReport {
     /// Of the paper's.
     Paper {
         /// How many things entered and left its steps.
@@ -75,12 +81,10 @@ pub enum AssemblerReport {
         /// What its steps kept.
         steps: FastBackEndReport,
     },
-    /// Of the line tracks.
-    Tracks {
-        /// 3D segments that the field proposes, which break ties.
-        priors: usize,
-        /// What its steps kept.
-        steps: LineTracksReport,
+    /// Of the assembler.
+    Assembler {
+        /// What its steps found.
+        steps: AssembleReport,
     },
 }
 
@@ -102,39 +106,38 @@ impl Distilled {
     }
 }
 
-/// Queries the thin regions of all views and assembles the wireframe.
+/// Takes the wireframe out of the field, or, where the plan has the assembler, out of the
+/// images.
 ///
 /// # Errors
-/// If the field's junctions or distances are not finite, or `progress` says so.
+/// If the field's junctions or distances are not finite, an image lies in a file that
+/// cannot be read, or `progress` says so.
 pub fn distill(
     scene: &Scene,
     field: &TrainedField,
     plan: &Plan,
     progress: OnProgress<'_>,
 ) -> Result<Distilled, DistillError> {
-    let (config, assembler) = (plan.config(), plan.assembler());
-    let distill = &config.distill;
-    let min_score = match assembler {
-        Assembler::Paper => distill.paper.neat_lines.min_segment_score,
-        Assembler::Fast | Assembler::Tracks => config.data.min_segment_score,
+    let config = plan.config();
+    let min_score = match plan.back_end() {
+        BackEnd::Paper => config.distill.paper.neat_lines.min_segment_score,
+        BackEnd::Fast | BackEnd::Assembler => config.data.min_segment_score,
     };
     let views = ViewObservation::from_scene(scene, min_score);
-    let (wireframe, report, surface) = if assembler == Assembler::Paper {
-        let (wireframe, report) = paper(scene, field, config, &views, progress)?;
-        (wireframe, report, field.surface_grid())
-    } else {
-        let on_proposals = &mut |share| progress(0.7 * share);
-        let proposals = propose_segments(scene, field, config, &views, on_proposals)?;
-        let surface = field.surface_grid();
-        let (wireframe, report) = from_proposals(field, plan, &views, &proposals, &surface);
-        progress(0.9)?;
-        (wireframe, report, surface)
+    // Once, and only where it is wanted.
+    let surface = LazyCell::new(|| field.surface_grid());
+    let (wireframe, report) = match plan.back_end() {
+        BackEnd::Paper => paper(scene, field, config, &views, progress)?,
+        BackEnd::Fast => fast(scene, field, &*surface, config, &views, progress)?,
+        BackEnd::Assembler => assembled(scene, config, &views, field.scene_radius, progress)?,
     };
-    // A learned surface of a photograph is too coarse to hide edges behind.
-    let hides = assembler != Assembler::Tracks || distill.tracks.occlusion_test;
-    let hiding = hides.then_some(&surface as &dyn SignedDistance);
-    let radius = field.scene_radius;
-    let confidence = assess(&wireframe, &views, hiding, radius, &distill.confidence)?;
+    let hiding = match plan.back_end() {
+        BackEnd::Paper | BackEnd::Fast => Some(&*surface as &dyn SignedDistance),
+        // A learned surface of a photograph is too coarse to hide edges behind.
+        BackEnd::Assembler => None,
+    };
+    let assessing = &config.distill.confidence;
+    let confidence = assess(&wireframe, &views, hiding, field.scene_radius, assessing)?;
     Ok(Distilled {
         wireframe,
         confidence,
@@ -142,33 +145,67 @@ pub fn distill(
     })
 }
 
-/// The back ends that take one proposal per 2D segment.
-fn from_proposals(
+/// The fast back end, which takes one proposal per 2D segment.
+fn fast(
+    scene: &Scene,
     field: &TrainedField,
-    plan: &Plan,
-    views: &[ViewObservation],
-    proposals: &[SegmentProposal],
     surface: &dyn SignedDistance,
-) -> (Wireframe3d, AssemblerReport) {
-    let radius = field.scene_radius;
-    let distill = &plan.config().distill;
-    if plan.assembler() == Assembler::Tracks {
-        let tracks = &distill.tracks;
-        let built = line_tracks::run(views, proposals, Some(surface), radius, tracks);
-        let report = AssemblerReport::Tracks {
-            priors: proposals.len(),
-            steps: built.report,
-        };
-        return (built.wireframe, report);
-    }
-    let junctions = field.junctions();
-    let fast = &distill.fast;
-    let built = fast::run(views, proposals, &junctions, surface, radius, fast);
-    let report = AssemblerReport::Fast {
+    config: &Config,
+    views: &[ViewObservation],
+    progress: OnProgress<'_>,
+) -> Result<(Wireframe3d, BackEndReport), DistillError> {
+    let on_proposals = &mut |share| progress(0.7 * share);
+    let proposals = propose_segments(scene, field, config, views, on_proposals)?;
+    let built = fast::run(
+        views,
+        &proposals,
+        &field.junctions(),
+        surface,
+        field.scene_radius,
+        &config.distill.fast,
+    );
+    progress(0.9)?;
+    let report = BackEndReport::Fast {
         proposals: proposals.len(),
         steps: built.report,
     };
-    (built.wireframe, report)
+    Ok((built.wireframe, report))
+}
+
+/// The assembler, which asks the images and not the field.
+fn assembled(
+    scene: &Scene,
+    config: &Config,
+    views: &[ViewObservation],
+    scene_radius: f64,
+    progress: OnProgress<'_>,
+) -> Result<(Wireframe3d, BackEndReport), DistillError> {
+    let edgels = edgels(scene, &config.detect, &mut |share| progress(0.3 * share))?;
+    let built = assemble(views, &edgels, scene_radius, &config.distill.assembler);
+    progress(0.9)?;
+    let report = BackEndReport::Assembler {
+        steps: built.report,
+    };
+    Ok((built.wireframe, report))
+}
+
+/// The edgels of all images.
+fn edgels(
+    scene: &Scene,
+    config: &DetectorConfig,
+    progress: OnProgress<'_>,
+) -> Result<Vec<EdgelMap>, DistillError> {
+    let views = &scene.views;
+    let mut maps = Vec::with_capacity(views.len());
+    // Some at a time, so that progress can be told in between.
+    for chunk in views.chunks(4 * rayon::current_num_threads()) {
+        let found: Result<Vec<EdgelMap>, SceneError> = (chunk.par_iter())
+            .map(|view| Ok(edgel_map(&*view.image.read()?, config, scene.pixel_center)))
+            .collect();
+        maps.extend(found?);
+        progress(maps.len() as f64 / views.len() as f64)?;
+    }
+    Ok(maps)
 }
 
 /// How well a wireframe in the scene's world agrees with the 2D segments and the
@@ -271,7 +308,7 @@ fn paper(
     config: &Config,
     views: &[ViewObservation],
     progress: OnProgress<'_>,
-) -> Result<(Wireframe3d, AssemblerReport), DistillError> {
+) -> Result<(Wireframe3d, BackEndReport), DistillError> {
     let mut rays_by_view = Vec::with_capacity(views.len());
     for (index, view) in scene.views.iter().enumerate() {
         let regions = paper_regions(&view.wireframe, scene.pixel_center, config);
@@ -301,7 +338,7 @@ fn paper(
     }
     let paper = &config.distill.paper;
     let built = paper.run(&field.junctions(), views, &rays_by_view, field)?;
-    let report = AssemblerReport::Paper {
+    let report = BackEndReport::Paper {
         steps: built.counts,
     };
     Ok((built.wireframe, report))

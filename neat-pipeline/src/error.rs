@@ -94,6 +94,7 @@ impl From<PlanError> for PipelineError {
         match error {
             PlanError::Scene(error) => Self::Scene(error),
             PlanError::Config(error) => Self::Train(error),
+            PlanError::Detector(error) => Self::Detector(error),
             PlanError::Open(_) => Self::Train(TrainError::Config(error.to_string())),
         }
     }
@@ -103,6 +104,7 @@ impl From<DistillError> for PipelineError {
     fn from(error: DistillError) -> Self {
         match error {
             DistillError::Cancelled(_) => Self::InterruptedIn(Stage::Distill),
+            DistillError::Image(error) => Self::Scene(error),
             error => Self::Distill(error),
         }
     }

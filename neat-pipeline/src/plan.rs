@@ -12,9 +12,10 @@ mod without_effect;
 pub use step_memory::{bytes_per_ray, rows_of_step};
 pub(crate) use without_effect::{Given, changes_of_presets, settings_without_effect};
 
-use crate::config::{Assembler, Background, Choice, Config};
+use crate::config::{BackEnd, Background, Choice, Config};
 use crate::event::Decision;
 use neat_core::{MemoryLimit, Scene, SceneError};
+use neat_detect::DetectorConfigError;
 use neat_gjp::JunctionCount;
 use neat_tensor::{Backend, Kernels};
 use neat_train::TrainError;
@@ -28,7 +29,7 @@ const SPHERE_SLOPE: f64 = 20.0;
 pub struct Plan {
     config: Config,
     background: Option<Background>,
-    assembler: Assembler,
+    back_end: BackEnd,
 }
 
 /// Why there is no plan.
@@ -40,6 +41,9 @@ pub enum PlanError {
     /// The configuration contradicts itself.
     #[error(transparent)]
     Config(#[from] TrainError),
+    /// The settings of the detector are out of range.
+    #[error("the section `detect` of the configuration: {0}")]
+    Detector(#[from] DetectorConfigError),
     /// A value that a scene decides is still open.
     #[error("{0} is open: a scene has to decide it")]
     Open(&'static str),
@@ -65,21 +69,22 @@ impl Plan {
             Some(Choice::Given(background)) => Some(background),
             Some(Choice::Auto) => return Err(PlanError::Open("data.background")),
         };
-        let assembler = match config.distill.back_end {
-            Choice::Given(assembler) => assembler,
+        let back_end = match config.distill.back_end {
+            Choice::Given(back_end) => back_end,
             // It follows from the background alone.
-            Choice::Auto if background == Some(Background::Photo) => Assembler::Tracks,
-            Choice::Auto => Assembler::Fast,
+            Choice::Auto if background == Some(Background::Photo) => BackEnd::Assembler,
+            Choice::Auto => BackEnd::Fast,
         };
-        config.distill.back_end = Choice::Given(assembler);
+        config.distill.back_end = Choice::Given(back_end);
         if config.model.perceiver.junctions.fixed().is_none() {
             return Err(PlanError::Open("model.perceiver.junctions"));
         }
+        config.detect.validate()?;
         config.training(Kernels::default()).validate()?;
         Ok(Self {
             config,
             background,
-            assembler,
+            back_end,
         })
     }
 
@@ -94,8 +99,8 @@ impl Plan {
     }
 
     /// What assembles the wireframe.
-    pub fn assembler(&self) -> Assembler {
-        self.assembler
+    pub fn back_end(&self) -> BackEnd {
+        self.back_end
     }
 }
 
@@ -171,7 +176,7 @@ pub fn settle(
             Some(Background::Black) => "for an object on a black background",
             None => "where nothing is said of the background",
         };
-        decide("distill.back_end", &plan.assembler, reason.to_owned());
+        decide("distill.back_end", &plan.back_end, reason.to_owned());
     }
     if asked.train.ray_chunk.is_none() {
         plan.config.train.ray_chunk = match earlier {

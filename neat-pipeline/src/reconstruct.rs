@@ -10,7 +10,7 @@ mod training;
 pub use opened::{OpenedRun, open_run, software_warning};
 
 use crate::config::Config;
-use crate::distill::AssemblerReport;
+use crate::distill::BackEndReport;
 use crate::error::PipelineError;
 use crate::event::{OnEvent, Stage};
 use crate::run_dir::{Existing, RunDir};
@@ -66,7 +66,7 @@ pub struct Reconstruction {
     /// How well it agrees with the images.
     pub agreement: Option<ImageEvidence>,
     /// Numbers of every step of the distillation; `None` if another version wrote them.
-    pub report: Option<AssemblerReport>,
+    pub report: Option<BackEndReport>,
 }
 
 /// Trains on a scene and leaves a run folder with checkpoints.
@@ -145,10 +145,10 @@ pub fn distill_run(
     }
     session.forget_distillation_warnings();
     // Another back end than the scene's choice may have been asked for.
-    let assembler = session.plan.assembler().to_string();
+    let back_end = session.plan.back_end().to_string();
     let decisions = &mut session.manifest.decisions;
     decisions
-        .retain(|decision| decision.setting != "distill.back_end" || decision.value == assembler);
+        .retain(|decision| decision.setting != "distill.back_end" || decision.value == back_end);
     // How the training ended stays as it is.
     let result = session.distill(&field, &AtomicBool::new(false));
     let recorded = session.write_manifest();

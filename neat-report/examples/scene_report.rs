@@ -1,6 +1,6 @@
 //! A report on a scene folder without any training: 2D wireframes are detected where
-//! there are none, and the line-track back end reconstructs, unless a wireframe is
-//! given.
+//! there are none, and the assembler reconstructs from them and the images, unless a
+//! wireframe is given.
 //!
 //! ```text
 //! cargo run --release -p neat-report --example scene_report -- SCENE OUT.html [WIREFRAME.json]
@@ -9,13 +9,13 @@
 #![expect(clippy::print_stdout, reason = "an example tells what it does")]
 
 use neat_core::layout::HAWP_DIR;
-use neat_core::{LineSegment2, LoadOptions, Scene, Wireframe3d, load_scene};
-use neat_detect::{DetectorConfig, detect};
+use neat_core::{EdgelMap, LineSegment2, LoadOptions, Scene, SceneError, Wireframe3d, load_scene};
+use neat_detect::{DetectorConfig, detect, edgel_map};
 use neat_report::{FactGroup, PhotographConfig, Report};
 use neat_wireframe::ViewObservation;
+use neat_wireframe::assemble::{AssembleConfig, assemble};
 use neat_wireframe::evidence::confirms;
 use neat_wireframe::export::{SupportingSegment, WireframeDocument, read_json};
-use neat_wireframe::line_tracks::{LineTracksConfig, run};
 use rayon::prelude::*;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     if detected {
         (scene.views.par_iter_mut()).try_for_each(|view| {
             view.wireframe = detect(&*view.image.read()?, &DetectorConfig::default());
-            Ok::<(), neat_core::SceneError>(())
+            Ok::<(), SceneError>(())
         })?;
     }
     let observations = ViewObservation::from_scene(&scene, MIN_SCORE);
@@ -51,8 +51,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             (read_json(path)?.wireframe()).map(|point| world_from_original.apply(point))
         }
         None => {
-            let config = LineTracksConfig::default();
-            run(&observations, &[], None, scene.sphere_radius, &config).wireframe
+            let edgels = edgels(&scene)?;
+            let config = AssembleConfig::default();
+            assemble(&observations, &edgels, scene.sphere_radius, &config).wireframe
         }
     };
     let reconstructed = start.elapsed().as_secs_f64();
@@ -76,6 +77,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         start.elapsed().as_secs_f64()
     );
     Ok(())
+}
+
+fn edgels(scene: &Scene) -> Result<Vec<EdgelMap>, SceneError> {
+    let config = DetectorConfig::default();
+    (scene.views.par_iter())
+        .map(|view| Ok(edgel_map(&*view.image.read()?, &config, scene.pixel_center)))
+        .collect()
 }
 
 /// The wireframe in the frame of the files, with the 2D segments that lie on its

@@ -10,7 +10,7 @@ use crate::scene_arguments::SceneArgs;
 use clap::{Args, Subcommand};
 use neat_lab::line3d::reconstruct_line3d;
 use neat_pipeline::resources::{Resources, default_limit};
-use neat_wireframe::line_tracks::Line3dConfig;
+use neat_wireframe::assemble::Line3dConfig;
 use std::path::PathBuf;
 
 /// Reconstruct with the method of somebody else, on the same 2D wireframes

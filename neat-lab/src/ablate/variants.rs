@@ -1,6 +1,6 @@
 //! What an ablation leaves out or changes, one thing at a time.
 
-use neat_pipeline::config::Assembler;
+use neat_pipeline::config::BackEnd;
 
 /// One row of an ablation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -213,19 +213,36 @@ const FAST_STEPS: [Variant; 10] = [
     ),
 ];
 
-/// The back end of line tracks with and without what the field knows.
-const TRACK_STEPS: [Variant; 1] = [step_off(
-    "occlusion by the learned surface",
-    "tracks-occlusion",
-    &["distill.tracks.occlusion_test=true"],
-)];
+/// The assembler with more and less of what a line needs.
+const ASSEMBLER_STEPS: [Variant; 4] = [
+    step_off(
+        "half the evidence of a line",
+        "assembler-half-evidence",
+        &["distill.assembler.min_evidence=1.5"],
+    ),
+    step_off(
+        "twice the evidence of a line",
+        "assembler-twice-evidence",
+        &["distill.assembler.min_evidence=6.0"],
+    ),
+    step_off(
+        "lines proposed by long segments only",
+        "assembler-long-segments",
+        &["distill.assembler.min_segment_length_in_pixels=16.0"],
+    ),
+    step_off(
+        "half as many neighbours of each view",
+        "assembler-few-neighbours",
+        &["distill.assembler.neighbours=5"],
+    ),
+];
 
 /// All variants that make sense for a run with this back end, the base first.
-pub fn variants(assembler: Assembler) -> Vec<Variant> {
-    let steps: &[Variant] = match assembler {
-        Assembler::Fast => &FAST_STEPS,
-        Assembler::Tracks => &TRACK_STEPS,
-        Assembler::Paper => &[],
+pub fn variants(back_end: BackEnd) -> Vec<Variant> {
+    let steps: &[Variant] = match back_end {
+        BackEnd::Fast => &FAST_STEPS,
+        BackEnd::Assembler => &ASSEMBLER_STEPS,
+        BackEnd::Paper => &[],
     };
     [BASE]
         .iter()
@@ -245,7 +262,7 @@ mod tests {
 
     #[test]
     fn every_variant_applies_to_every_preset_and_most_change_something() {
-        let all = [Assembler::Fast, Assembler::Tracks, Assembler::Paper];
+        let all = [BackEnd::Fast, BackEnd::Assembler, BackEnd::Paper];
         for preset in Preset::ALL {
             let config = preset.config();
             for variant in all.into_iter().flat_map(variants) {
@@ -262,8 +279,8 @@ mod tests {
 
     #[test]
     fn folders_are_not_shared() {
-        for assembler in [Assembler::Fast, Assembler::Tracks, Assembler::Paper] {
-            let variants = variants(assembler);
+        for back_end in [BackEnd::Fast, BackEnd::Assembler, BackEnd::Paper] {
+            let variants = variants(back_end);
             let slugs: BTreeSet<_> = variants.iter().map(|v| v.slug).collect();
             assert_eq!(slugs.len(), variants.len());
         }

@@ -40,20 +40,20 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Choice<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Assembler;
+    use crate::config::BackEnd;
 
     #[test]
     fn a_choice_is_a_word() {
-        let read = |text: &str| serde_json::from_str::<Choice<Assembler>>(text);
+        let read = |text: &str| serde_json::from_str::<Choice<BackEnd>>(text);
         for (text, choice) in [
             ("\"auto\"", Choice::Auto),
-            ("\"tracks\"", Choice::Given(Assembler::Tracks)),
+            ("\"assembler\"", Choice::Given(BackEnd::Assembler)),
         ] {
             assert_eq!(read(text).unwrap(), choice);
             assert_eq!(serde_json::to_string(&choice).unwrap(), text);
         }
-        let error = read("\"trakcs\"").unwrap_err().to_string();
-        assert!(error.contains("`tracks` or `auto`"), "{error}");
+        let error = read("\"asembler\"").unwrap_err().to_string();
+        assert!(error.contains("`assembler` or `auto`"), "{error}");
         assert!(read("3").is_err());
     }
 }

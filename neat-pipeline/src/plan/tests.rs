@@ -41,17 +41,17 @@ fn an_object_before_black_gets_the_fast_back_end() {
     let asked = Preset::Fast.config();
     let (plan, decisions) = settled(&asked, &black());
     assert_eq!(plan.background(), Some(Background::Black));
-    assert_eq!(plan.assembler(), Assembler::Fast);
+    assert_eq!(plan.back_end(), BackEnd::Fast);
     assert_eq!(plan.config().train, asked.train);
     assert_eq!(plan.config().model, asked.model);
     assert_eq!(decisions, ["data.background", "distill.back_end"]);
 }
 
 #[test]
-fn photographs_get_a_sphere_behind_them_and_line_tracks() {
+fn photographs_get_a_sphere_behind_them_and_the_assembler() {
     let (plan, decisions) = settled(&Preset::Fast.config(), &photographs());
     assert_eq!(plan.background(), Some(Background::Photo));
-    assert_eq!(plan.assembler(), Assembler::Tracks);
+    assert_eq!(plan.back_end(), BackEnd::Assembler);
     let config = plan.config();
     assert_eq!(config.train.loss.mask, 0.0);
     assert_eq!(config.model.implicit.bounding_sphere_slope, SPHERE_SLOPE);
@@ -89,10 +89,10 @@ fn what_an_earlier_part_of_a_run_has_decided_stays() {
     let (again, _) = settle(&asked, &black(), MACHINE, Some(&first)).unwrap();
     assert_eq!(again, first);
     // But not against what is given.
-    asked.distill.back_end = Choice::Given(Assembler::Paper);
+    asked.distill.back_end = Choice::Given(BackEnd::Paper);
     asked.train.ray_chunk = Some(8);
     let (other, _) = settle(&asked, &black(), MACHINE, Some(&first)).unwrap();
-    assert_eq!(other.assembler(), Assembler::Paper);
+    assert_eq!(other.back_end(), BackEnd::Paper);
     assert_eq!(other.config().train.ray_chunk, Some(8));
 }
 
@@ -102,7 +102,7 @@ fn a_trained_field_keeps_its_sphere_whatever_is_said_of_the_background() {
     let mut asked = Preset::Fast.config();
     asked.data.background = Some(Choice::Given(Background::Black));
     let (plan, _) = settle(&asked, &photographs(), MACHINE, Some(&trained)).unwrap();
-    assert_eq!(plan.assembler(), Assembler::Fast);
+    assert_eq!(plan.back_end(), BackEnd::Fast);
     assert_eq!(plan.config().model, trained.config().model);
 }
 
@@ -136,4 +136,7 @@ fn what_is_open_or_contradicts_itself_is_no_plan() {
     let mut config = Preset::PaperAbc.config();
     config.train.rays = 0;
     assert!(matches!(Plan::new(config), Err(PlanError::Config(_))));
+    let mut config = Preset::PaperAbc.config();
+    config.detect.min_gradient = 0.0;
+    assert!(matches!(Plan::new(config), Err(PlanError::Detector(_))));
 }

@@ -1,7 +1,7 @@
 //! Settings that a person has changed and that do nothing.
 
 use super::Plan;
-use crate::config::{Assembler, Background, Config, Difference, Preset, differences};
+use crate::config::{BackEnd, Background, Config, Difference, Preset, differences};
 use crate::event::{Warning, WarningKind};
 
 /// What a person has changed: in what `asked` differs from the preset nearest to it.
@@ -58,19 +58,20 @@ fn only_trains(key: &str) -> bool {
 
 /// How the keys of settings begin that do nothing, and why.
 fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)> {
-    let mut idle = match plan.assembler() {
-        Assembler::Paper => vec![
+    let mut idle = match plan.back_end() {
+        BackEnd::Paper => vec![
             ("distill.fast.", PAPER_RUNS),
-            ("distill.tracks.", PAPER_RUNS),
+            ("distill.assembler.", PAPER_RUNS),
             ("distill.rays_per_segment", PAPER_RUNS),
         ],
-        Assembler::Fast => vec![
+        BackEnd::Fast => vec![
             ("distill.paper.", FAST_RUNS),
-            ("distill.tracks.", FAST_RUNS),
+            ("distill.assembler.", FAST_RUNS),
         ],
-        Assembler::Tracks => vec![
-            ("distill.paper.", TRACKS_RUN),
-            ("distill.fast.", TRACKS_RUN),
+        BackEnd::Assembler => vec![
+            ("distill.paper.", ASSEMBLER_RUNS),
+            ("distill.fast.", ASSEMBLER_RUNS),
+            ("distill.rays_per_segment", ASSEMBLER_RUNS),
         ],
     };
     if plan.background() == Some(Background::Photo) {
@@ -84,14 +85,25 @@ fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)>
         ]);
     }
     if !given.detected {
-        idle.push(("detect.", "the scene has 2D wireframes"));
+        let reason = "the scene has 2D wireframes";
+        if plan.back_end() == BackEnd::Assembler {
+            // The others say what an edgel is.
+            let of_segments = [
+                "detect.min_length",
+                "detect.min_score",
+                "detect.max_search_side",
+            ];
+            idle.extend(of_segments.map(|key| (key, reason)));
+        } else {
+            idle.push(("detect.", reason));
+        }
     }
     idle
 }
 
 const PAPER_RUNS: &str = "the wireframe is assembled by the paper's back end";
 const FAST_RUNS: &str = "the wireframe is assembled by the fast back end";
-const TRACKS_RUN: &str = "the wireframe is assembled by line tracks";
+const ASSEMBLER_RUNS: &str = "the wireframe is made by the assembler";
 
 #[cfg(test)]
 mod tests {
@@ -122,10 +134,16 @@ mod tests {
         assert_eq!(
             told(photo, &sets),
             [
-                format!("distill.fast.cleanup = false has no effect: {TRACKS_RUN}"),
+                format!("distill.fast.cleanup = false has no effect: {ASSEMBLER_RUNS}"),
                 "train.loss.mask = 0.7 has no effect: photographs show no silhouettes".to_owned(),
             ]
         );
+        // With 2D wireframes, what an edgel is matters to the assembler only.
+        let sets = ["detect.min_gradient=2.0", "detect.min_score=0.2"];
+        assert_eq!(told(black, &sets).len(), 2);
+        let without_effect = told(photo, &sets);
+        assert_eq!(without_effect.len(), 1, "{without_effect:?}");
+        assert!(without_effect[0].starts_with("detect.min_score"));
         let sets = [
             "train.steps=5".to_owned(),
             "train.sampler.lookups=32".to_owned(),

@@ -8,7 +8,7 @@
 //! Prints one line per noise, number of views, detector and back end: "adjusted"
 //! is the true graph, displaced and brought back by the bundle adjustment of the
 //! fast back end, "given" the displaced graph itself (0.003 per coordinate),
-//! "tracks" what the line-track back end finds. A second table compares the
+//! "assembled" what the assembler finds. A second table compares the
 //! probabilities of true and false edges with the truth.
 
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
@@ -23,13 +23,13 @@ mod scenario;
 use nalgebra::Vector3;
 use neat_core::Wireframe3d;
 use neat_core::synthetic::Solid;
+use neat_wireframe::assemble::{AssembleConfig, assemble};
 use neat_wireframe::confidence::{ConfidenceConfig, DetectionNoise, assess};
-use neat_wireframe::line_tracks::{LineTracksConfig, run};
 use reliability::{Bin, bins, brier_score, judged};
 use scenario::{Coverage, Detector, Scene, adjusted, displaced, scene};
 
 const SEEDS: u64 = 2;
-/// A junction of the line tracks farther than this from all true ones is another
+/// An assembled junction farther than this from all true ones is another
 /// mistake than noise.
 const MAX_ERROR: f64 = 0.03;
 
@@ -99,12 +99,12 @@ const WIREFRAMES: [(&str, Make); 3] = [
         adjusted(&scene.observations, &scene.truth, seed)
     }),
     ("given", |scene, seed| displaced(&scene.truth, seed)),
-    ("tracks", tracks),
+    ("assembled", assembled),
 ];
 
-fn tracks(scene: &Scene, _: u64) -> Wireframe3d {
-    let config = LineTracksConfig::default();
-    run(&scene.observations, &[], None, 1.0, &config).wireframe
+fn assembled(scene: &Scene, _: u64) -> Wireframe3d {
+    let config = AssembleConfig::default();
+    assemble(&scene.observations, &[], 1.0, &config).wireframe
 }
 
 fn measure(scenes: &[(u64, Scene)], make: Make) -> (Coverage, DetectionNoise) {

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 use neat_core::synthetic::Solid;
 use neat_core::{LineSegment2, Wireframe3d};
 use neat_wireframe::ViewObservation;
+use neat_wireframe::assemble::{AssembleConfig, assemble};
 use neat_wireframe::confidence::{Confidence, ConfidenceConfig, assess};
-use neat_wireframe::line_tracks::{LineTracksConfig, run};
 
 fn assessed(wireframe: &Wireframe3d, scene: &Scene) -> Confidence {
     let config = ConfidenceConfig::default();
@@ -47,11 +47,11 @@ fn bundle_adjusted_junctions_lie_in_their_ellipsoids() {
 }
 
 #[test]
-fn line_tracks_are_honest_too() {
+fn assembled_junctions_are_honest_too() {
     let mut coverage = Coverage::default();
     for scene in scenes(Detector::Vertices, 0.5, 30) {
-        let config = LineTracksConfig::default();
-        let wireframe = run(&scene.observations, &[], None, 1.0, &config).wireframe;
+        let config = AssembleConfig::default();
+        let wireframe = assemble(&scene.observations, &[], 1.0, &config).wireframe;
         let confidence = assessed(&wireframe, &scene);
         coverage.add(&wireframe, &confidence, |junction| {
             let junction = wireframe.junctions[junction];

