@@ -65,24 +65,13 @@ def reconstruct(options, scene, run, seed):
     return sum(json.loads(manifest.read_text())["seconds"].values())
 
 
-def with_detections(scene, detections, out):
-    """A folder of links to a scene, with our 2D wireframes as its hawp/."""
-    copy = out.absolute()
-    copy.mkdir(parents=True, exist_ok=True)
-    for entry in [*scene.iterdir(), detections]:
-        link = copy / ("hawp" if entry == detections else entry.name)
-        if not link.exists():
-            link.symlink_to(entry.resolve())
-    return copy
-
-
 def rivals(options, scene, run):
     """(name, wireframe, seconds) of the others on the same 2D segments."""
     out = options.out / "rivals" / scene.name
     out.mkdir(parents=True, exist_ok=True)
     start = time.time()
-    folder = with_detections(scene, run / "detections", options.out / "scenes" / scene.name)
-    call(options.neat, "baseline", "line3d", folder, "--out", out / "line3d", "--overwrite")
+    # It detects the same as the run did.
+    call(options.neat, "baseline", "line3d", scene, "--out", out / "line3d")
     yield "Line3D++ (ours)", out / "line3d" / "wireframe.json", time.time() - start
     if importlib.util.find_spec("limap"):
         start = time.time()
