@@ -56,7 +56,7 @@ pub(super) fn cut_edges(images: &Images, mut corners: Corners) -> Wireframe3d {
                 stem_line.point_at(stem_line.line_parameter(&foot))
             };
             let near = (from - foot).norm() <= MAX_GAP * images.reach * pixel;
-            if !near || !(margin < place && place < 1.0 - margin) {
+            if !(near && margin < place && place < 1.0 - margin) {
                 continue;
             }
             if degrees[junction] == 1 {

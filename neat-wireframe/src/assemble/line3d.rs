@@ -121,7 +121,6 @@ pub fn line3d(
         // Agreement ends at two standard deviations.
         tolerance_in_pixels: 2.0 * config.sigma_in_pixels,
         alternatives: 1,
-        ..Default::default()
     };
     let alternatives =
         score_hypotheses(&views, &neighbours, config.ball_margin, min_views, &scoring);
