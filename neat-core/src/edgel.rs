@@ -6,6 +6,8 @@ use nalgebra::Vector2;
 
 /// Side of a cell of the index, in pixels: a search of a few pixels visits four at most.
 const CELL: f64 = 4.0;
+/// The index has at most this many cells along one side, whatever size an image claims.
+const MAX_CELLS: f64 = 2048.0;
 
 /// A point of an image edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +21,8 @@ pub struct Edgel {
 /// All edge points of an image, by where they are.
 #[derive(Clone, Debug, Default)]
 pub struct EdgelMap {
+    /// Side of a cell, in pixels.
+    cell: f64,
     columns: usize,
     rows: usize,
     /// First edgel of each cell, row by row, and the end.
@@ -30,13 +34,14 @@ impl EdgelMap {
     /// Indexes the edgels of a `width × height` image; those outside it, and those that
     /// are not finite, are left out.
     pub fn new(edgels: &[Edgel], width: u32, height: u32) -> Self {
-        let cells = |size: u32| ((f64::from(size) / CELL).ceil() as usize).max(1);
+        let side = CELL.max(f64::from(width.max(height)) / MAX_CELLS);
+        let cells = |size: u32| ((f64::from(size) / side).ceil() as usize).max(1);
         let (columns, rows) = (cells(width), cells(height));
         let cell_of = |edgel: &Edgel| {
             let [x, y] = [edgel.position.x, edgel.position.y].map(f64::from);
             let inside = x >= 0.0 && y >= 0.0 && x < f64::from(width) && y < f64::from(height);
             let finite = edgel.normal.iter().all(|value| value.is_finite());
-            (inside && finite).then(|| (y / CELL) as usize * columns + (x / CELL) as usize)
+            (inside && finite).then(|| (y / side) as usize * columns + (x / side) as usize)
         };
         let mut starts = vec![0_u32; columns * rows + 1];
         for cell in edgels.iter().filter_map(cell_of) {
@@ -58,6 +63,7 @@ impl EdgelMap {
             }
         }
         Self {
+            cell: side,
             columns,
             rows,
             starts,
@@ -118,7 +124,7 @@ impl EdgelMap {
         const ALONG: f64 = 0.75;
         let box_of = |axis: usize, count: usize| {
             let half = reach * normal[axis].abs() + ALONG;
-            let cell = |x: f64| (x / CELL).floor();
+            let cell = |x: f64| (x / self.cell).floor();
             let (low, high) = (cell(point[axis] - half), cell(point[axis] + half));
             // Not so for NaN.
             (high >= 0.0 && low < count as f64)
@@ -228,6 +234,7 @@ mod tests {
         ];
         assert_eq!(EdgelMap::new(&edgels, 10, 10).len(), 1);
         assert!(EdgelMap::new(&edgels, 0, 0).is_empty());
+        assert_eq!(EdgelMap::new(&edgels, u32::MAX, u32::MAX).len(), 1);
         let empty = EdgelMap::default();
         assert!(
             empty
