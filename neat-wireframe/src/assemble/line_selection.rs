@@ -58,6 +58,8 @@ pub(super) struct Selection<'a> {
     pub lines: Vec<ChosenLine>,
     /// Lines that the images show and that stand for curves.
     pub curved: usize,
+    /// For each edgel of each view, whether a line has it.
+    pub taken: Vec<Vec<bool>>,
 }
 
 /// A 3D position of a 2D segment.
@@ -213,6 +215,7 @@ fn choose<'a>(
         noise,
         lines,
         curved,
+        taken: chooser.taken,
     }
 }
 
@@ -242,36 +245,11 @@ impl Chooser<'_> {
         Some(ChosenLine { line, evidence })
     }
 
-    /// Takes the edgels beside a line, in all views: where something hides the middle of an
-    /// edge, its ends are still its own. And the 2D segments, where the line is shown.
+    /// Takes the edgels beside a line, and the 2D segments where it is shown.
     fn claim(&mut self, found: &ChosenLine, seed: SegmentId) {
         let images = self.images;
         self.explained[seed.view][seed.segment] = true;
-        for (view, prepared) in images.views.iter().enumerate() {
-            let Some(projected) = project_segment(prepared, &found.line) else {
-                continue;
-            };
-            let count = (CLAIM_DENSITY * projected.length())
-                .ceil()
-                .clamp(8.0, 4000.0);
-            let range = [0.0, 1.0];
-            let Some(samples) = images.samples(view, &found.line, range, Some(count as usize))
-            else {
-                continue;
-            };
-            let taken = &mut self.taken[view];
-            for (_, pixel) in &samples.points {
-                while let Some((_, edgel)) = images.maps[view].nearest(
-                    pixel,
-                    &samples.normal,
-                    images.reach,
-                    CLAIM_COSINE,
-                    |edgel| !taken[edgel],
-                ) {
-                    taken[edgel] = true;
-                }
-            }
-        }
+        claim_edgels(&images, &found.line, &mut self.taken);
         for view in found.evidence.views() {
             let prepared = &images.views[view];
             let Some(projected) = project_segment(prepared, &found.line) else {
@@ -282,6 +260,34 @@ impl Chooser<'_> {
                 if lies_on(detected, &projected, SEGMENT_REACHES * images.reach) {
                     self.explained[view][segment] = true;
                 }
+            }
+        }
+    }
+}
+
+/// Takes the edgels beside a line, in all views: where something hides the middle of an edge,
+/// its ends are still its own.
+pub(super) fn claim_edgels(images: &Images, line: &LineSegment3, taken: &mut [Vec<bool>]) {
+    for (view, prepared) in images.views.iter().enumerate() {
+        let Some(projected) = project_segment(prepared, line) else {
+            continue;
+        };
+        let count = (CLAIM_DENSITY * projected.length())
+            .ceil()
+            .clamp(8.0, 4000.0);
+        let Some(samples) = images.samples(view, line, [0.0, 1.0], Some(count as usize)) else {
+            continue;
+        };
+        let (map, taken) = (&images.maps[view], &mut taken[view]);
+        for (_, pixel) in &samples.points {
+            while let Some((_, edgel)) = map.nearest(
+                pixel,
+                &samples.normal,
+                images.reach,
+                CLAIM_COSINE,
+                |edgel| !taken[edgel],
+            ) {
+                taken[edgel] = true;
             }
         }
     }

@@ -15,6 +15,7 @@
 mod collinear_pieces;
 mod config;
 mod corners;
+mod edge_completion;
 mod edge_cutting;
 mod edge_samples;
 mod epipolar_matching;
@@ -42,6 +43,7 @@ pub use report::{AssembleReport, Assembled};
 use crate::ViewObservation;
 use collinear_pieces::merge_pieces;
 use corners::find_corners;
+use edge_completion::complete_edges;
 use edge_cutting::cut_edges;
 use edge_samples::Images;
 use graph_fitting::fit_graph;
@@ -112,7 +114,7 @@ pub fn assemble(
         maps,
         reach: 0.0,
     };
-    let selection = select_lines(images, &alternatives, config);
+    let mut selection = select_lines(images, &alternatives, config);
     drop(alternatives);
     let images = selection.images;
     report.noise_in_pixels = selection.noise;
@@ -124,6 +126,8 @@ pub fn assemble(
     let mut corners = find_corners(&images, &lines);
     report.ends = corners.junctions.len();
     fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
+    let (taken, least) = (&mut selection.taken, config.min_evidence);
+    report.completed_edges = complete_edges(&images, &mut corners, taken, least);
     let wireframe = cut_edges(&images, corners).map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
     report.edges = wireframe.edges.len();

@@ -33,6 +33,8 @@ pub struct AssembleReport {
     pub merged_pieces: usize,
     /// Places where lines end, alone or together.
     pub ends: usize,
+    /// Edges between corners that no pair of views could place.
+    pub completed_edges: usize,
     /// Junctions of the wireframe.
     pub junctions: usize,
     /// Edges of the wireframe.

@@ -105,7 +105,7 @@ fn observe(camera: &Camera, truth: &Wireframe3d, noise: &mut Noise) -> ViewObser
 }
 
 #[test]
-fn windows_come_back_with_their_corners_and_upright_edges() {
+fn windows_come_back_with_their_corners() {
     let truth = facade();
     let mut noise = Noise(7);
     let observations: Vec<_> = cameras()
@@ -119,9 +119,10 @@ fn windows_come_back_with_their_corners_and_upright_edges() {
         "junctions: {junctions:?}"
     );
     // Half of the edges lie along the line of the cameras: with each of them, all cameras are
-    // in one plane, and no pair of views proposes a place for it.
+    // in one plane, and no pair of views proposes a place for it. Two thirds of these come
+    // back between the corners of others.
     assert!(
-        segments.recall >= 0.5 && segments.precision >= 0.9,
+        segments.recall >= 0.8 && segments.precision >= 0.9,
         "segments: {segments:?}, {:?}",
         result.report
     );
