@@ -144,11 +144,11 @@ fn clipped(segment: &LineSegment2, size: Vector2<u32>) -> Option<LineSegment2> {
 
 /// An image with what its noise and texture ask for.
 pub(crate) struct PreparedImage {
-    smoothed: SmoothedImage,
+    pub smoothed: SmoothedImage,
     /// Standard deviation of its smoothing, in pixels.
     sigma: f64,
     /// The smallest strength of an edge, in grey levels per pixel.
-    min_gradient: f64,
+    pub min_gradient: f64,
 }
 
 impl PreparedImage {
@@ -164,14 +164,6 @@ impl PreparedImage {
             sigma,
             min_gradient,
         }
-    }
-
-    pub(crate) fn smoothed(&self) -> &SmoothedImage {
-        &self.smoothed
-    }
-
-    pub(crate) fn min_gradient(&self) -> f64 {
-        self.min_gradient
     }
 }
 

@@ -39,7 +39,7 @@ fn edgels(image: &RgbImage, config: &DetectorConfig) -> Vec<Edgel> {
     }
     let prepared = PreparedImage::new(image, config);
     let gradients = gradients(&prepared, width, height);
-    let min_strength = prepared.min_gradient() as f32;
+    let min_strength = prepared.min_gradient as f32;
     let mut found = Vec::new();
     for row in 2..height - 2 {
         for column in 2..width - 2 {
@@ -77,7 +77,7 @@ fn gradients(prepared: &PreparedImage, width: usize, height: usize) -> Vec<(f32,
     for row in 1..height - 1 {
         for column in 1..width - 1 {
             let mut tensor = Matrix2::<f32>::zeros();
-            for [x, y] in prepared.smoothed().differences(column, row) {
+            for [x, y] in prepared.smoothed.differences(column, row) {
                 tensor += Matrix2::new(x * x, x * y, x * y, y * y);
             }
             let tensor = tensor / 3.0;
@@ -100,4 +100,57 @@ fn interpolated(gradients: &[(f32, Vector2<f32>)], width: usize, place: &Vector2
     let first = row as usize * width + column as usize;
     let at = |offset: usize| gradients[first + offset].0;
     (1.0 - v) * ((1.0 - u) * at(0) + u * at(1)) + v * ((1.0 - u) * at(width) + u * at(width + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+
+    /// A bright disc, each pixel by the share of it that the disc covers.
+    fn disc(center: [f64; 2], radius: f64) -> RgbImage {
+        const PARTS: u32 = 8;
+        RgbImage::from_fn(80, 64, |x, y| {
+            let covered = (0..PARTS * PARTS).filter(|part| {
+                let at = |pixel: u32, part: u32| {
+                    f64::from(pixel) + (f64::from(part) + 0.5) / f64::from(PARTS) - 0.5
+                };
+                let [dx, dy] = [
+                    at(x, part % PARTS) - center[0],
+                    at(y, part / PARTS) - center[1],
+                ];
+                dx.hypot(dy) < radius
+            });
+            let share = covered.count() as f64 / f64::from(PARTS * PARTS);
+            Rgb([(20.0 + 200.0 * share) as u8; 3])
+        })
+    }
+
+    #[test]
+    fn edgels_lie_on_the_rim_of_a_disc_and_point_across_it() {
+        let (center, radius) = ([38.3, 30.6], 20.0);
+        let found = edgels(&disc(center, radius), &DetectorConfig::default());
+        // One for most pixels of the rim, and no other.
+        assert!((80..160).contains(&found.len()), "{}", found.len());
+        let mut sum = 0.0;
+        for edgel in &found {
+            let offset = edgel.position.cast::<f64>() - Vector2::from(center);
+            let off = (offset.norm() - radius).abs();
+            // Strengths between pixels are linear, which draws maxima towards pixels.
+            assert!(off < 0.2, "{off}");
+            sum += off;
+            let cosine = edgel.normal.cast::<f64>().dot(&offset.normalize());
+            assert!(cosine.abs() > 0.99, "{cosine}");
+        }
+        let mean = sum / found.len() as f64;
+        assert!(mean < 0.08, "{mean}");
+    }
+
+    #[test]
+    fn images_without_room_or_contrast_have_none() {
+        for (width, height) in [(0, 0), (4, 40), (40, 4), (40, 40)] {
+            let flat = RgbImage::from_pixel(width, height, Rgb([90; 3]));
+            assert!(edgels(&flat, &DetectorConfig::default()).is_empty());
+        }
+    }
 }

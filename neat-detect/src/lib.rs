@@ -40,10 +40,12 @@ mod robust_line;
 pub mod segment_file;
 mod segment_search;
 mod smoothed_image;
+mod views;
 
 pub use config::{DetectorConfig, DetectorConfigError};
 pub use detection::{detect, wireframe_from_segments};
 pub use edgels::edgel_map;
+pub use views::{detect_views, edgel_maps};
 
 /// The example of the README compiles.
 #[cfg(doctest)]

@@ -6,7 +6,7 @@ use crate::config::{BackEnd, Config};
 use crate::plan::Plan;
 use nalgebra::Vector3;
 use neat_core::{EdgelMap, LineSegment3, Scene, SceneError, Wireframe3d};
-use neat_detect::{DetectorConfig, edgel_map};
+use neat_detect::{DetectorConfig, edgel_maps};
 use neat_sdf::RayBundle;
 use neat_tensor::host::host_vec;
 use neat_train::TrainedField;
@@ -20,7 +20,6 @@ use neat_wireframe::paper::{PaperBackEndCounts, PaperBackEndError, SupportedSegm
 use neat_wireframe::proposals::{WeightedSegment, robust_segment};
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::cell::LazyCell;
 pub use thin_regions::paper_regions;
@@ -199,10 +198,7 @@ fn edgels(
     let mut maps = Vec::with_capacity(views.len());
     // Some at a time, so that progress can be told in between.
     for chunk in views.chunks(4 * rayon::current_num_threads()) {
-        let found: Result<Vec<EdgelMap>, SceneError> = (chunk.par_iter())
-            .map(|view| Ok(edgel_map(&*view.image.read()?, config, scene.pixel_center)))
-            .collect();
-        maps.extend(found?);
+        maps.extend(edgel_maps(chunk, config, scene.pixel_center)?);
         progress(maps.len() as f64 / views.len() as f64)?;
     }
     Ok(maps)

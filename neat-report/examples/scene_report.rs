@@ -9,8 +9,8 @@
 #![expect(clippy::print_stdout, reason = "an example tells what it does")]
 
 use neat_core::layout::HAWP_DIR;
-use neat_core::{EdgelMap, LineSegment2, LoadOptions, Scene, SceneError, Wireframe3d, load_scene};
-use neat_detect::{DetectorConfig, detect, edgel_map};
+use neat_core::{LineSegment2, LoadOptions, Scene, Wireframe3d, load_scene};
+use neat_detect::{DetectorConfig, detect_views, edgel_maps};
 use neat_report::{FactGroup, PhotographConfig, Report};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::assemble::{AssembleConfig, assemble};
@@ -39,10 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let loaded = load_scene(folder, &options)?;
     let mut scene = loaded.scene;
     if detected {
-        (scene.views.par_iter_mut()).try_for_each(|view| {
-            view.wireframe = detect(&*view.image.read()?, &DetectorConfig::default());
-            Ok::<(), SceneError>(())
-        })?;
+        detect_views(&mut scene, &DetectorConfig::default())?;
     }
     let observations = ViewObservation::from_scene(&scene, MIN_SCORE);
     let in_world = match given {
@@ -51,7 +48,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             (read_json(path)?.wireframe()).map(|point| world_from_original.apply(point))
         }
         None => {
-            let edgels = edgels(&scene)?;
+            let config = DetectorConfig::default();
+            let edgels = edgel_maps(&scene.views, &config, scene.pixel_center)?;
             let config = AssembleConfig::default();
             assemble(&observations, &edgels, scene.sphere_radius, &config).wireframe
         }
@@ -77,13 +75,6 @@ fn main() -> Result<(), Box<dyn Error>> {
         start.elapsed().as_secs_f64()
     );
     Ok(())
-}
-
-fn edgels(scene: &Scene) -> Result<Vec<EdgelMap>, SceneError> {
-    let config = DetectorConfig::default();
-    (scene.views.par_iter())
-        .map(|view| Ok(edgel_map(&*view.image.read()?, &config, scene.pixel_center)))
-        .collect()
 }
 
 /// The wireframe in the frame of the files, with the 2D segments that lie on its

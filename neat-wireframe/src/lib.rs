@@ -50,6 +50,7 @@ mod segment_ends;
 mod segment_matching;
 mod signed_distance;
 mod solve;
+mod statistics;
 mod triangulation;
 mod used_junctions;
 

@@ -21,8 +21,8 @@ mod drawing;
 use nalgebra::Vector3;
 use neat_core::ground_truth::read_wireframe;
 use neat_core::layout::HAWP_DIR;
-use neat_core::{EdgelMap, LoadOptions, Scene, SceneError, load_scene};
-use neat_detect::{DetectorConfig, detect, edgel_map};
+use neat_core::{LoadOptions, Scene, load_scene};
+use neat_detect::{DetectorConfig, detect_views, edgel_maps};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::Wireframe3d;
 use neat_wireframe::assemble::{
@@ -34,7 +34,6 @@ use neat_wireframe::metrics::{
     ImageEvidenceConfig, Matching, PointCloud, SegmentDistance, image_evidence, junction_distances,
     precision_recall, segment_distances,
 };
-use rayon::prelude::*;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -95,7 +94,7 @@ fn main() -> Result<(), AnyError> {
     }
     let mut scene = loaded.scene;
     if detected {
-        detect_wireframes(&mut scene)?;
+        detect_views(&mut scene, &DetectorConfig::default())?;
     }
     let observations = ViewObservation::from_scene(&scene, 0.05);
 
@@ -173,7 +172,7 @@ fn assembled(
 ) -> Result<Reconstruction, AnyError> {
     let config: AssembleConfig = read_config(arguments.config.as_deref())?;
     let start = Instant::now();
-    let edgels = edgels(scene)?;
+    let edgels = edgel_maps(&scene.views, &DetectorConfig::default(), scene.pixel_center)?;
     println!("{:>12} {:8.3} s", "edgels", start.elapsed().as_secs_f64());
     let radius = scene.sphere_radius;
     let result = assemble(observations, &edgels, radius, &config);
@@ -190,26 +189,6 @@ fn assembled(
         views_per_edge: confidence.edges.iter().map(|edge| edge.views).collect(),
         wireframe: result.wireframe,
     })
-}
-
-/// Detects the 2D wireframes of all views, in image coordinates.
-fn detect_wireframes(scene: &mut Scene) -> Result<(), SceneError> {
-    let pixel_center = scene.pixel_center;
-    (scene.views.par_iter_mut()).try_for_each(|view| {
-        let mut wireframe = detect(&*view.image.read()?, &DetectorConfig::default());
-        for vertex in &mut wireframe.vertices {
-            *vertex = vertex.add_scalar(pixel_center);
-        }
-        view.wireframe = wireframe;
-        Ok(())
-    })
-}
-
-fn edgels(scene: &Scene) -> Result<Vec<EdgelMap>, SceneError> {
-    let config = DetectorConfig::default();
-    (scene.views.par_iter())
-        .map(|view| Ok(edgel_map(&*view.image.read()?, &config, scene.pixel_center)))
-        .collect()
 }
 
 fn baseline(

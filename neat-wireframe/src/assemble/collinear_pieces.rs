@@ -15,19 +15,28 @@ pub(super) fn merge_pieces(images: &Images, mut lines: Vec<ChosenLine>) -> Vec<C
         let views = |line: &ChosenLine| line.evidence.showing.len();
         (views(b).cmp(&views(a))).then(b.line.length().total_cmp(&a.line.length()))
     });
-    let mut merged: Vec<ChosenLine> = Vec::new();
+    let size = |line: &ChosenLine| images.pixel_size(&line.line, line.evidence.views());
+    // With the size of a pixel.
+    let mut merged: Vec<(f64, ChosenLine)> = Vec::new();
     for piece in lines {
-        let size = images.pixel_size(&piece.line, piece.evidence.views());
-        let same = merged.iter_mut().find(|other| {
-            let other_size = images.pixel_size(&other.line, other.evidence.views());
-            continues(&other.line, &piece.line, size.min(other_size), images.reach)
+        let pixel = size(&piece);
+        let same = merged.iter_mut().find(|(other_pixel, other)| {
+            continues(
+                &other.line,
+                &piece.line,
+                pixel.min(*other_pixel),
+                images.reach,
+            )
         });
         match same {
-            None => merged.push(piece),
-            Some(line) => join(images, line, piece),
+            None => merged.push((pixel, piece)),
+            Some((pixel, line)) => {
+                join(images, line, piece);
+                *pixel = size(line);
+            }
         }
     }
-    merged
+    merged.into_iter().map(|(_, line)| line).collect()
 }
 
 /// Whether `piece` lies on `line`, beside or next to it.

@@ -11,7 +11,8 @@ use rayon::prelude::*;
 
 /// Lines meet where so many reaches lie between them at most.
 const MAX_GAP: f64 = 2.5;
-/// An end may be off along its line by so many pixels: corners are round and hidden …
+/// An end may be off along its line by so many pixels, since corners are round and hidden;
+/// with 8 or 24 F1 of photographs with truth is the same …
 const WINDOW_IN_PIXELS: f64 = 16.0;
 /// … or by this share of the line, whose ends grow uncertain with its depth …
 const WINDOW_SHARE: f64 = 0.1;

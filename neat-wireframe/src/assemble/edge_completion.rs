@@ -5,7 +5,6 @@ use super::corners::Corners;
 use super::edge_samples::Images;
 use super::line_selection::claim_edgels;
 use crate::projection::project_in_front;
-use nalgebra::Vector2;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -32,10 +31,8 @@ pub(super) fn complete_edges(
         .into_par_iter()
         .filter(|pair| !known.contains(pair))
         .map(|pair| {
-            (
-                images.evidence(&line(pair), Some(taken), min_evidence).gain,
-                pair,
-            )
+            let evidence = images.evidence(&line(pair), Some(taken), min_evidence);
+            (evidence.gain, pair)
         })
         .filter(|(gain, _)| *gain > min_evidence)
         .collect();
@@ -56,20 +53,25 @@ pub(super) fn complete_edges(
 fn drawn_pairs(images: &Images, corners: &Corners) -> Vec<[usize; 2]> {
     let of_views: Vec<BTreeSet<[usize; 2]>> = (images.views.par_iter())
         .map(|view| {
-            let pixels: Vec<(usize, Vector2<f64>)> = (corners.junctions.iter().enumerate())
-                .filter_map(|(index, point)| Some((index, project_in_front(&view.camera, point)?)))
-                .collect();
-            let corner_at = |end: &Vector2<f64>| {
-                (pixels.iter())
-                    .map(|(index, pixel)| ((pixel - end).norm(), *index))
-                    .filter(|(distance, _)| *distance <= END_DISTANCE)
-                    .min_by(|a, b| a.0.total_cmp(&b.0))
-                    .map(|(_, index)| index)
-            };
-            (view.segments.iter())
-                .filter_map(|segment| {
-                    let [start, end] = segment.segment.ends();
-                    let (a, b) = (corner_at(&start)?, corner_at(&end)?);
+            // Of each end of each segment the nearest corner, and how far it is.
+            let mut corner_at = vec![[(f64::INFINITY, None); 2]; view.segments.len()];
+            for (corner, point) in corners.junctions.iter().enumerate() {
+                let Some(pixel) = project_in_front(&view.camera, point) else {
+                    continue;
+                };
+                view.index.for_each_near(&pixel, END_DISTANCE, |segment| {
+                    let ends = view.segments[segment].segment.ends();
+                    for (end, nearest) in ends.iter().zip(&mut corner_at[segment]) {
+                        let distance = (pixel - end).norm();
+                        if distance <= END_DISTANCE && distance < nearest.0 {
+                            *nearest = (distance, Some(corner));
+                        }
+                    }
+                });
+            }
+            (corner_at.into_iter())
+                .filter_map(|[(_, start), (_, end)]| {
+                    let (a, b) = (start?, end?);
                     (a != b).then(|| [a.min(b), a.max(b)])
                 })
                 .collect()

@@ -1,12 +1,12 @@
 //! Where a 3D line ought to show in the images, and whether edgels are there.
 
-use super::view_segments::TrackView;
+use super::view_segments::PreparedView;
 use crate::projection::project_in_front;
+use crate::statistics::upper_median;
 use nalgebra::Vector2;
 use neat_core::{EdgelMap, LineSegment2, LineSegment3};
 
-/// Edgels of a line have at most this angle to its normal (cosine): about 20°, what noise
-/// does to the gradient of a weak edge.
+/// Edgels of a line have at most this angle to its normal (cosine): about 20°, judged.
 const MIN_COSINE: f64 = 0.93;
 /// Distance between samples in pixels: the smoothing before gradients correlates nearer
 /// ones.
@@ -25,7 +25,7 @@ const MIN_INSIDE: f64 = 1.0 / 3.0;
 /// All that the assembler knows of the images.
 #[derive(Clone, Copy)]
 pub(super) struct Images<'a> {
-    pub views: &'a [TrackView],
+    pub views: &'a [PreparedView],
     /// The edgels of each view.
     pub maps: &'a [EdgelMap],
     /// Farther beside a line no edgel is its own, in pixels.
@@ -130,11 +130,8 @@ impl Images<'_> {
         views: impl Iterator<Item = usize>,
     ) -> f64 {
         let middle = line.point_at(0.5);
-        median(
-            views
-                .map(|view| self.views[view].pixel_size_at(&middle))
-                .collect(),
-        )
+        let sizes = views.map(|view| self.views[view].pixel_size_at(&middle));
+        upper_median(&mut sizes.collect::<Vec<f64>>())
     }
 
     /// Median length of a line's projections, in pixels.
@@ -144,21 +141,13 @@ impl Images<'_> {
         views: impl Iterator<Item = usize>,
     ) -> f64 {
         let lengths = views.filter_map(|view| project_segment(&self.views[view], line));
-        median(lengths.map(|segment| segment.length()).collect())
+        let lengths = lengths.map(|segment| segment.length());
+        upper_median(&mut lengths.collect::<Vec<f64>>())
     }
-}
-
-/// The upper median; 0 of nothing.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// The projection of a 3D segment, `None` unless it lies in front of the camera.
-pub(super) fn project_segment(view: &TrackView, line: &LineSegment3) -> Option<LineSegment2> {
+pub(super) fn project_segment(view: &PreparedView, line: &LineSegment3) -> Option<LineSegment2> {
     Some(LineSegment2::new(
         project_in_front(&view.camera, &line.start)?,
         project_in_front(&view.camera, &line.end)?,

@@ -8,7 +8,7 @@
 //! segments*, 2017, Sec. 3.2).
 
 use super::neighbours::ball_interval;
-use super::view_segments::TrackView;
+use super::view_segments::PreparedView;
 use nalgebra::Vector3;
 use std::f64::consts::{PI, TAU};
 
@@ -94,8 +94,8 @@ fn wrapped(angle: f64) -> f64 {
 
 /// Two views, with the second one's segments sorted by their arcs.
 pub(super) struct ViewPair<'a> {
-    view: &'a TrackView,
-    other: &'a TrackView,
+    view: &'a PreparedView,
+    other: &'a PreparedView,
     slot: usize,
     pencil: Pencil,
     /// Arcs of the other view's segments, ascending, each also one turn lower
@@ -105,7 +105,11 @@ pub(super) struct ViewPair<'a> {
 
 impl<'a> ViewPair<'a> {
     /// `slot` is passed on to the matches. `None` for cameras at one place.
-    pub(super) fn new(view: &'a TrackView, other: &'a TrackView, slot: usize) -> Option<Self> {
+    pub(super) fn new(
+        view: &'a PreparedView,
+        other: &'a PreparedView,
+        slot: usize,
+    ) -> Option<Self> {
         let baseline = other.camera.center_in_world - view.camera.center_in_world;
         let pencil = Pencil::new(&baseline)?;
         let mut arcs = Vec::with_capacity(3 * other.segments.len());
@@ -237,7 +241,7 @@ mod tests {
         ];
         let views: Vec<_> = views_of_edges(&cameras, &junctions, &edges)
             .iter()
-            .map(|observation| TrackView::new(observation, 1.0, 1.0))
+            .map(|observation| PreparedView::new(observation, 1.0, 1.0))
             .collect();
         let pair = ViewPair::new(&views[0], &views[1], 7).unwrap();
         let mut found = 0;
@@ -259,7 +263,7 @@ mod tests {
     fn cameras_at_one_place_are_no_pair() {
         let (junctions, edges) = cube();
         let camera = camera_looking_at_origin(&Vector3::new(1.6, 1.4, 1.3));
-        let view = TrackView::new(&views_of_edges(&[camera], &junctions, &edges)[0], 1.0, 1.0);
+        let view = PreparedView::new(&views_of_edges(&[camera], &junctions, &edges)[0], 1.0, 1.0);
         assert!(ViewPair::new(&view, &view, 0).is_none());
     }
 }

@@ -4,8 +4,8 @@ use super::edge_samples::{Images, project_segment};
 use super::line_selection::ChosenLine;
 use crate::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, adjust_observed};
 use crate::projection::project_in_front;
-use crate::solve::Cauchy;
-use nalgebra::{Matrix2, Vector2, Vector3};
+use crate::solve::{Cauchy, reweighted};
+use nalgebra::{Vector2, Vector3};
 use neat_core::{LineSegment2, LineSegment3};
 use rayon::prelude::*;
 
@@ -68,46 +68,36 @@ fn observations(
         .collect()
 }
 
-/// The segment through points beside another, as far as they reach, by iteratively
-/// reweighted least squares.
+/// The segment through points beside another, as far as they reach, hardly moved by outliers.
 fn segment_through(
     points: &[Vector2<f64>],
     beside: &LineSegment2,
     scale: f64,
 ) -> Option<LineSegment2> {
-    const ROUNDS: usize = 5;
     if points.len() < MIN_EDGELS {
         return None;
     }
     let direction = (beside.end - beside.start).try_normalize(1e-9)?;
     let normal = Vector2::new(-direction.y, direction.x);
-    let places: Vec<[f64; 2]> = (points.iter())
+    let rows: Vec<(Vector2<f64>, f64)> = (points.iter())
         .map(|point| {
             let offset = point - beside.start;
-            [offset.dot(&direction), offset.dot(&normal)]
+            (
+                Vector2::new(1.0, offset.dot(&direction)),
+                offset.dot(&normal),
+            )
         })
         .collect();
-    let mut line = Vector2::zeros();
-    for _ in 0..ROUNDS {
-        let mut matrix = Matrix2::zeros();
-        let mut right = Vector2::zeros();
-        for [along, across] in &places {
-            let row = Vector2::new(1.0, *along);
-            let residual = across - row.dot(&line);
-            let weight = 1.0 / (1.0 + (residual / (0.5 * scale)).powi(2));
-            matrix += weight * row * row.transpose();
-            right += weight * *across * row;
-        }
-        line = matrix.cholesky()?.solve(&right);
-    }
+    let loss = Cauchy { scale: 0.5 * scale };
+    let line = reweighted(&rows, loss, 0.0)?.solution;
     let at = |along: f64| {
         beside.start + direction * along + normal * line.dot(&Vector2::new(1.0, along))
     };
-    let first = places.iter().map(|p| p[0]).fold(f64::INFINITY, f64::min);
-    let last = places
-        .iter()
-        .map(|p| p[0])
-        .fold(f64::NEG_INFINITY, f64::max);
+    let along = rows.iter().map(|(row, _)| row.y);
+    let (first, last) = (
+        along.clone().fold(f64::INFINITY, f64::min),
+        along.fold(f64::NEG_INFINITY, f64::max),
+    );
     (last - first > MIN_LENGTH).then(|| LineSegment2::new(at(first), at(last)))
 }
 

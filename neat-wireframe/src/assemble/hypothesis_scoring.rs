@@ -7,7 +7,7 @@
 //! agreement is a reprojection test.
 
 use super::epipolar_matching::{LineMatch, ViewPair};
-use super::view_segments::{SegmentId, TrackView};
+use super::view_segments::{PreparedView, SegmentId};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -56,7 +56,7 @@ pub(super) type Alternatives = Vec<Vec<Vec<Hypothesis>>>;
 
 /// Matches and scores all segments.
 pub(super) fn score_hypotheses(
-    views: &[TrackView],
+    views: &[PreparedView],
     neighbours: &[Vec<usize>],
     ball_radius: f64,
     min_views: usize,

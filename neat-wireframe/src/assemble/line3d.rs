@@ -20,7 +20,7 @@ use super::graph_segmentation::{Link, segment_graph};
 use super::hypothesis_scoring::{Hypothesis, Scoring, score_hypotheses};
 use super::neighbours::neighbours;
 use super::projected_line::ProjectedLine;
-use super::view_segments::{SegmentId, TrackView, segment_of};
+use super::view_segments::{PreparedView, SegmentId, segment_of};
 use crate::{ViewObservation, Wireframe3d};
 use nalgebra::{Matrix3, Vector3};
 use neat_core::LineSegment3;
@@ -109,11 +109,11 @@ pub fn line3d(
         return Vec::new();
     }
     let min_views = config.min_views.max(2);
-    let views: Vec<TrackView> = observations
+    let views: Vec<PreparedView> = observations
         .par_iter()
         .map(|observation| {
             let length = config.min_segment_length_in_pixels;
-            TrackView::new(observation, scene_radius.recip(), length)
+            PreparedView::new(observation, scene_radius.recip(), length)
         })
         .collect();
     let neighbours = neighbours(&views, config.ball_margin, config.neighbours);
@@ -164,7 +164,7 @@ struct Positioned {
 }
 
 /// The partners that are alike enough, in both directions.
-fn links(views: &[TrackView], positioned: &[Positioned], config: &Line3dConfig) -> Vec<Link> {
+fn links(views: &[PreparedView], positioned: &[Positioned], config: &Line3dConfig) -> Vec<Link> {
     let index_of = |id: SegmentId| positioned.binary_search_by_key(&id, |p| p.id).ok();
     let found: Vec<Vec<Link>> = positioned
         .par_iter()
@@ -187,7 +187,7 @@ fn links(views: &[TrackView], positioned: &[Positioned], config: &Line3dConfig) 
 
 /// From 0 to 1: how near each position lies to the other's 2D segment, and how
 /// parallel the two are.
-fn affinity(views: &[TrackView], a: &Positioned, b: &Positioned, config: &Line3dConfig) -> f64 {
+fn affinity(views: &[PreparedView], a: &Positioned, b: &Positioned, config: &Line3dConfig) -> f64 {
     let [u, v] = [a, b].map(|p| (p.line.end - p.line.start).normalize());
     let degrees = u.dot(&v).abs().min(1.0).acos().to_degrees();
     let bell = |x: f64, sigma: f64| (-0.5 * (x / sigma).powi(2)).exp();
@@ -205,7 +205,7 @@ fn affinity(views: &[TrackView], a: &Positioned, b: &Positioned, config: &Line3d
 
 /// The line through all ends of a cluster, where enough views show it.
 fn segments_of_cluster(
-    views: &[TrackView],
+    views: &[PreparedView],
     members: &[&Positioned],
     min_views: usize,
 ) -> Vec<Line3dSegment> {

@@ -8,7 +8,7 @@ use neat_core::LineSegment3;
 /// Probability that there is an edgel beside an edge that is not hidden.
 const HIT: f64 = 0.9;
 /// What a sample without an edgel says, in nats: the edge ends there, or something hides it
-/// in this view; the odds against the end are those of a view beside the line.
+/// in this view. Of -0.3, -0.6 and -1.2 the best on photographs with truth.
 const MISS: f64 = -1.2;
 /// The least that an edgel says where they are everywhere.
 const LEAST_HIT: f64 = 0.05;

@@ -2,7 +2,7 @@
 
 use super::edge_samples::Images;
 use super::projected_line::ProjectedLine;
-use super::view_segments::TrackView;
+use super::view_segments::PreparedView;
 use crate::solve::{Cauchy, LeastSquares, Options, minimise};
 use nalgebra::{Matrix3x2, Matrix4, Vector2, Vector3, Vector4};
 use neat_core::LineSegment3;
@@ -64,7 +64,7 @@ struct Observation {
 }
 
 struct LineProblem<'a> {
-    views: &'a [TrackView],
+    views: &'a [PreparedView],
     /// By view.
     observations: Vec<Observation>,
     loss: Cauchy,

@@ -2,11 +2,12 @@
 //! before it has.
 
 use super::config::AssembleConfig;
-use super::edge_samples::{Images, median, project_segment};
+use super::edge_samples::{Images, project_segment};
 use super::hypothesis_scoring::Alternatives;
 use super::line_evidence::LineEvidence;
 use super::projected_line::ProjectedLine;
 use super::view_segments::SegmentId;
+use crate::statistics::{SIGMA_BY_MEDIAN, upper_median};
 use neat_core::{LineSegment2, LineSegment3};
 use rayon::prelude::*;
 use std::collections::BinaryHeap;
@@ -29,8 +30,6 @@ const MIN_EDGELS_FOR_NOISE: usize = 20;
 const USUAL_NOISE: f64 = 0.3;
 /// The least noise, in pixels: a bow of more tells of a curve, not of noise.
 const LEAST_NOISE: f64 = 0.05;
-/// Standard deviation of a normal distribution by its median absolute value.
-const DEVIATION_BY_MEDIAN: f64 = 1.4826;
 /// Reaches of the rounds of fitting: the first line is a guess.
 const FITTING_REACHES: [f64; 3] = [1.3, 1.0, 1.0];
 /// An evidence that others have lowered by more goes back into the queue, in nats.
@@ -111,7 +110,7 @@ fn candidates(images: &Images, alternatives: &Alternatives, step: usize) -> Vec<
 /// The median over lines of the standard deviation of their edgels, in pixels; lines that
 /// stand for curves do not count.
 fn noise_of_edgels(images: &Images, lines: &[ChosenLine]) -> f64 {
-    let deviations: Vec<f64> = lines
+    let mut deviations: Vec<f64> = lines
         .par_iter()
         .filter_map(|chosen| {
             let mut distances = Vec::new();
@@ -123,13 +122,13 @@ fn noise_of_edgels(images: &Images, lines: &[ChosenLine]) -> f64 {
                 }
             }
             (distances.len() >= MIN_EDGELS_FOR_NOISE)
-                .then(|| DEVIATION_BY_MEDIAN * median(distances))
+                .then(|| SIGMA_BY_MEDIAN * upper_median(&mut distances))
         })
         .collect();
     if deviations.is_empty() {
         USUAL_NOISE
     } else {
-        median(deviations)
+        upper_median(&mut deviations)
     }
 }
 

@@ -8,8 +8,11 @@
 //! left. Lines that bend are curves. Ends that meet become corners, all corners are fitted
 //! to the edgels together, and edges are cut where others end on them.
 //!
-//! Nothing is compared with pixels as such: edgels are so noisy as the scene's poses and
-//! images make them, which the first lines tell, and every tolerance follows from that.
+//! Edgels are so noisy as the scene's poses and images make them, which the first lines tell;
+//! how near to a line is near are multiples of that. Along edges, ends have windows in
+//! pixels. Unless a
+//! comment says so, no constant has been measured on its own.
+//!
 //! All steps work in a world whose scene ball is the unit ball around the origin.
 
 mod collinear_pieces;
@@ -51,7 +54,7 @@ use hypothesis_scoring::{Scoring, score_hypotheses};
 use line_selection::select_lines;
 use neat_core::{EdgelMap, LineSegment2};
 use rayon::prelude::*;
-use view_segments::TrackView;
+use view_segments::PreparedView;
 
 /// Views that must agree on a position for it to be proposed; the images decide.
 const MIN_VIEWS: usize = 2;
@@ -79,10 +82,10 @@ pub fn assemble(
         return Assembled::default();
     }
     let _span = tracing::debug_span!("assemble", views = observations.len()).entered();
-    let views: Vec<TrackView> = (observations.par_iter())
+    let views: Vec<PreparedView> = (observations.par_iter())
         .map(|observation| {
             let min_length = config.min_segment_length_in_pixels;
-            TrackView::new(observation, scene_radius.recip(), min_length)
+            PreparedView::new(observation, scene_radius.recip(), min_length)
         })
         .collect();
     let of_segments: Vec<EdgelMap>;
@@ -136,7 +139,7 @@ pub fn assemble(
 }
 
 /// The edgels of a view that is known by its segments only.
-fn edgels_of_segments(view: &TrackView) -> EdgelMap {
+fn edgels_of_segments(view: &PreparedView) -> EdgelMap {
     let segments: Vec<LineSegment2> = view.segments.iter().map(|s| s.segment).collect();
     EdgelMap::of_segments(&segments, view.camera.width, view.camera.height)
 }

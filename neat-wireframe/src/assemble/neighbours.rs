@@ -1,7 +1,7 @@
 //! For each view the other views that see the same part of the scene under a
 //! useful angle.
 
-use super::view_segments::TrackView;
+use super::view_segments::PreparedView;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -20,7 +20,11 @@ const SAMPLED_DEPTHS: usize = 6;
 /// segments within the ball of radius `ball_radius` stand for it; a neighbour is
 /// worth the number of these that it sees under a useful angle, small angles
 /// less.
-pub(super) fn neighbours(views: &[TrackView], ball_radius: f64, count: usize) -> Vec<Vec<usize>> {
+pub(super) fn neighbours(
+    views: &[PreparedView],
+    ball_radius: f64,
+    count: usize,
+) -> Vec<Vec<usize>> {
     views
         .par_iter()
         .enumerate()
@@ -41,7 +45,7 @@ pub(super) fn neighbours(views: &[TrackView], ball_radius: f64, count: usize) ->
 }
 
 /// Points within the ball on the rays through the middles of some segments.
-fn sample_points(view: &TrackView, ball_radius: f64) -> Vec<Vector3<f64>> {
+fn sample_points(view: &PreparedView, ball_radius: f64) -> Vec<Vector3<f64>> {
     let step = view.segments.len().div_ceil(SAMPLED_SEGMENTS.max(1)).max(1);
     let depths = SAMPLED_DEPTHS.max(1);
     let mut points = Vec::new();
@@ -59,7 +63,7 @@ fn sample_points(view: &TrackView, ball_radius: f64) -> Vec<Vector3<f64>> {
     points
 }
 
-fn worth(view: &TrackView, other: &TrackView, points: &[Vector3<f64>]) -> f64 {
+fn worth(view: &PreparedView, other: &PreparedView, points: &[Vector3<f64>]) -> f64 {
     let [min, max] = [MIN_ANGLE_IN_DEGREES, MAX_ANGLE_IN_DEGREES].map(f64::to_radians);
     points
         .iter()
@@ -97,12 +101,12 @@ mod tests {
     use super::*;
     use crate::test_scenes::{camera_looking_at_origin, cube, views_of_edges};
 
-    fn view_at(degrees: f64) -> TrackView {
+    fn view_at(degrees: f64) -> PreparedView {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let camera = camera_looking_at_origin(&(2.5 * Vector3::new(sin, cos, 0.3)));
         let (junctions, edges) = cube();
         let observation = &views_of_edges(&[camera], &junctions, &edges)[0];
-        TrackView::new(observation, 1.0, 1.0)
+        PreparedView::new(observation, 1.0, 1.0)
     }
 
     #[test]

@@ -1,23 +1,24 @@
 //! A cube without noise, for the unit tests of the steps.
 
 use super::edge_samples::Images;
-use super::view_segments::TrackView;
+use super::view_segments::PreparedView;
 use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
 use neat_core::{EdgelMap, LineSegment3};
 
 /// Views of all edges of the cube of half side 0.5; segment e shows edge e.
 pub(super) struct CubeViews {
-    views: Vec<TrackView>,
+    views: Vec<PreparedView>,
     maps: Vec<EdgelMap>,
 }
 
 impl CubeViews {
     pub(super) fn new(count: usize) -> Self {
         let (junctions, edges) = cube();
-        let views: Vec<TrackView> = views_of_edges(&cameras_on_sphere(count), &junctions, &edges)
-            .iter()
-            .map(|observation| TrackView::new(observation, 1.0, 1.0))
-            .collect();
+        let views: Vec<PreparedView> =
+            views_of_edges(&cameras_on_sphere(count), &junctions, &edges)
+                .iter()
+                .map(|observation| PreparedView::new(observation, 1.0, 1.0))
+                .collect();
         Self {
             maps: views.iter().map(super::edgels_of_segments).collect(),
             views,

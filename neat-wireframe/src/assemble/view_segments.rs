@@ -11,7 +11,7 @@ use neat_core::{Camera, LineSegment2, LineSegment3};
 pub(super) struct SegmentId {
     /// Index of the view.
     pub view: usize,
-    /// Index into [`TrackView::segments`].
+    /// Index into [`PreparedView::segments`].
     pub segment: usize,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct ViewSegment {
 
 /// A camera with its prepared segments.
 #[derive(Clone, Debug)]
-pub(super) struct TrackView {
+pub(super) struct PreparedView {
     /// In the world whose scene ball has radius 1.
     pub camera: Camera,
     /// Mean focal length in pixels.
@@ -41,7 +41,7 @@ pub(super) struct TrackView {
     pub index: SegmentGrid,
 }
 
-impl TrackView {
+impl PreparedView {
     /// Prepares a view; lengths of the world are multiplied by `scale`. A camera
     /// that cannot be used leaves a view without segments, and segments that are
     /// not finite or shorter than `min_length_in_pixels` are left out.
@@ -99,7 +99,7 @@ impl TrackView {
 }
 
 /// The 2D segment that an id names.
-pub(super) fn segment_of(views: &[TrackView], id: SegmentId) -> &ViewSegment {
+pub(super) fn segment_of(views: &[PreparedView], id: SegmentId) -> &ViewSegment {
     &views[id.view].segments[id.segment]
 }
 
@@ -113,7 +113,7 @@ mod tests {
         let (junctions, edges) = cube();
         let observations = views_of_edges(&cameras_on_sphere(3), &junctions, &edges);
         for observation in &observations {
-            let view = TrackView::new(observation, 1.0, 1.0);
+            let view = PreparedView::new(observation, 1.0, 1.0);
             for (segment, [a, b]) in view.segments.iter().zip(&edges) {
                 for junction in [junctions[*a], junctions[*b]] {
                     let offset = junction - view.camera.center_in_world;
@@ -129,12 +129,12 @@ mod tests {
         let mut observations = views_of_edges(&cameras_on_sphere(2), &junctions, &edges);
         observations[0].segments[3].segment.start.x = f64::NAN;
         observations[0].segments[4].segment.end = observations[0].segments[4].segment.start;
-        let view = TrackView::new(&observations[0], 1.0, 1.0);
+        let view = PreparedView::new(&observations[0], 1.0, 1.0);
         assert_eq!(view.segments.len(), edges.len() - 2);
         assert_eq!(view.segments[3].segment_in_view, 5);
         observations[1].camera.center_in_world.x = f64::NAN;
         assert!(
-            TrackView::new(&observations[1], 1.0, 1.0)
+            PreparedView::new(&observations[1], 1.0, 1.0)
                 .segments
                 .is_empty()
         );

@@ -1,6 +1,7 @@
 //! The noise of the detected ends, estimated from what is left after adjustment.
 
 use super::config::CovarianceConfig;
+use crate::statistics::{SIGMA_BY_MEDIAN, upper_median};
 use serde::{Deserialize, Serialize};
 
 /// Standard deviations of detected ends in pixels.
@@ -25,8 +26,6 @@ pub(super) enum NoiseKind {
     Along,
 }
 
-/// The standard deviation of normal numbers whose median magnitude is 1.
-const SIGMA_BY_MEDIAN: f64 = 1.4826;
 /// Fewer residuals of one kind tell nothing.
 const MIN_RESIDUALS: usize = 20;
 
@@ -87,9 +86,8 @@ fn robust_sigma(mut magnitudes: Vec<f64>, config: &CovarianceConfig) -> Option<f
     if magnitudes.len() < MIN_RESIDUALS {
         return None;
     }
-    let middle = magnitudes.len() / 2;
-    let (_, median, _) = magnitudes.select_nth_unstable_by(middle, f64::total_cmp);
-    let first_guess = (SIGMA_BY_MEDIAN * *median).max(config.min_noise_in_pixels);
+    let median = upper_median(&mut magnitudes);
+    let first_guess = (SIGMA_BY_MEDIAN * median).max(config.min_noise_in_pixels);
     let limit = config.max_standard_deviations * first_guess;
     // Sorted, so that the sum does not depend on the selection.
     magnitudes.retain(|x| *x <= limit);

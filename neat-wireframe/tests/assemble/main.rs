@@ -5,4 +5,6 @@ mod facade;
 mod hostile_input;
 mod scores;
 mod solids;
+#[path = "../toy_data/mod.rs"]
+mod toy_data;
 mod toy_object;

@@ -8,4 +8,6 @@ mod noise;
 mod reliability;
 mod robustness;
 mod scenario;
+#[path = "../toy_data/mod.rs"]
+mod toy_data;
 mod toy_object;

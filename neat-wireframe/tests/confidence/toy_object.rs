@@ -1,28 +1,12 @@
 //! The authors' toy object with its real HAWP detections, whose noise is neither
 //! normal nor independent.
-//!
-//! The data are not part of the repository: set `NEAT_DATA`, or keep them in
-//! `../shared/data`.
 
 use crate::scenario::{Coverage, adjusted};
+use crate::toy_data::toy_dir;
 use neat_core::ground_truth::read_wireframe;
 use neat_core::{LoadOptions, load_scene};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::confidence::{ConfidenceConfig, assess};
-use std::path::PathBuf;
-
-/// The folder of the toy object, or `None`, said aloud, where there is none.
-#[expect(clippy::print_stderr, reason = "a skipped test must say so")]
-fn toy_dir() -> Option<PathBuf> {
-    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let data = std::env::var_os("NEAT_DATA").map_or_else(|| default.into(), PathBuf::from);
-    let dir = data.join("abc-00075213");
-    if dir.is_dir() {
-        return Some(dir);
-    }
-    eprintln!("skipped: {} is not there, set NEAT_DATA", dir.display());
-    None
-}
 
 #[expect(clippy::print_stderr, reason = "the figures are worth a look")]
 #[test]

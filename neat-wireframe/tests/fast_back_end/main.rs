@@ -10,4 +10,6 @@ mod prisms;
 mod refinement;
 #[path = "../../examples/graph_scale/score.rs"]
 mod score;
+#[path = "../toy_data/mod.rs"]
+mod toy_data;
 mod toy_object;

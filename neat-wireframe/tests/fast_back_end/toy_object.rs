@@ -1,18 +1,15 @@
 //! The authors' toy object with its real HAWP detections. The field is replaced
 //! by the truth with noise, so that what is tested is the back end alone.
-//!
-//! The data are not part of the repository: set `NEAT_DATA`, or keep them in
-//! `../shared/data`.
 
 use crate::graph::assert_is_the_graph;
 use crate::noise::{Noise, PROPOSAL_SIGMA};
 use crate::prism::{Prism, with_numeric_gradient};
+use crate::toy_data::toy_dir;
 use nalgebra::{Vector2, Vector3};
 use neat_core::ground_truth::read_wireframe;
 use neat_core::{Camera, LineSegment2, LineSegment3, LoadOptions, load_scene};
 use neat_wireframe::fast::{FastBackEndConfig, run};
 use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation, Wireframe3d};
-use std::path::PathBuf;
 
 const HOLE_CENTER: Vector2<f64> = Vector2::new(0.1, 0.0);
 const HOLE_RADIUS: f64 = 2.0 / 15.0;
@@ -51,19 +48,6 @@ impl SignedDistance for ToyObject {
     fn sdf_and_gradient(&self, points: &[Vector3<f64>]) -> Vec<(f64, Vector3<f64>)> {
         with_numeric_gradient(self, points)
     }
-}
-
-/// The folder of the toy object, or `None`, said aloud, where there is none.
-#[expect(clippy::print_stderr, reason = "a skipped test must say so")]
-fn toy_dir() -> Option<PathBuf> {
-    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data");
-    let data = std::env::var_os("NEAT_DATA").map_or_else(|| default.into(), PathBuf::from);
-    let dir = data.join("abc-00075213");
-    if dir.is_dir() {
-        return Some(dir);
-    }
-    eprintln!("skipped: {} is not there, set NEAT_DATA", dir.display());
-    None
 }
 
 /// What a field of medium quality would propose for every detection: the true
