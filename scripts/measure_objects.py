@@ -5,11 +5,13 @@
     scripts/measure_objects.py DATA OUT --views 50,25,12       fewer views
     scripts/measure_objects.py DATA OUT --budgets 1,2,4,8      quality over training time
     scripts/measure_objects.py DATA OUT --refinement           what graph refinement is worth
+    scripts/measure_objects.py DATA OUT --set KEY=VALUE        with another setting
 
-DATA holds one folder per object, with gt_wireframe.json; HAWP's 2D wireframes are not
-used, except with --hawp. OUT keeps every run, so that an interrupted measurement goes
-on. Prints a Markdown table; OUT/measurements.json holds every number. Needs Python 3.9
-and nothing else; --plot FILE.svg draws the mean F-scores over the training time.
+DATA holds one folder per object, with gt_wireframe.json; those without straight edges are
+left out. HAWP's 2D wireframes are not used, except with --hawp. OUT keeps every run, so that
+an interrupted measurement goes on. Prints a Markdown table; OUT/measurements.json holds every
+number. Needs Python 3.9 and nothing else; --plot FILE.svg draws the mean F-scores over the
+training time.
 """
 
 import argparse
@@ -19,8 +21,9 @@ import os
 import pathlib
 import shutil
 import statistics
-import subprocess
 import sys
+
+from measuring import call, f_score, reconstruct, settings
 
 
 def arguments():
@@ -33,6 +36,7 @@ def arguments():
     parser.add_argument("--views", default="", help="numbers of views, with commas")
     parser.add_argument("--budgets", default="", help="seconds of training, with commas")
     parser.add_argument("--hawp", action="store_true", help="use HAWP's wireframes")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--threshold", type=float, default=0.01)
     parser.add_argument(
         "--refinement",
@@ -60,20 +64,14 @@ def without_hawp(scene, out):
     return copy
 
 
-def reconstruct(options, scene, run, seed, views, budget):
-    """Runs neat unless that has been done; returns the run's manifest."""
-    manifest = run / "manifest.json"
-    done = manifest.is_file() and json.loads(manifest.read_text())["status"] == "finished"
-    if not done:
-        command = [options.neat, "reconstruct", scene, "--out", run, "--overwrite", "--quiet"]
-        command += ["--backend", "flex", "--no-doctor", "--seed", str(seed)]
-        if views:
-            command += ["--max-views", str(int(views))]
-        if budget:
-            # More steps than the budget leaves time for: the schedule follows the time.
-            command += ["--time-budget", f"{budget}s", "--set", "train.steps=1000000"]
-        subprocess.run([str(x) for x in command], check=True, stdout=subprocess.DEVNULL)
-    return json.loads(manifest.read_text())
+def run_arguments(options, views, budget):
+    arguments = ["--no-doctor", *settings(options.set)]
+    if views:
+        arguments += ["--max-views", int(views)]
+    if budget:
+        # More steps than the budget leaves time for: the schedule follows the time.
+        arguments += ["--time-budget", f"{budget}s", "--set", "train.steps=1000000"]
+    return arguments
 
 
 def evaluate(options, scene, run):
@@ -81,21 +79,24 @@ def evaluate(options, scene, run):
     command = [options.neat, "eval", "--pred", run / "wireframe.json"]
     command += ["--gt", scene / "gt_wireframe.json", "--scene", scene, "--format", "json"]
     command += ["--thresholds", str(options.threshold), "--matching", "per-threshold"]
-    text = subprocess.run([str(x) for x in command], check=True, capture_output=True, text=True)
-    full, supported = json.loads(text.stdout)
+    full, supported = json.loads(call(*command))
     scores = {}
     for name, report in (("full", full), ("supported", supported)):
         graph = report["scores"]["wireframe"]
         for of, key in (("junctions", "junctions"), ("segments", "segments_max")):
             score = graph[key][0]
             p, r = score["precision"], score["recall"]
-            f = 2 * p * r / (p + r) if p + r > 0 else 0.0
-            scores[f"{name} {of}"] = {"precision": p, "recall": r, "f": f}
+            scores[f"{name} {of}"] = {"precision": p, "recall": r, "f": f_score(p, r)}
     return scores
 
 
 def scenes_with_truth(options):
-    scenes = sorted(p.parent for p in options.data.glob("*/gt_wireframe.json"))
+    # Without a straight edge there is nothing to find, and no score.
+    scenes = sorted(
+        path.parent
+        for path in options.data.glob("*/gt_wireframe.json")
+        if json.loads(path.read_text())["lines"]
+    )
     if options.objects:
         wanted = options.objects.split(",")
         scenes = [scene for scene in scenes if scene.name in wanted]
@@ -115,7 +116,8 @@ def measure(options):
             for seed in (int(s) for s in numbers(options.seeds)):
                 what = f"{views or 'all'}-views-{budget or 'full'}-budget-seed-{seed}"
                 run = options.out / "runs" / scene.name / what
-                manifest = reconstruct(options, scene, run, seed, views, budget)
+                arguments = run_arguments(options, views, budget)
+                manifest = reconstruct(options.neat, scene, run, seed, *arguments)
                 result = {"object": scene.name, "views": views, "budget": budget, "seed": seed}
                 result["seconds"] = manifest["seconds"]
                 result["scores"] = evaluate(options, scene, run)
@@ -224,7 +226,7 @@ def measure_refinement(options, scenes):
         scene = original if options.hawp else without_hawp(original, options.out)
         for seed in (int(s) for s in numbers(options.seeds)):
             run = options.out / "runs" / scene.name / f"all-views-full-budget-seed-{seed}"
-            reconstruct(options, scene, run, seed, None, None)
+            reconstruct(options.neat, scene, run, seed, *run_arguments(options, None, None))
             row = {"object": scene.name, "seed": seed}
             for name, switches in WITHOUT.items():
                 copy = options.out / "refinement" / scene.name / f"seed-{seed}" / name.replace(" ", "-")
@@ -248,7 +250,7 @@ def distill(options, scene, run, copy, switches):
     command = [options.neat, "distill", copy, "--scene", scene, "--backend", "flex", "--quiet"]
     for switch in switches:
         command += ["--set", f"distill.fast.{switch}=false"]
-    subprocess.run([str(x) for x in command], check=True, stdout=subprocess.DEVNULL)
+    call(*command)
 
 
 def junction_errors(scene, run):
@@ -263,11 +265,9 @@ def f_scores(options, scene, run):
     command += ["--gt", scene / "gt_wireframe.json", "--format", "json"]
     command += ["--thresholds", ",".join(str(x) for x in REFINEMENT_THRESHOLDS)]
     command += ["--matching", "per-threshold"]
-    text = subprocess.run([str(x) for x in command], check=True, capture_output=True, text=True)
-    graph = json.loads(text.stdout)[0]["scores"]["wireframe"]
-    harmonic = lambda p, r: 2 * p * r / (p + r) if p + r > 0 else 0.0
+    graph = json.loads(call(*command))[0]["scores"]["wireframe"]
     return {
-        key: [harmonic(score["precision"], score["recall"]) for score in graph[key]]
+        key: [f_score(score["precision"], score["recall"]) for score in graph[key]]
         for key in ("junctions", "segments_max")
     }
 

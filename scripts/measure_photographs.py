@@ -14,9 +14,10 @@ import argparse
 import importlib.util
 import json
 import pathlib
-import subprocess
 import sys
 import time
+
+from measuring import call, f_score, reconstruct, settings
 
 
 def arguments():
@@ -31,38 +32,22 @@ def arguments():
     return parser.parse_args()
 
 
-def call(*command):
-    command = [str(part) for part in command]
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
-
-
 def evaluate(options, scene, wireframe):
     """One row: P, R and F1 of creases and P and R of junctions at three thresholds."""
     text = call(options.neat, "eval", "--pred", wireframe, "--truth", scene, "--format", "json")
     report = json.loads(text)
     scores = report["scores"] if isinstance(report, dict) else report[0]["scores"]
     rows = scores["thresholds"]
-    f1 = lambda p, r: 2 * p * r / (p + r) if p and r else 0.0
     return {
         "thresholds": [row["threshold"] for row in rows],
         "precision": [row["length_on_crease"] or 0.0 for row in rows],
         "recall": [row["completeness"] or 0.0 for row in rows],
-        "f1": [f1(row["length_on_crease"], row["completeness"]) for row in rows],
+        "f1": [f_score(row["length_on_crease"] or 0.0, row["completeness"] or 0.0) for row in rows],
         "junction_precision": [row["junction_precision"] or 0.0 for row in rows],
         "junction_recall": [row["junction_recall"] or 0.0 for row in rows],
         "accuracy": (scores["segment_accuracy"] or {}).get("mean"),
         "edges": scores["predicted"]["edges"],
     }
-
-
-def reconstruct(options, scene, run, seed):
-    manifest = run / "manifest.json"
-    done = manifest.is_file() and json.loads(manifest.read_text())["status"] == "finished"
-    if not done:
-        settings = [part for value in options.set for part in ("--set", value)]
-        call(options.neat, "reconstruct", scene, "--out", run, "--overwrite", "--quiet",
-             "--backend", "flex", "--no-cache", "--seed", seed, *settings)
-    return sum(json.loads(manifest.read_text())["seconds"].values())
 
 
 def rivals(options, scene, run):
@@ -91,7 +76,9 @@ def measure(options):
         runs = []
         for seed in options.seeds.split(","):
             run = options.out / "runs" / scene.name / f"seed-{seed}"
-            seconds = reconstruct(options, scene, run, seed)
+            arguments = ["--no-cache", *settings(options.set)]
+            manifest = reconstruct(options.neat, scene, run, seed, *arguments)
+            seconds = sum(manifest["seconds"].values())
             scores = evaluate(options, scene, run / "wireframe.json")
             results.append({"scene": scene.name, "of": "neat", "seed": seed, "seconds": seconds, **scores})
             runs.append(run)

@@ -86,6 +86,74 @@ fn a_scene_without_wireframes_gets_them_once() {
     assert!(!scene.file("run/detections").exists());
 }
 
+/// Puts something behind the object.
+fn before_a_wall(scene: &TestScene) {
+    for entry in fs::read_dir(scene.file("scene/images")).unwrap() {
+        let path = entry.unwrap().path();
+        let mut image = image::open(&path).unwrap().into_rgb8();
+        for pixel in image.pixels_mut() {
+            pixel.0 = pixel.0.map(|c| c.max(90));
+        }
+        image.save(&path).unwrap();
+    }
+}
+
+#[test]
+fn photographs_need_no_field_and_get_one_on_request() {
+    let scene = TestScene::new();
+    before_a_wall(&scene);
+    let run = scene.path("run");
+    let told = stderr(&scene.run("reconstruct", "2").assert().success());
+    assert!(told.contains("distill.field: none"), "{told}");
+    assert!(
+        told.contains("train.steps = 2 has no effect: no field"),
+        "{told}"
+    );
+    let manifest = json(&scene.file("run/manifest.json"));
+    assert!(manifest["seconds"].get("train").is_none(), "{manifest}");
+    assert!(!scene.file("run/metrics.jsonl").exists());
+    let wireframe = fs::read(scene.file("run/wireframe.json")).unwrap();
+
+    // What asks the field says how to get one.
+    for command in [
+        "render",
+        "export --mesh",
+        "distill --set distill.back_end=paper",
+    ] {
+        let mut words = command.split(' ');
+        let mut command = neat(&[words.next().unwrap(), &run]);
+        let message = stderr(&command.args(words).assert().code(2));
+        assert!(message.contains("--train"), "{message}");
+    }
+    // What does not goes on.
+    neat(&["distill", &run, "--backend", "flex"])
+        .assert()
+        .success();
+    assert_eq!(
+        fs::read(scene.file("run/wireframe.json")).unwrap(),
+        wireframe
+    );
+    let mut resumed = scene.run("reconstruct", "2");
+    resumed.arg("--resume").assert().success();
+
+    let mut trained = scene.run("reconstruct", "2");
+    let told = stderr(&trained.args(["--train", "--overwrite"]).assert().success());
+    assert!(!told.contains("no effect"), "{told}");
+    neat(&["render", &run, "--downscale", "16", "--backend", "flex"])
+        .assert()
+        .success();
+    scene
+        .run("train", "2")
+        .arg("--overwrite")
+        .assert()
+        .success();
+    assert!(
+        scene
+            .file("run/checkpoints/step-00000002.safetensors")
+            .exists()
+    );
+}
+
 #[test]
 fn detect_writes_wireframes_and_pictures() {
     let scene = photos();

@@ -10,7 +10,7 @@ use neat_core::{Scene, Wireframe3d, file, with_causes};
 use neat_eval::image_quality::psnr;
 use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
 use neat_field::region_pixels::RegionPixels;
-use neat_pipeline::config::{BackEnd, Choice, Config, apply_overrides};
+use neat_pipeline::config::{BackEnd, Choice, Config, FieldUse, apply_overrides};
 use neat_pipeline::distill::distill;
 use neat_pipeline::error::PipelineError;
 use neat_pipeline::event::{Event, OnEvent, Stage, Warning, WarningKind};
@@ -65,10 +65,15 @@ pub fn ablate(
     on_event: OnEvent<'_>,
 ) -> Result<Vec<Row>, LabError> {
     // Once: looking for GPUs takes a while.
-    let options = &RunOptions {
+    let mut options = RunOptions {
         backend: options.backend.resolve(),
         ..options.clone()
     };
+    // What training brings is asked too.
+    if options.config.distill.field == Choice::Auto {
+        options.config.distill.field = Choice::Given(FieldUse::Trained);
+    }
+    let options = &options;
     folder::claim(options)?;
     let expected = match options.config.distill.back_end {
         Choice::Given(back_end) => variants(back_end).len(),
@@ -201,7 +206,7 @@ fn measure(
 ) -> Result<Row, LabError> {
     let plan = run.replan(&variant.apply(&run.asked)?)?;
     let start = Instant::now();
-    let distilled = distill(&run.scene, &run.field, &plan, &mut |_| Ok(()));
+    let distilled = distill(&run.scene, run.field.as_ref(), &plan, &mut |_| Ok(()));
     let distilled = distilled.map_err(PipelineError::from)?;
     let seconds = start.elapsed().as_secs_f64();
     let document = distilled.document(&run.scene);
@@ -265,10 +270,9 @@ fn row(
         segment_recall: segments.map(|scores| scores.recall),
         junction_accuracy: surface.and_then(|scores| scores.junction_accuracy),
         segment_accuracy: surface.and_then(|scores| scores.segment_accuracy),
-        psnr: variant
-            .trains
-            .then(|| mean_psnr(&run.scene, &run.field))
-            .flatten(),
+        psnr: (run.field.as_ref())
+            .filter(|_| variant.trains)
+            .and_then(|field| mean_psnr(&run.scene, field)),
         mask_ratio: (variant.trains)
             .then(|| masked_out(&run.scene, config))
             .flatten(),

@@ -49,7 +49,7 @@ pub struct Config {
     pub model: ModelConfig,
     /// The optimisation.
     pub train: TrainConfig,
-    /// From the trained field to the wireframe.
+    /// From the trained field, or the images, to the wireframe.
     pub distill: DistillConfig,
 }
 
@@ -151,6 +151,25 @@ impl fmt::Display for BackEnd {
     }
 }
 
+/// Whether there is a field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FieldUse {
+    /// One is trained.
+    Trained,
+    /// None is: the images alone make the wireframe.
+    None,
+}
+
+impl fmt::Display for FieldUse {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Trained => "trained",
+            Self::None => "none",
+        })
+    }
+}
+
 /// What a wireframe is drawn on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -162,13 +181,17 @@ pub enum OverlayGround {
     Segments,
 }
 
-/// From the trained field to the wireframe.
+/// From the trained field, or the images, to the wireframe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DistillConfig {
     /// What assembles the wireframe; `auto` is the assembler for photographs, else
     /// the fast back end.
     pub back_end: Choice<BackEnd>,
+    /// Whether a field is trained; `auto`: only for a back end that asks it. Without one
+    /// there is nothing to render, and no mesh.
+    #[serde(default)]
+    pub field: Choice<FieldUse>,
     /// What the wireframe is drawn on in `overlays/`.
     #[serde(default)]
     pub overlay: OverlayGround,

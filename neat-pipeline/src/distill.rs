@@ -21,7 +21,6 @@ use neat_wireframe::proposals::{WeightedSegment, robust_segment};
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation};
 use serde::{Deserialize, Serialize};
-use std::cell::LazyCell;
 pub use thin_regions::paper_regions;
 use thin_regions::{Query, spread_query};
 
@@ -48,6 +47,9 @@ pub enum DistillError {
     /// The paper's back end refused its input.
     #[error(transparent)]
     Paper(#[from] PaperBackEndError),
+    /// A back end that asks the field, and none was trained.
+    #[error("the {0} back end asks the field, and none was trained")]
+    NoField(BackEnd),
     /// The wireframe has a point that is no point.
     #[error("the wireframe is not valid")]
     Invalid(#[from] WireframeFlaw),
@@ -106,14 +108,14 @@ impl Distilled {
 }
 
 /// Takes the wireframe out of the field, or, where the plan has the assembler, out of the
-/// images.
+/// images: that needs no field.
 ///
 /// # Errors
-/// If the field's junctions or distances are not finite, an image lies in a file that
-/// cannot be read, or `progress` says so.
+/// If there is no field and the back end asks it, the field's junctions or distances are not
+/// finite, an image lies in a file that cannot be read, or `progress` says so.
 pub fn distill(
     scene: &Scene,
-    field: &TrainedField,
+    field: Option<&TrainedField>,
     plan: &Plan,
     progress: OnProgress<'_>,
 ) -> Result<Distilled, DistillError> {
@@ -123,20 +125,30 @@ pub fn distill(
         BackEnd::Fast | BackEnd::Assembler => config.data.min_segment_score,
     };
     let views = ViewObservation::from_scene(scene, min_score);
-    // Once, and only where it is wanted.
-    let surface = LazyCell::new(|| field.surface_grid());
-    let (wireframe, report) = match plan.back_end() {
-        BackEnd::Paper => paper(scene, field, config, &views, progress)?,
-        BackEnd::Fast => fast(scene, field, &*surface, config, &views, progress)?,
-        BackEnd::Assembler => assembled(scene, config, &views, field.scene_radius, progress)?,
-    };
-    let hiding = match plan.back_end() {
-        BackEnd::Paper | BackEnd::Fast => Some(&*surface as &dyn SignedDistance),
+    let scene_radius = config.data.scene_radius.unwrap_or(scene.sphere_radius);
+    let back_end = plan.back_end();
+    let field = field.ok_or(DistillError::NoField(back_end));
+    let (wireframe, report, surface) = match back_end {
+        BackEnd::Paper => {
+            let field = field?;
+            let (wireframe, report) = paper(scene, field, config, &views, progress)?;
+            (wireframe, report, Some(field.surface_grid()))
+        }
+        BackEnd::Fast => {
+            let field = field?;
+            let surface = field.surface_grid();
+            let (wireframe, report) = fast(scene, field, &surface, config, &views, progress)?;
+            (wireframe, report, Some(surface))
+        }
         // A learned surface of a photograph is too coarse to hide edges behind.
-        BackEnd::Assembler => None,
+        BackEnd::Assembler => {
+            let (wireframe, report) = assembled(scene, config, &views, scene_radius, progress)?;
+            (wireframe, report, None)
+        }
     };
+    let hiding = surface.as_ref().map(|grid| grid as &dyn SignedDistance);
     let assessing = &config.distill.confidence;
-    let confidence = assess(&wireframe, &views, hiding, field.scene_radius, assessing)?;
+    let confidence = assess(&wireframe, &views, hiding, scene_radius, assessing)?;
     Ok(Distilled {
         wireframe,
         confidence,

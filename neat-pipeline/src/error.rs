@@ -95,7 +95,9 @@ impl From<PlanError> for PipelineError {
             PlanError::Scene(error) => Self::Scene(error),
             PlanError::Config(error) => Self::Train(error),
             PlanError::Detector(error) => Self::Detector(error),
-            PlanError::Open(_) => Self::Train(TrainError::Config(error.to_string())),
+            PlanError::Open(_) | PlanError::NoField(_) => {
+                Self::Train(TrainError::Config(error.to_string()))
+            }
         }
     }
 }

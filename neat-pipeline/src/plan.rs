@@ -10,9 +10,9 @@ mod step_memory;
 mod without_effect;
 
 pub use step_memory::{bytes_per_ray, rows_of_step};
-pub(crate) use without_effect::{Given, changes_of_presets, settings_without_effect};
+pub(crate) use without_effect::{Given, NO_FIELD, changes_of_presets, settings_without_effect};
 
-use crate::config::{BackEnd, Background, Choice, Config};
+use crate::config::{BackEnd, Background, Choice, Config, DistillConfig, FieldUse};
 use crate::event::Decision;
 use neat_core::{MemoryLimit, Scene, SceneError};
 use neat_detect::DetectorConfigError;
@@ -30,6 +30,7 @@ pub struct Plan {
     config: Config,
     background: Option<Background>,
     back_end: BackEnd,
+    field: FieldUse,
 }
 
 /// Why there is no plan.
@@ -44,6 +45,11 @@ pub enum PlanError {
     /// The settings of the detector are out of range.
     #[error("the section `detect` of the configuration: {0}")]
     Detector(#[from] DetectorConfigError),
+    /// A back end that asks the field, and no field.
+    #[error(
+        "distill.back_end = {0} asks the field: leave out distill.field = none, or take distill.back_end = assembler"
+    )]
+    NoField(BackEnd),
     /// A value that a scene decides is still open.
     #[error("{0} is open: a scene has to decide it")]
     Open(&'static str),
@@ -69,22 +75,21 @@ impl Plan {
             Some(Choice::Given(background)) => Some(background),
             Some(Choice::Auto) => return Err(PlanError::Open("data.background")),
         };
-        let back_end = match config.distill.back_end {
-            Choice::Given(back_end) => back_end,
-            // It follows from the background alone.
-            Choice::Auto if background == Some(Background::Photo) => BackEnd::Assembler,
-            Choice::Auto => BackEnd::Fast,
-        };
+        let (back_end, field) = settle_distillation(&config.distill, background)?;
         config.distill.back_end = Choice::Given(back_end);
-        if config.model.perceiver.junctions.fixed().is_none() {
-            return Err(PlanError::Open("model.perceiver.junctions"));
-        }
+        config.distill.field = Choice::Given(field);
         config.detect.validate()?;
-        config.training(Kernels::default()).validate()?;
+        if field == FieldUse::Trained {
+            if config.model.perceiver.junctions.fixed().is_none() {
+                return Err(PlanError::Open("model.perceiver.junctions"));
+            }
+            config.training(Kernels::default()).validate()?;
+        }
         Ok(Self {
             config,
             background,
             back_end,
+            field,
         })
     }
 
@@ -102,12 +107,38 @@ impl Plan {
     pub fn back_end(&self) -> BackEnd {
         self.back_end
     }
+
+    /// Whether a field is trained.
+    pub fn trains(&self) -> bool {
+        self.field == FieldUse::Trained
+    }
+}
+
+/// What assembles the wireframe, and whether there is a field: by the background alone.
+fn settle_distillation(
+    asked: &DistillConfig,
+    background: Option<Background>,
+) -> Result<(BackEnd, FieldUse), PlanError> {
+    let back_end = match asked.back_end {
+        Choice::Given(back_end) => back_end,
+        Choice::Auto if background == Some(Background::Photo) => BackEnd::Assembler,
+        Choice::Auto => BackEnd::Fast,
+    };
+    let field = match (asked.field, back_end) {
+        (Choice::Auto, BackEnd::Assembler) => FieldUse::None,
+        (Choice::Auto, _) => FieldUse::Trained,
+        (Choice::Given(FieldUse::None), BackEnd::Paper | BackEnd::Fast) => {
+            return Err(PlanError::NoField(back_end));
+        }
+        (Choice::Given(field), _) => field,
+    };
+    Ok((back_end, field))
 }
 
 /// Decides what `asked` leaves open, by the scene and the machine, and tells it. What
 /// an `earlier` part of the run has decided stays.
 ///
-/// For a photograph the border of the sphere is put behind the scene and the silhouette
+/// For a field of photographs the border of the sphere is put behind the scene and the silhouette
 /// term is dropped. A configuration without `data.background` stays as it is.
 ///
 /// # Errors
@@ -138,7 +169,13 @@ pub fn settle(
         };
         config.data.background = Some(Choice::Given(background));
     }
-    if config.data.background == Some(Choice::Given(Background::Photo)) {
+    let background = match config.data.background {
+        Some(Choice::Given(background)) => Some(background),
+        _ => None,
+    };
+    let (_, field) = settle_distillation(&config.distill, background)?;
+    let trains = field == FieldUse::Trained;
+    if trains && background == Some(Background::Photo) {
         if asked.train.loss.mask != 0.0 {
             config.train.loss.mask = 0.0;
             let reason = "as photographs show no silhouettes".to_owned();
@@ -158,7 +195,7 @@ pub fn settle(
         let slope = plan.config.model.implicit.bounding_sphere_slope;
         config.model.implicit.bounding_sphere_slope = slope;
     }
-    if asked.model.perceiver.junctions.fixed().is_none() {
+    if trains && asked.model.perceiver.junctions.fixed().is_none() {
         let kept = earlier.and_then(|plan| plan.config.model.perceiver.junctions.fixed());
         let count = kept.unwrap_or_else(|| {
             let wireframes = scene.views.iter().map(|view| &view.wireframe);
@@ -178,7 +215,11 @@ pub fn settle(
         };
         decide("distill.back_end", &plan.back_end, reason.to_owned());
     }
-    if asked.train.ray_chunk.is_none() {
+    if asked.distill.field == Choice::Auto && !trains {
+        let reason = "as the images alone make the wireframe; --train trains one".to_owned();
+        decide("distill.field", &field, reason);
+    }
+    if trains && asked.train.ray_chunk.is_none() {
         plan.config.train.ray_chunk = match earlier {
             // A run keeps the passes that it began with, whatever memory is here.
             Some(plan) => plan.config.train.ray_chunk,

@@ -9,7 +9,7 @@ mod training;
 
 pub use opened::{OpenedRun, open_run, software_warning};
 
-use crate::config::Config;
+use crate::config::{Choice, Config, FieldUse};
 use crate::distill::BackEndReport;
 use crate::error::PipelineError;
 use crate::event::{OnEvent, Stage};
@@ -69,7 +69,8 @@ pub struct Reconstruction {
     pub report: Option<BackEndReport>,
 }
 
-/// Trains on a scene and leaves a run folder with checkpoints.
+/// Trains on a scene and leaves a run folder with checkpoints, also where no back end
+/// would ask the field.
 ///
 /// `cancelled` is looked at before every step and between the views that are
 /// detected: once it is set, the last state is written and the run ends.
@@ -88,6 +89,11 @@ pub fn train(
     cancelled: &AtomicBool,
     on_event: OnEvent<'_>,
 ) -> Result<RunDir, PipelineError> {
+    let mut options = options.clone();
+    if options.config.distill.field == Choice::Auto {
+        options.config.distill.field = Choice::Given(FieldUse::Trained);
+    }
+    let options = &options;
     Session::start(options, cancelled, on_event)?.finish(|session| {
         if !session.finished {
             session.train(options, cancelled)?;
@@ -96,7 +102,8 @@ pub fn train(
     })
 }
 
-/// Trains on a scene, distils the wireframe and writes all results.
+/// Trains on a scene, unless the images alone make the wireframe, distils it and writes
+/// all results.
 ///
 /// # Errors
 /// As [`train`], or if no wireframe can be taken out of the field.
@@ -111,12 +118,16 @@ pub fn reconstruct(
         {
             return Ok(result);
         }
-        let field = session.train(options, cancelled)?;
-        session.distill(&field, cancelled)
+        let field = if session.plan.trains() {
+            Some(session.train(options, cancelled)?)
+        } else {
+            None
+        };
+        session.distill(field.as_ref(), cancelled)
     })
 }
 
-/// Distils the wireframe once more from the last checkpoint of a run, and writes
+/// Distils the wireframe of a run once more, from its last checkpoint if it has one, and writes
 /// the results into its folder.
 ///
 /// # Errors
@@ -150,7 +161,7 @@ pub fn distill_run(
     decisions
         .retain(|decision| decision.setting != "distill.back_end" || decision.value == back_end);
     // How the training ended stays as it is.
-    let result = session.distill(&field, &AtomicBool::new(false));
+    let result = session.distill(field.as_ref(), &AtomicBool::new(false));
     let recorded = session.write_manifest();
     // Of two errors the first is the cause.
     let reconstruction = result?;

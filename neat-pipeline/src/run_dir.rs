@@ -101,9 +101,9 @@ pub enum RunDirError {
         /// What is wrong with the last one.
         source: Box<CheckpointError>,
     },
-    /// A run that ended before its first checkpoint.
-    #[error("{0} has no checkpoint: train again with --overwrite")]
-    NoCheckpoint(PathBuf),
+    /// A run without a field, or that ended before its first checkpoint.
+    #[error("{0} holds no trained field: reconstruct again with --train and --overwrite")]
+    NoField(PathBuf),
     /// `config.toml`, `plan.toml` or `manifest.json` does not parse.
     #[error(
         "{path} cannot be understood: {reason}; if another version of neat wrote it, use that one, else correct it or train again with --overwrite"
@@ -515,7 +515,7 @@ impl RunDir {
         self.checkpoints()?
             .pop()
             .map(|(_, path)| path)
-            .ok_or_else(|| RunDirError::NoCheckpoint(self.root.clone()))
+            .ok_or_else(|| RunDirError::NoField(self.root.clone()))
     }
 
     /// All checkpoints with their steps, in the order of these.
@@ -686,7 +686,7 @@ mod tests {
         let (run, _lock) = RunDir::create(dir.path(), Existing::Refuse).unwrap();
         assert!(matches!(
             run.latest_checkpoint(),
-            Err(RunDirError::NoCheckpoint(_))
+            Err(RunDirError::NoField(_))
         ));
         assert!(run.usable_checkpoint().unwrap().is_none());
         let losses = [(5, 3.0), (50, 0.5), (500, 2.0), (100_000_000, 1.0)];

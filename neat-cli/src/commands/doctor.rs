@@ -109,7 +109,7 @@ impl DoctorArgs {
             text.push('\n');
         }
         if !costs.is_empty() {
-            text.push_str("\ntraining on this machine if it is idle, within a factor of two:\n");
+            text.push_str("\ntraining on this machine if it is idle, within a factor of two; photographs need none:\n");
         }
         for Cost { preset, estimate } in costs {
             let time = duration::display(estimate.seconds);

@@ -250,17 +250,18 @@ impl ExportArgs {
             Ok::<_, CliError>,
             &mut |event| progress.show(event),
         )?;
+        let field = opened.trained_field()?;
         let grid = Grid {
             region: Region::Ball {
                 center: Vector3::zeros(),
-                radius: opened.field.scene_radius,
+                radius: field.scene_radius,
             },
             resolution: self.resolution,
             closed: false,
             max_slope: Some(MAX_SLOPE),
         };
         progress.show(Event::StageStarted(Stage::Export));
-        let mesh = marching_cubes(&opened.field, &grid, &mut |fraction| {
+        let mesh = marching_cubes(field, &grid, &mut |fraction| {
             progress.show(Event::StageProgress {
                 stage: Stage::Export,
                 fraction,

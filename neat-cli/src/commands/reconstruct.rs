@@ -4,14 +4,18 @@ use super::train::RunArgs;
 use crate::error::CliError;
 use crate::{interrupt, output};
 use clap::Args;
+use neat_pipeline::config::{Choice, FieldUse};
 use neat_pipeline::reconstruct::{Reconstruction, reconstruct};
 use neat_wireframe::metrics::ImageEvidence;
 
-/// Turn a scene into a 3D wireframe: train, distil, and write all results
+/// Turn a scene into a 3D wireframe, and write all results
+///
+/// Objects on black take half a minute of training; photographs need none.
 ///
 /// RUN then holds report.html to open first (`neat view RUN`), the wireframe as .json, .obj and
 /// .ply in the frame of the scene's files, a picture of it, overlays/ on some of the photographs,
-/// and config.toml, manifest.json, metrics.jsonl, junctions.jsonl and checkpoints/.
+/// and config.toml and manifest.json; after training also metrics.jsonl, junctions.jsonl and
+/// checkpoints/.
 ///
 /// Ctrl-C ends training after the current step and leaves a checkpoint (exit code 130).
 #[derive(Debug, Args)]
@@ -28,11 +32,18 @@ The keys of --set are those of a run's config.toml; a wrong one lists the right 
 pub struct ReconstructArgs {
     #[command(flatten)]
     run: RunArgs,
+    /// Train a field also where the images alone make the wireframe, as those of photographs do: to
+    /// render it, or for its mesh
+    #[arg(long)]
+    train: bool,
 }
 
 impl ReconstructArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
-        let options = self.run.options()?;
+        let mut options = self.run.options()?;
+        if self.train {
+            options.config.distill.field = Choice::Given(FieldUse::Trained);
+        }
         let interrupted = interrupt::flag()?;
         let mut progress = self.run.progress(quiet);
         let reconstruction = reconstruct(&options, &interrupted, &mut |event| progress.show(event))

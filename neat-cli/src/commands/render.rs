@@ -92,7 +92,7 @@ fn render(
     progress: &mut Progress,
 ) -> Result<Option<f64>, CliError> {
     let rendered = render_view(
-        &run.field,
+        run.trained_field()?,
         &view.camera,
         run.scene.pixel_center,
         downscale,

@@ -8,9 +8,10 @@ use serde::ser::{Serialize, Serializer};
 const AUTO: &str = "auto";
 
 /// A value, or `auto`: the scene decides.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Choice<T> {
     /// The scene decides.
+    #[default]
     Auto,
     /// This one.
     Given(T),

@@ -120,7 +120,7 @@ impl FromStr for Preset {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::apply_overrides;
+    use crate::config::{Choice, FieldUse, apply_overrides};
     use neat_gjp::JunctionCount;
     use neat_tensor::Kernels;
     use neat_train::config::TrainingConfig;
@@ -192,7 +192,8 @@ mod tests {
         assert_eq!(balanced.model.perceiver.junctions, JunctionCount::AUTO);
         // What its file does not name is as it was.
         assert_eq!(balanced.data, fast.data);
-        assert_eq!(balanced.distill, fast.distill);
+        assert_eq!(balanced.distill.back_end, fast.distill.back_end);
+        assert_eq!(balanced.distill.field, Choice::Given(FieldUse::Trained));
         assert_eq!(balanced.train.loss, fast.train.loss);
         assert_eq!(balanced.train.adam, fast.train.adam);
     }

@@ -44,14 +44,37 @@ fn an_object_before_black_gets_the_fast_back_end() {
     assert_eq!(plan.back_end(), BackEnd::Fast);
     assert_eq!(plan.config().train, asked.train);
     assert_eq!(plan.config().model, asked.model);
+    assert!(plan.trains());
     assert_eq!(decisions, ["data.background", "distill.back_end"]);
 }
 
+/// The fast preset, with a field whatever the scene.
+fn with_field() -> Config {
+    let mut asked = Preset::Fast.config();
+    asked.distill.field = Choice::Given(FieldUse::Trained);
+    asked
+}
+
 #[test]
-fn photographs_get_a_sphere_behind_them_and_the_assembler() {
-    let (plan, decisions) = settled(&Preset::Fast.config(), &photographs());
+fn photographs_get_the_assembler_and_no_field() {
+    let mut asked = Preset::Fast.config();
+    asked.model.perceiver.junctions = JunctionCount::AUTO;
+    let (plan, decisions) = settled(&asked, &photographs());
     assert_eq!(plan.background(), Some(Background::Photo));
     assert_eq!(plan.back_end(), BackEnd::Assembler);
+    assert!(!plan.trains());
+    // Nothing is decided that only training looks at.
+    assert_eq!(plan.config().train, asked.train);
+    assert_eq!(plan.config().model, asked.model);
+    let told = ["data.background", "distill.back_end", "distill.field"];
+    assert_eq!(decisions, told);
+}
+
+#[test]
+fn a_field_of_photographs_gets_a_sphere_behind_them() {
+    let (plan, decisions) = settled(&with_field(), &photographs());
+    assert_eq!(plan.back_end(), BackEnd::Assembler);
+    assert!(plan.trains());
     let config = plan.config();
     assert_eq!(config.train.loss.mask, 0.0);
     assert_eq!(config.model.implicit.bounding_sphere_slope, SPHERE_SLOPE);
@@ -80,7 +103,7 @@ fn what_is_given_or_decided_stays() {
 
 #[test]
 fn what_an_earlier_part_of_a_run_has_decided_stays() {
-    let mut asked = Preset::Fast.config();
+    let mut asked = with_field();
     asked.model.perceiver.junctions = JunctionCount::AUTO;
     let (mut first, decisions) = settled(&asked, &photographs());
     assert!(decisions.contains(&"model.perceiver.junctions".to_owned()));
@@ -98,8 +121,8 @@ fn what_an_earlier_part_of_a_run_has_decided_stays() {
 
 #[test]
 fn a_trained_field_keeps_its_sphere_whatever_is_said_of_the_background() {
-    let (trained, _) = settled(&Preset::Fast.config(), &photographs());
-    let mut asked = Preset::Fast.config();
+    let (trained, _) = settled(&with_field(), &photographs());
+    let mut asked = with_field();
     asked.data.background = Some(Choice::Given(Background::Black));
     let (plan, _) = settle(&asked, &photographs(), MACHINE, Some(&trained)).unwrap();
     assert_eq!(plan.back_end(), BackEnd::Fast);
@@ -139,4 +162,8 @@ fn what_is_open_or_contradicts_itself_is_no_plan() {
     let mut config = Preset::PaperAbc.config();
     config.detect.min_gradient = 0.0;
     assert!(matches!(Plan::new(config), Err(PlanError::Detector(_))));
+    let mut config = Preset::PaperAbc.config();
+    config.distill.field = Choice::Given(FieldUse::None);
+    let error = Plan::new(config).unwrap_err().to_string();
+    assert!(error.contains("distill.back_end = paper asks"), "{error}");
 }

@@ -74,6 +74,10 @@ fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)>
             ("distill.rays_per_segment", ASSEMBLER_RUNS),
         ],
     };
+    if !plan.trains() && !given.trained {
+        let keys = ["train.", "model.", "data.attraction_distance"];
+        idle.extend(keys.map(|key| (key, NO_FIELD)));
+    }
     if plan.background() == Some(Background::Photo) {
         idle.push(("train.loss.mask", "photographs show no silhouettes"));
     }
@@ -101,6 +105,7 @@ fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)>
     idle
 }
 
+pub(crate) const NO_FIELD: &str = "no field is trained: --train trains one";
 const PAPER_RUNS: &str = "the wireframe is assembled by the paper's back end";
 const FAST_RUNS: &str = "the wireframe is assembled by the fast back end";
 const ASSEMBLER_RUNS: &str = "the wireframe is made by the assembler";
@@ -131,13 +136,12 @@ mod tests {
         assert!(told(photo, &[]).is_empty());
         let sets = ["train.loss.mask=0.7", "distill.fast.cleanup=false"];
         assert!(told(black, &sets).is_empty());
-        assert_eq!(
-            told(photo, &sets),
-            [
-                format!("distill.fast.cleanup = false has no effect: {ASSEMBLER_RUNS}"),
-                "train.loss.mask = 0.7 has no effect: photographs show no silhouettes".to_owned(),
-            ]
-        );
+        let no_fast = format!("distill.fast.cleanup = false has no effect: {ASSEMBLER_RUNS}");
+        let no_mask = format!("train.loss.mask = 0.7 has no effect: {NO_FIELD}");
+        assert_eq!(told(photo, &sets), [no_fast, no_mask]);
+        let sets = ["train.loss.mask=0.7", "distill.field=trained"];
+        let no_mask = "train.loss.mask = 0.7 has no effect: photographs show no silhouettes";
+        assert_eq!(told(photo, &sets), [no_mask]);
         // With 2D wireframes, what an edgel is matters to the assembler only.
         let sets = ["detect.min_gradient=2.0", "detect.min_score=0.2"];
         assert_eq!(told(black, &sets).len(), 2);

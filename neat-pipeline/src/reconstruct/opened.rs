@@ -15,7 +15,7 @@ use neat_tensor::{Backend, Kernels};
 use neat_train::TrainedField;
 use std::path::Path;
 
-/// A run that has been, with its scene and its trained field.
+/// A run that has been, with its scene and, if it was trained, its field.
 #[derive(Debug)]
 pub struct OpenedRun {
     /// Its folder.
@@ -30,12 +30,21 @@ pub struct OpenedRun {
     pub scene: Scene,
     /// What computes.
     pub device: Device,
-    /// The field of its last checkpoint.
-    pub field: TrainedField,
+    /// The field of its last checkpoint; `None` if it was not trained.
+    pub field: Option<TrainedField>,
     machine: Machine,
 }
 
 impl OpenedRun {
+    /// The field of the last checkpoint.
+    ///
+    /// # Errors
+    /// If the run was not trained.
+    pub fn trained_field(&self) -> Result<&TrainedField, PipelineError> {
+        let no_field = || RunDirError::NoField(self.dir.root().into());
+        Ok(self.field.as_ref().ok_or_else(no_field)?)
+    }
+
     /// The plan for something else that is asked of this run. What its scene has decided
     /// stays.
     ///
@@ -98,25 +107,30 @@ fn read_run(
         memory_limit: resources.memory_limit,
     };
     let (plan, _) = settle(&asked, &prepared.scene, machine, Some(&planned))?;
+    let usable = dir.usable_checkpoint()?;
     let changes = differences(then, &asked);
     let given = Given {
         sparse_points: !prepared.scene.sparse_points.is_empty(),
         detected: prepared.detected,
-        trained: true,
+        trained: usable.is_some(),
     };
     for warning in settings_without_effect(&changes, &plan, given) {
         on_event(Event::Warning(warning));
     }
-    let no_checkpoint = || RunDirError::NoCheckpoint(dir.root().into());
-    let usable = dir.usable_checkpoint()?.ok_or_else(no_checkpoint)?;
-    for (_, error) in &usable.damaged {
-        let text = format!("{error}: {} is used instead", usable.path.display());
-        let warning = Warning::new(WarningKind::DamagedCheckpoint, text);
-        on_event(Event::Warning(warning));
-    }
-    let kernels = Kernels::within(resources.memory_limit.bytes());
-    let training = plan.config().training(kernels);
-    let field = TrainedField::load(&training, &usable.checkpoint, &device)?;
+    let field = match usable {
+        Some(usable) => {
+            for (_, error) in &usable.damaged {
+                let text = format!("{error}: {} is used instead", usable.path.display());
+                let warning = Warning::new(WarningKind::DamagedCheckpoint, text);
+                on_event(Event::Warning(warning));
+            }
+            let kernels = Kernels::within(resources.memory_limit.bytes());
+            let training = plan.config().training(kernels);
+            Some(TrainedField::load(&training, &usable.checkpoint, &device)?)
+        }
+        None if plan.trains() => return Err(RunDirError::NoField(dir.root().into()).into()),
+        None => None,
+    };
     Ok(OpenedRun {
         dir,
         asked,

@@ -52,11 +52,11 @@ impl Session<'_> {
         })
     }
 
-    /// Takes the wireframe out of the field and writes it, unless `cancelled` is set
+    /// Takes the wireframe out of the field, or the images, and writes it, unless `cancelled` is set
     /// before.
     pub fn distill(
         &mut self,
-        field: &TrainedField,
+        field: Option<&TrainedField>,
         cancelled: &AtomicBool,
     ) -> Result<Reconstruction, PipelineError> {
         let distilled = self.stage(Stage::Distill, |session| {

@@ -7,7 +7,9 @@ use crate::config::Config;
 use crate::error::PipelineError;
 use crate::event::{Decision, Event, OnEvent, Stage, Warning, WarningKind, timed};
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
-use crate::plan::{Given, Machine, Plan, changes_of_presets, settings_without_effect, settle};
+use crate::plan::{
+    Given, Machine, NO_FIELD, Plan, changes_of_presets, settings_without_effect, settle,
+};
 use crate::resources::Resources;
 use crate::run_dir::{Existing, RunDir, RunLock};
 use crate::scene::{PreparedScene, examine_quickly, prepare_scene};
@@ -264,6 +266,10 @@ fn prepare(
     };
     for warning in settings_without_effect(&changes, &plan, given) {
         on_event(Event::Warning(warning));
+    }
+    if options.time_budget.is_some() && !plan.trains() {
+        let text = format!("--time-budget has no effect: {NO_FIELD}");
+        on_event(Event::Warning(Warning::new(WarningKind::NoEffect, text)));
     }
     if options.examine && earlier.is_none() {
         timed(on_event, Stage::Examine, |on_event| {
