@@ -5,12 +5,14 @@
 //! brickwork, little on a wall. What a view says is the logarithm of the ratio of both
 //! probabilities, where a line that exists may still be hidden. Two views show a line
 //! wherever they want, since any two planes meet in one: the two that say most do not
-//! count.
+//! count. What is another line in each view is weighed in the same way.
 
 use super::edge_samples::{EdgeSamples, Images};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 
+/// Two views show a line wherever they want.
+const FREE_VIEWS: usize = 2;
 /// The ends of an edge are round and hidden: this share of it at each end is not asked.
 const ENDS: f64 = 0.03;
 /// A view shows a line along which edgels are at this share of the samples …
@@ -103,10 +105,23 @@ impl Images<'_> {
         taken: Option<&[Vec<bool>]>,
         least: f64,
     ) -> LineEvidence {
+        self.evidence_of(line, |_| Some(*line), taken, least, FREE_VIEWS)
+    }
+
+    /// [`Self::evidence`] of something near `line` that is the line `in_view` for each view, of
+    /// which `free` views show one wherever they want.
+    pub(super) fn evidence_of(
+        &self,
+        line: &LineSegment3,
+        in_view: impl Fn(usize) -> Option<LineSegment3>,
+        taken: Option<&[Vec<bool>]>,
+        least: f64,
+        free: usize,
+    ) -> LineEvidence {
         let states: Vec<(usize, State, EdgeSamples)> = (0..self.views.len())
             .filter(|view| !self.maps[*view].is_empty())
             .filter_map(|view| {
-                let samples = self.samples(view, line, [ENDS, 1.0 - ENDS], None)?;
+                let samples = self.samples(view, &in_view(view)?, [ENDS, 1.0 - ENDS], None)?;
                 let state = State::of(self.share(view, &samples, 0.0, taken));
                 Some((view, state, samples))
             })
@@ -127,14 +142,14 @@ impl Images<'_> {
         let partly = (states.iter())
             .filter(|(_, state, _)| *state == State::PartlyShown)
             .count();
-        let most = shown.len().saturating_sub(2) as f64 * most_of_view(State::Shown)
+        let most = shown.len().saturating_sub(free) as f64 * most_of_view(State::Shown)
             + partly as f64 * most_of_view(State::PartlyShown);
         if most <= least {
             return evidence;
         }
         let min_cosine = BESIDE.to_radians().cos();
         let mut gain = 0.0;
-        let mut best = [0.0_f64; 2];
+        let mut of_showing = Vec::new();
         for (view, state, samples) in &states {
             if *state == State::NotShown {
                 let here = toward(*view);
@@ -156,11 +171,11 @@ impl Images<'_> {
                     view: *view,
                     chance,
                 });
-                let [first, second] = best;
-                best = [first.max(of_view), first.min(of_view).max(second)];
+                of_showing.push(of_view);
             }
         }
-        evidence.gain = gain - best[0] - best[1];
+        of_showing.sort_by(|a: &f64, b| b.total_cmp(a));
+        evidence.gain = gain - of_showing.iter().take(free).sum::<f64>();
         evidence
     }
 
