@@ -57,6 +57,8 @@ pub(super) struct Selection<'a> {
     pub lines: Vec<ChosenLine>,
     /// Lines that the images show and that stand for curves.
     pub curved: usize,
+    /// Those that are outlines of round things.
+    pub outlines: usize,
     /// For each edgel of each view, whether a line has it.
     pub taken: Vec<Vec<bool>>,
 }
@@ -107,8 +109,8 @@ fn candidates(images: &Images, alternatives: &Alternatives, step: usize) -> Vec<
     candidates
 }
 
-/// The median over lines of the standard deviation of their edgels, in pixels; lines that
-/// stand for curves do not count.
+/// The median over lines of the standard deviation of their edgels, in pixels; curves and
+/// outlines, whose edgels lie farther off, are not among them.
 fn noise_of_edgels(images: &Images, lines: &[ChosenLine]) -> f64 {
     let mut deviations: Vec<f64> = lines
         .par_iter()
@@ -182,7 +184,7 @@ fn choose<'a>(
             .map(|view| vec![false; view.segments.len()])
             .collect(),
     };
-    let (mut lines, mut curved) = (Vec::new(), 0);
+    let (mut lines, mut curved, mut outlines) = (Vec::new(), 0, 0);
     while let Some(Ranked(gain, index)) = queue.pop() {
         let Candidate { segment, line } = &candidates[index];
         if lines.len() >= most {
@@ -205,6 +207,8 @@ fn choose<'a>(
         chooser.claim(&found, *segment);
         if images.is_curved(&found.line, &found.evidence, noise) {
             curved += 1;
+        } else if images.is_outline(&found.line, &found.evidence) {
+            outlines += 1;
         } else {
             lines.push(found);
         }
@@ -214,6 +218,7 @@ fn choose<'a>(
         noise,
         lines,
         curved,
+        outlines,
         taken: chooser.taken,
     }
 }

@@ -5,7 +5,8 @@
 //! (Hofer, Maurer and Bischof, *Efficient 3D scene abstraction using line segments*,
 //! Line3D++, 2017). The images decide: the line that they speak for most is fitted to the
 //! edgels of all views at once, takes them, and the next one is chosen by those that are
-//! left. Lines that bend are curves. Ends that meet become corners, all corners are fitted
+//! left. Lines that bend are curves, and those that
+//! move aside from view to view are outlines of round things. Ends that meet become corners, all corners are fitted
 //! to the edgels together, and edges are cut where others end on them.
 //!
 //! Edgels are so noisy as the scene's poses and images make them, which the first lines tell;
@@ -31,6 +32,7 @@ mod line_extent;
 mod line_fitting;
 mod line_selection;
 mod neighbours;
+mod outlines;
 mod projected_line;
 mod report;
 mod straightness;
@@ -123,6 +125,7 @@ pub fn assemble(
     report.noise_in_pixels = selection.noise;
     report.lines = selection.lines.len();
     report.curved_lines = selection.curved;
+    report.outlines = selection.outlines;
 
     let lines = merge_pieces(&images, selection.lines);
     report.merged_pieces = report.lines - lines.len();

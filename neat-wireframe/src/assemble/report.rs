@@ -27,8 +27,10 @@ pub struct AssembleReport {
     pub noise_in_pixels: f64,
     /// Straight lines that the images show …
     pub lines: usize,
-    /// … and those that stand for curves, and are left out.
+    /// … those that stand for curves, and are left out …
     pub curved_lines: usize,
+    /// … and outlines of round things, which are left out, too.
+    pub outlines: usize,
     /// Lines that were pieces of others.
     pub merged_pieces: usize,
     /// Places where lines end, alone or together.
