@@ -242,7 +242,8 @@ impl Chooser<'_> {
             line = images.fit(&line, evidence.views(), share * images.reach);
             line = images.extent(&line, &evidence.showing)?;
             evidence = images.evidence(&line, Some(&self.taken), self.min_evidence);
-            if evidence.gain <= self.min_evidence {
+            // Parts of others' edges make evidence too, but no view that a fit could ask.
+            if evidence.gain <= self.min_evidence || evidence.showing.is_empty() {
                 return None;
             }
         }
@@ -304,4 +305,33 @@ fn lies_on(segment: &LineSegment2, on: &LineSegment2, reach: f64) -> bool {
         .all(|(end, place)| (end - on.point_at(place)).norm() <= reach);
     let [low, high] = [places[0].min(places[1]), places[0].max(places[1])];
     near && high.min(1.0) - low.max(0.0) >= 0.5 * (high - low)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::test_cube::{CubeViews, cube_edge};
+
+    #[test]
+    fn what_no_view_shows_with_edgels_of_its_own_is_no_line() {
+        let cube = CubeViews::new(20);
+        let images = cube.images();
+        let edge = cube_edge(3);
+        let settled = |share_of_others: f64| {
+            let mut taken: Vec<Vec<bool>> = (images.maps.iter())
+                .map(|map| vec![false; map.len()])
+                .collect();
+            let part = LineSegment3::new(edge.start, edge.point_at(share_of_others));
+            claim_edgels(&images, &part, &mut taken);
+            let chooser = Chooser {
+                images,
+                min_evidence: 0.0,
+                taken,
+                explained: Vec::new(),
+            };
+            chooser.settle(&edge, images.evidence(&edge, None, 0.0))
+        };
+        assert!(settled(0.1).unwrap().evidence.showing.len() >= 18);
+        assert!(settled(0.6).is_none());
+    }
 }
