@@ -10,7 +10,7 @@ use neat_core::LineSegment3;
 use rayon::prelude::*;
 
 /// Lines meet where so many reaches lie between them at most.
-const MAX_GAP: f64 = 2.5;
+pub(super) const MAX_GAP: f64 = 2.5;
 /// An end may be off along its line by so many pixels, since corners are round and hidden;
 /// with 8 or 24 F1 of photographs with truth is the same …
 const WINDOW_IN_PIXELS: f64 = 16.0;
@@ -34,6 +34,26 @@ pub(super) struct Corners {
     pub windows: Vec<f64>,
     /// Per line, the size of a pixel.
     pub pixels: Vec<f64>,
+}
+
+impl Corners {
+    /// Takes away the other lines. Their junctions stay, though none may run there.
+    pub(super) fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
+        let mut new_index = vec![None; self.ends.len()];
+        let kept: Vec<usize> = (0..self.ends.len()).filter(|line| wanted(*line)).collect();
+        for (new, old) in kept.iter().enumerate() {
+            new_index[*old] = Some(new);
+        }
+        self.ends = kept.iter().map(|line| self.ends[*line]).collect();
+        self.windows = kept.iter().map(|line| self.windows[*line]).collect();
+        self.pixels = kept.iter().map(|line| self.pixels[*line]).collect();
+        self.meetings.retain_mut(|meeting| {
+            let [a, b] = meeting.lines.map(|line| new_index[line]);
+            Option::zip(a, b)
+                .inspect(|(a, b)| meeting.lines = [*a, *b])
+                .is_some()
+        });
+    }
 }
 
 /// Two lines that come near each other within their lengths.

@@ -1,7 +1,7 @@
 //! Edges that no pair of views can place, since all cameras lie in one plane with them, or
 //! nearly: where 2D segments run from corner to corner, corners that other edges have placed.
 
-use super::corners::Corners;
+use super::corners::{Corners, MAX_GAP};
 use super::edge_samples::Images;
 use super::line_selection::claim_edgels;
 use crate::projection::project_in_front;
@@ -37,16 +37,50 @@ pub(super) fn complete_edges(
         .filter(|(gain, _)| *gain > min_evidence)
         .collect();
     drawn.sort_by(|(a, i), (b, j)| b.total_cmp(a).then(i.cmp(j)));
-    let mut found = Vec::new();
+    let (mut found, mut pixels) = (Vec::new(), Vec::new());
     for (_, pair) in drawn {
         let evidence = images.evidence(&line(pair), Some(taken), min_evidence);
         if evidence.gain > min_evidence {
             claim_edgels(images, &line(pair), taken);
             found.push(pair);
+            pixels.push(images.pixel_size(&line(pair), evidence.views()));
         }
     }
+    drop_pieces(images, corners, &found);
     corners.ends.extend(&found);
+    // Their ends are corners already: they are not sought any more.
+    corners.windows.extend(found.iter().map(|_| 0.0));
+    corners.pixels.extend(pixels);
     found.len()
+}
+
+/// Takes away the lines that are pieces of the edges between `pairs`: from a corner of theirs to
+/// an end of their own that lies on the edge.
+fn drop_pieces(images: &Images, corners: &mut Corners, pairs: &[[usize; 2]]) {
+    let junctions = &corners.junctions;
+    let mut degrees = vec![0; junctions.len()];
+    let mut lines_at: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (line, ends) in corners.ends.iter().enumerate() {
+        for end in ends {
+            degrees[*end] += 1;
+            lines_at.entry(*end).or_default().push(line);
+        }
+    }
+    let mut dropped = vec![false; corners.ends.len()];
+    for pair in pairs {
+        let edge = LineSegment3::new(junctions[pair[0]], junctions[pair[1]]);
+        for line in pair.iter().filter_map(|end| lines_at.get(end)).flatten() {
+            let [a, b] = corners.ends[*line];
+            let free = if pair.contains(&a) { b } else { a };
+            let place = edge.line_parameter(&junctions[free]);
+            let gap = (junctions[free] - edge.point_at(place)).norm();
+            let max_gap = MAX_GAP * images.reach * corners.pixels[*line];
+            if degrees[free] == 1 && (0.0..1.0).contains(&place) && gap <= max_gap {
+                dropped[*line] = true;
+            }
+        }
+    }
+    corners.keep(|line| !dropped[line]);
 }
 
 /// Pairs of junctions, ascending, between which 2D segments run in enough views.
@@ -85,4 +119,57 @@ fn drawn_pairs(images: &Images, corners: &Corners) -> Vec<[usize; 2]> {
         .filter(|(_, views)| *views >= MIN_VIEWS)
         .map(|(pair, _)| pair)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::corners::find_corners;
+    use crate::assemble::test_cube::{CubeViews, chosen, cube_edge};
+
+    /// All edges of the cube but `left_out`, and what has the edgels.
+    fn without(images: &Images, left_out: usize) -> (Corners, Vec<Vec<bool>>) {
+        let mut taken: Vec<Vec<bool>> = (images.maps.iter())
+            .map(|map| vec![false; map.len()])
+            .collect();
+        let lines: Vec<_> = (0..12)
+            .filter(|edge| *edge != left_out)
+            .map(|edge| chosen(images, &cube_edge(edge)))
+            .collect();
+        for line in &lines {
+            claim_edgels(images, &line.line, &mut taken);
+        }
+        (find_corners(images, &lines), taken)
+    }
+
+    #[test]
+    fn the_missing_edge_is_found() {
+        let cube = CubeViews::new(20);
+        let images = cube.images();
+        let (mut corners, mut taken) = without(&images, 7);
+        assert_eq!(corners.junctions.len(), 8);
+        assert_eq!(complete_edges(&images, &mut corners, &mut taken, 3.0), 1);
+        assert_eq!(corners.ends.len(), 12);
+        assert_eq!(complete_edges(&images, &mut corners, &mut taken, 3.0), 0);
+    }
+
+    #[test]
+    fn pieces_of_a_new_edge_go() {
+        let cube = CubeViews::new(20);
+        let images = cube.images();
+        let (mut corners, _) = without(&images, 7);
+        let pair = [0, 1].map(|side| {
+            let end = cube_edge(7).ends()[side];
+            let apart = |k: &usize| (corners.junctions[*k] - end).norm();
+            (0..8).min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap()
+        });
+        let free = corners.junctions.len();
+        corners.junctions.push(cube_edge(7).point_at(0.3));
+        corners.ends.push([pair[0], free]);
+        corners.pixels.push(corners.pixels[0]);
+        corners.windows.push(corners.windows[0]);
+        drop_pieces(&images, &mut corners, &[pair]);
+        assert_eq!(corners.ends.len(), 11);
+        assert!(corners.ends.iter().flatten().all(|end| *end != free));
+    }
 }

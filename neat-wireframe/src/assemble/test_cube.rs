@@ -1,6 +1,7 @@
 //! A cube without noise, for the unit tests of the steps.
 
 use super::edge_samples::Images;
+use super::line_selection::ChosenLine;
 use super::view_segments::PreparedView;
 use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
 use neat_core::{EdgelMap, LineSegment3};
@@ -39,6 +40,14 @@ pub(super) fn cube_edge(edge: usize) -> LineSegment3 {
     let (junctions, edges) = cube();
     let [a, b] = edges[edge];
     LineSegment3::new(junctions[a], junctions[b])
+}
+
+/// A line with what the images say about it.
+pub(super) fn chosen(images: &Images, line: &LineSegment3) -> ChosenLine {
+    ChosenLine {
+        line: *line,
+        evidence: images.evidence(line, None, 0.0),
+    }
 }
 
 /// Larger distance of corresponding ends, in the better order.
