@@ -27,6 +27,7 @@ mod graph_fitting;
 mod graph_segmentation;
 mod hypothesis_scoring;
 mod line3d;
+mod line_continuation;
 mod line_evidence;
 mod line_extent;
 mod line_fitting;
@@ -53,6 +54,7 @@ use edge_cutting::cut_edges;
 use edge_samples::Images;
 use graph_fitting::fit_graph;
 use hypothesis_scoring::{Scoring, score_hypotheses};
+use line_continuation::continue_lines;
 use line_selection::select_lines;
 use neat_core::{EdgelMap, LineSegment2};
 use rayon::prelude::*;
@@ -127,7 +129,14 @@ pub fn assemble(
     report.curved_lines = selection.curved;
     report.outlines = selection.outlines;
 
-    let lines = merge_pieces(&images, selection.lines);
+    let mut lines = merge_pieces(&images, selection.lines);
+    continue_lines(
+        &images,
+        &mut lines,
+        &mut selection.taken,
+        config.min_evidence,
+    );
+    lines = merge_pieces(&images, lines);
     report.merged_pieces = report.lines - lines.len();
     let mut corners = find_corners(&images, &lines);
     report.ends = corners.junctions.len();

@@ -1,0 +1,135 @@
+//! Lines followed beyond their ends to what they would meet there: the views that show most
+//! of an edge are not those that show its rest.
+
+use super::corners::{MAX_GAP, beyond_end, nearest_points};
+use super::edge_samples::Images;
+use super::line_selection::{ChosenLine, claim_edgels};
+use neat_core::LineSegment3;
+use rayon::prelude::*;
+
+/// A line is followed by this share of its length beyond each end.
+const BEYOND: f64 = 1.0;
+/// The nearest things ahead that are asked for: behind so many that no edgels lead to,
+/// nothing is hoped for.
+const MOST_AHEAD: usize = 4;
+
+/// Makes lines longer where edgels that no line has speak for it.
+pub(super) fn continue_lines(
+    images: &Images,
+    lines: &mut [ChosenLine],
+    taken: &mut [Vec<bool>],
+    min_evidence: f64,
+) {
+    let pixels: Vec<f64> = (lines.iter())
+        .map(|line| images.pixel_size(&line.line, line.evidence.views()))
+        .collect();
+    let ahead: Vec<[Vec<f64>; 2]> = (0..lines.len())
+        .into_par_iter()
+        .map(|k| places_ahead(images, lines, &pixels, k))
+        .collect();
+    for (chosen, ahead) in lines.iter_mut().zip(ahead) {
+        let line = chosen.line;
+        let mut reached = [0.0, 1.0];
+        for (reached, places) in reached.iter_mut().zip(ahead) {
+            for place in places {
+                let stretch = LineSegment3::new(line.point_at(*reached), line.point_at(place));
+                let evidence = images.evidence(&stretch, Some(taken), min_evidence);
+                if evidence.gain > min_evidence {
+                    claim_edgels(images, &stretch, taken);
+                    *reached = place;
+                }
+            }
+        }
+        if reached != [0.0, 1.0] {
+            let whole = LineSegment3::new(line.point_at(reached[0]), line.point_at(reached[1]));
+            chosen.line = images.fit(&whole, chosen.evidence.views(), images.reach);
+        }
+    }
+}
+
+/// Parameters, nearest first, where a line would meet others before its start and beyond its
+/// end.
+fn places_ahead(images: &Images, lines: &[ChosenLine], pixels: &[f64], k: usize) -> [Vec<f64>; 2] {
+    let line = &lines[k].line;
+    let length = line.length();
+    let mut ahead = [Vec::new(), Vec::new()];
+    for (other, pixel) in lines.iter().zip(pixels) {
+        let pixel = pixel.max(pixels[k]);
+        let gap = MAX_GAP * images.reach * pixel;
+        for place in meeting_places(line, &other.line, gap) {
+            let (beyond, end) = beyond_end(place, length);
+            if beyond > 0.0 && beyond <= BEYOND * length {
+                ahead[end].push(place);
+            }
+        }
+    }
+    for (places, sign) in ahead.iter_mut().zip([-1.0, 1.0]) {
+        places.sort_by(|a: &f64, b| (sign * a).total_cmp(&(sign * b)));
+        places.truncate(MOST_AHEAD);
+    }
+    ahead
+}
+
+/// Where a line would meet another: a point of the other within its length, or the ends of one
+/// that lies on the same line.
+fn meeting_places(line: &LineSegment3, other: &LineSegment3, gap: f64) -> Vec<f64> {
+    if let Some(([place, on_other], distance)) = nearest_points(line, other) {
+        let (beyond, _) = beyond_end(on_other, other.length());
+        return if distance <= gap && beyond <= gap {
+            vec![place]
+        } else {
+            Vec::new()
+        };
+    }
+    let places = other.ends().map(|end| line.line_parameter(&end));
+    let apart = |side: usize| (other.ends()[side] - line.point_at(places[side])).norm();
+    if apart(0).max(apart(1)) <= gap {
+        places.to_vec()
+    } else {
+        Vec::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::test_cube::{CubeViews, chosen, cube_edge, end_distance};
+
+    #[test]
+    fn a_line_grows_to_what_it_meets_where_edgels_speak_for_it() {
+        let cube = CubeViews::new(20);
+        let images = cube.images();
+        let edge = cube_edge(0);
+        let mut lines: Vec<ChosenLine> = (1..12)
+            .map(|edge| chosen(&images, &cube_edge(edge)))
+            .collect();
+        let piece = LineSegment3::new(edge.point_at(0.3), edge.point_at(0.7));
+        lines.push(chosen(&images, &piece));
+        let none: Vec<Vec<bool>> = (images.maps.iter())
+            .map(|map| vec![false; map.len()])
+            .collect();
+        let all: Vec<Vec<bool>> = none.iter().map(|map| vec![true; map.len()]).collect();
+        let grown = |mut taken: Vec<Vec<bool>>| {
+            let mut lines = lines.clone();
+            continue_lines(&images, &mut lines, &mut taken, 3.0);
+            lines[11].line
+        };
+        assert!(end_distance(&grown(none), &edge) < 0.01);
+        // Others have the edgels.
+        assert!(end_distance(&grown(all), &piece) < 1e-9);
+    }
+
+    #[test]
+    fn lines_meet_others_within_their_lengths_and_pieces_of_themselves() {
+        let line = |a: [f64; 3], b: [f64; 3]| LineSegment3::new(a.into(), b.into());
+        let along = line([0.0; 3], [1.0, 0.0, 0.0]);
+        let places = |other: LineSegment3| meeting_places(&along, &other, 0.01);
+        let across = places(line([1.5, -1.0, 0.005], [1.5, 1.0, 0.005]));
+        assert!(across.len() == 1 && (across[0] - 1.5).abs() < 1e-9);
+        assert!(places(line([1.5, -1.0, 0.02], [1.5, 1.0, 0.02])).is_empty());
+        assert!(places(line([1.5, 0.2, 0.0], [1.5, 1.0, 0.0])).is_empty());
+        let piece = places(line([1.4, 0.0, 0.0], [2.0, 0.005, 0.0]));
+        assert!(piece.len() == 2 && (piece[0] - 1.4).abs() < 1e-9);
+        assert!(places(line([1.4, 0.02, 0.0], [2.0, 0.02, 0.0])).is_empty());
+    }
+}
