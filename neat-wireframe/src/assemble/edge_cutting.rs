@@ -1,4 +1,4 @@
-//! Edges are cut where corners and free ends lie on them.
+//! Edges are cut where corners and free ends lie on them, and where they cross.
 
 use super::corners::{Corners, beyond_end, nearest_points};
 use super::edge_samples::Images;
@@ -67,6 +67,7 @@ pub(super) fn cut_edges(images: &Images, mut corners: Corners) -> Wireframe3d {
             cuts[bar].push((place, junction));
         }
     }
+    cut_crossings(images, &mut corners, &mut cuts);
     let mut edges = BTreeSet::new();
     for (ends, cuts) in corners.ends.iter().zip(&mut cuts) {
         cuts.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -84,6 +85,35 @@ pub(super) fn cut_edges(images: &Images, mut corners: Corners) -> Wireframe3d {
         }
     }
     in_order(&corners, &edges)
+}
+
+/// Cuts edges where they cross each other: there is a junction, though none of them ends.
+fn cut_crossings(images: &Images, corners: &mut Corners, cuts: &mut [Vec<(f64, usize)>]) {
+    for meeting in &corners.meetings {
+        let lines = meeting.lines.map(|k| {
+            let [start, end] = corners.ends[k].map(|end| corners.junctions[end]);
+            LineSegment3::new(start, end)
+        });
+        let pixel = (meeting.lines.iter().map(|k| corners.pixels[*k])).fold(0.0, f64::max);
+        let Some((places, gap)) = nearest_points(&lines[0], &lines[1]) else {
+            continue;
+        };
+        let is_apart = |side: usize| {
+            let (line, place) = (meeting.lines[side], places[side]);
+            let margin = MARGIN_IN_PIXELS * pixel / lines[side].length();
+            (cuts[line].iter().map(|(cut, _)| *cut).chain([0.0, 1.0]))
+                .all(|other| (place - other).abs() > margin)
+                && (0.0..1.0).contains(&place)
+        };
+        if gap <= MAX_GAP * images.reach * pixel && is_apart(0) && is_apart(1) {
+            let junction = corners.junctions.len();
+            let middle = 0.5 * (lines[0].point_at(places[0]) + lines[1].point_at(places[1]));
+            corners.junctions.push(middle);
+            for (line, place) in meeting.lines.into_iter().zip(places) {
+                cuts[line].push((place, junction));
+            }
+        }
+    }
 }
 
 /// The used junctions in lexicographic order of their coordinates, and the edges, sorted.
@@ -110,5 +140,45 @@ fn in_order(corners: &Corners, edges: &BTreeSet<[usize; 2]>) -> Wireframe3d {
     Wireframe3d {
         junctions: order.iter().map(|old| corners.junctions[*old]).collect(),
         edges,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::corners::find_corners;
+    use crate::assemble::line_evidence::{LineEvidence, Showing};
+    use crate::assemble::line_selection::ChosenLine;
+    use crate::assemble::test_cube::CubeViews;
+
+    #[test]
+    fn lines_that_cross_have_a_junction_there_and_those_that_pass_have_none() {
+        let cube = CubeViews::new(4);
+        let images = cube.images();
+        let graph = |height: f64| {
+            let lines = [
+                [[-0.4, 0.0, 0.0], [0.6, 0.0, 0.0]],
+                [[0.1, -0.5, height], [0.1, 0.3, height]],
+            ];
+            let lines = lines.map(|[a, b]| ChosenLine {
+                line: LineSegment3::new(a.into(), b.into()),
+                evidence: LineEvidence {
+                    gain: 9.0,
+                    showing: vec![Showing {
+                        view: 0,
+                        chance: 0.1,
+                    }],
+                },
+            });
+            cut_edges(&images, find_corners(&images, &lines))
+        };
+        let crossing = graph(0.0);
+        assert_eq!([crossing.junctions.len(), crossing.edges.len()], [5, 4]);
+        let apart = (crossing.junctions.iter())
+            .map(|junction| (junction - nalgebra::Vector3::new(0.1, 0.0, 0.0)).norm())
+            .fold(f64::INFINITY, f64::min);
+        assert!(apart < 1e-9);
+        let passing = graph(0.1);
+        assert_eq!([passing.junctions.len(), passing.edges.len()], [4, 2]);
     }
 }
