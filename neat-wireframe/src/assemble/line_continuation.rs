@@ -7,7 +7,8 @@ use super::line_selection::{ChosenLine, claim_edgels};
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 
-/// A line is followed by this share of its length beyond each end.
+/// A line is followed by this share of its length beyond each end: how far its direction, as
+/// well as it is known, leads along an edge.
 const BEYOND: f64 = 1.0;
 /// The nearest things ahead that are asked for: behind so many that no edgels lead to,
 /// nothing is hoped for.

@@ -37,6 +37,7 @@ mod outlines;
 mod projected_line;
 mod report;
 mod straightness;
+mod tangent_ends;
 mod view_segments;
 
 #[cfg(test)]
@@ -58,6 +59,7 @@ use line_continuation::continue_lines;
 use line_selection::select_lines;
 use neat_core::{EdgelMap, LineSegment2};
 use rayon::prelude::*;
+use tangent_ends::cut_tangent_ends;
 use view_segments::PreparedView;
 
 /// Views that must agree on a position for it to be proposed; the images decide.
@@ -129,6 +131,7 @@ pub fn assemble(
     report.curved_lines = selection.curved;
     report.outlines = selection.outlines;
 
+    cut_tangent_ends(&images, &mut selection.lines, selection.noise);
     let mut lines = merge_pieces(&images, selection.lines);
     continue_lines(
         &images,

@@ -1,0 +1,197 @@
+//! Where a straight edge runs into an arc without a corner, it ends.
+//!
+//! Edgels of the arc stay within the noise for long. But noise averages out over all views,
+//! station by station along the line: a parabola that leaves the line at its end is asked for.
+
+use super::edge_samples::Images;
+use super::line_evidence::LineEvidence;
+use super::line_fitting::directions_across;
+use super::line_selection::ChosenLine;
+use super::projected_line::ProjectedLine;
+use nalgebra::{Matrix2, Vector2};
+use neat_core::LineSegment3;
+use rayon::prelude::*;
+
+/// Stations along a line: one for two pixels, within these bounds.
+const PIXELS_PER_STATION: f64 = 2.0;
+const COUNTS: [usize; 2] = [20, 400];
+/// An arc is at most this share of the line at each end: else it is none.
+const MOST: f64 = 0.4;
+/// Fewer stations tell nothing of an arc.
+const MIN_STATIONS: usize = 3;
+/// The parabola must explain the edgels so much better, in nats.
+const ADVANTAGE: f64 = 12.0;
+/// Two halves of the views must agree on its direction to this cosine: what lies beside an edge
+/// in some views bends it there only.
+const AGREEMENT: f64 = 0.8;
+/// Edgels of neighbouring stations are not independent: variances are so many times larger.
+const CORRELATION: f64 = 4.0;
+
+/// What edgels say about the offset from the line at one station.
+#[derive(Clone, Copy, Default)]
+struct Station {
+    matrix: Matrix2<f64>,
+    right: Vector2<f64>,
+}
+
+/// Takes the arcs at their ends away from lines. `noise` is the standard deviation of an edgel,
+/// in pixels.
+pub(super) fn cut_tangent_ends(images: &Images, lines: &mut [ChosenLine], noise: f64) {
+    lines.par_iter_mut().for_each(|chosen| {
+        let line = images.without_tangent_ends(&chosen.line, &chosen.evidence, noise);
+        if line != chosen.line {
+            chosen.line = images.fit(&line, chosen.evidence.views(), images.reach);
+        }
+    });
+}
+
+impl Images<'_> {
+    fn without_tangent_ends(
+        &self,
+        line: &LineSegment3,
+        evidence: &LineEvidence,
+        noise: f64,
+    ) -> LineSegment3 {
+        let mut halves = self.stations(line, evidence);
+        let count = halves[0].len() as f64;
+        let variance = CORRELATION * noise * noise;
+        let last = straight_until(&halves, variance);
+        halves.iter_mut().for_each(|stations| stations.reverse());
+        let first = straight_until(&halves, variance);
+        let place = |station: usize| station as f64 / count;
+        LineSegment3::new(
+            line.point_at(1.0 - place(first)),
+            line.point_at(place(last)),
+        )
+    }
+
+    /// The stations of a line, by each half of the views that show it.
+    fn stations(&self, line: &LineSegment3, evidence: &LineEvidence) -> [Vec<Station>; 2] {
+        let length = self.projected_length(line, evidence.views());
+        let count = ((length / PIXELS_PER_STATION) as usize).clamp(COUNTS[0], COUNTS[1]);
+        let mut halves = [(); 2].map(|()| vec![Station::default(); count]);
+        let Some(across) = directions_across(line) else {
+            return halves;
+        };
+        for (index, view) in evidence.views().enumerate() {
+            let camera = &self.views[view].camera;
+            let prepared = (ProjectedLine::new(camera, line)).zip(self.samples(
+                view,
+                line,
+                [0.0, 1.0],
+                Some(count),
+            ));
+            let Some((projected, samples)) = prepared else {
+                continue;
+            };
+            for (place, pixel) in &samples.points {
+                let Some(edgel) = self.edgel(view, pixel, &samples.normal, self.reach) else {
+                    continue;
+                };
+                let position = self.maps[view].get(edgel).position.cast();
+                let found = projected.distance_with_gradient(camera, &position);
+                let [start, end] = found.by_points;
+                let row = across.tr_mul(&(start + end));
+                let station =
+                    &mut halves[index % 2][((place * count as f64) as usize).min(count - 1)];
+                station.matrix += row * row.transpose();
+                station.right -= found.distance * row;
+            }
+        }
+        halves
+    }
+}
+
+/// A parabola that leaves a line, and what it gains.
+struct Parabola {
+    bend: Vector2<f64>,
+    /// In nats times the variance of an edgel.
+    gain: f64,
+}
+
+/// The best parabola that leaves the line at the first of some stations.
+fn parabola<'s>(stations: impl Iterator<Item = (usize, &'s Station)>) -> Option<Parabola> {
+    let mut matrix = Matrix2::zeros();
+    let mut right = Vector2::zeros();
+    for (k, station) in stations {
+        let square = (k as f64 + 0.5).powi(2);
+        matrix += station.matrix * (square * square);
+        right += station.right * square;
+    }
+    // A direction that no view tells of stays where it is.
+    let ridge = 1e-9 * matrix.trace();
+    let factor = (matrix + Matrix2::identity() * ridge).cholesky()?;
+    let bend = factor.solve(&right);
+    let gain = 0.5 * right.dot(&bend);
+    Some(Parabola { bend, gain })
+}
+
+/// The station after which a parabola leaves the line, or all of them.
+fn straight_until(halves: &[Vec<Station>; 2], variance: f64) -> usize {
+    let count = halves[0].len();
+    let first = count - (MOST * count as f64) as usize;
+    let of_half = |half: usize, start: usize| parabola(halves[half][start..].iter().enumerate());
+    let gain = |start: usize| {
+        let both = (0..2).flat_map(|half| halves[half][start..].iter().enumerate());
+        let whole = parabola(both)?;
+        let [one, other] = [of_half(0, start)?.bend, of_half(1, start)?.bend];
+        let agree = one.dot(&other) > AGREEMENT * one.norm() * other.norm();
+        (agree && whole.gain > ADVANTAGE * variance).then_some((whole.gain, start))
+    };
+    let best = (first..=count.saturating_sub(MIN_STATIONS))
+        .filter_map(gain)
+        .max_by(|(a, i), (b, j)| a.total_cmp(b).then(j.cmp(i)));
+    best.map_or(count, |(_, start)| start)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::test_cube::{CubeViews, cube_edge, end_distance};
+    use crate::assemble::view_segments::PreparedView;
+    use crate::test_scenes::{cameras_on_sphere, views_of_edges};
+    use nalgebra::Vector3;
+    use neat_core::EdgelMap;
+
+    #[test]
+    fn a_line_ends_where_an_arc_begins() {
+        const RADIUS: f64 = 0.2;
+        let mut points = vec![Vector3::new(-0.4, 0.0, 0.1), Vector3::new(0.2, 0.0, 0.1)];
+        let corner = points[1];
+        points.extend((1..40).map(|k| {
+            let (sine, cosine) = (0.02 * f64::from(k)).sin_cos();
+            corner + RADIUS * Vector3::new(sine, 1.0 - cosine, 0.0)
+        }));
+        let edges: Vec<[usize; 2]> = (1..points.len()).map(|k| [k - 1, k]).collect();
+        let cameras = cameras_on_sphere(20);
+        let views: Vec<PreparedView> = views_of_edges(&cameras, &points, &edges)
+            .iter()
+            .map(|observation| PreparedView::new(observation, 1.0, 0.0))
+            .collect();
+        let maps: Vec<EdgelMap> = views
+            .iter()
+            .map(crate::assemble::edgels_of_segments)
+            .collect();
+        let images = Images {
+            views: &views,
+            maps: &maps,
+            reach: 0.5,
+        };
+        let truth = LineSegment3::new(points[0], points[1]);
+        let late = LineSegment3::new(points[0], points[1] + Vector3::new(0.03, 0.0, 0.0));
+        let evidence = images.evidence(&late, None, 0.0);
+        assert!(evidence.showing.len() > 10);
+        let cut = images.without_tangent_ends(&late, &evidence, 0.05);
+        assert!(end_distance(&cut, &truth) < 0.01, "{cut:?}");
+        assert_eq!(cut.start, late.start);
+
+        // A corner is none.
+        let cube = CubeViews::new(20);
+        let images = cube.images();
+        for edge in 0..12 {
+            let evidence = images.evidence(&cube_edge(edge), None, 0.0);
+            let cut = images.without_tangent_ends(&cube_edge(edge), &evidence, 0.05);
+            assert!(end_distance(&cut, &cube_edge(edge)) < 1e-9);
+        }
+    }
+}
