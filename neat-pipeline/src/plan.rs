@@ -135,6 +135,54 @@ fn settle_distillation(
     Ok((back_end, field))
 }
 
+/// Tells a decision: the setting, its value, and the reason.
+type Decide<'a> = &'a mut dyn FnMut(&str, &dyn fmt::Display, String);
+
+/// Decides what the field is, where one is trained or was.
+fn settle_field(
+    config: &mut Config,
+    scene: &Scene,
+    earlier: Option<&Plan>,
+    trains: bool,
+    decide: Decide<'_>,
+) {
+    let is_photo = config.data.background == Some(Choice::Given(Background::Photo));
+    if trains && is_photo && config.train.loss.mask != 0.0 {
+        config.train.loss.mask = 0.0;
+        let reason = "as photographs show no silhouettes".to_owned();
+        decide("train.loss.mask", &0, reason);
+    }
+    if config.model.implicit.bounding_sphere_slope == 0.0 {
+        let slope = &mut config.model.implicit.bounding_sphere_slope;
+        match earlier {
+            // The field was trained with it, whatever is said of the background now.
+            Some(plan) => *slope = plan.config.model.implicit.bounding_sphere_slope,
+            None if trains && is_photo => {
+                *slope = SPHERE_SLOPE;
+                let reason = "as the sphere stands for all that is behind the scene".to_owned();
+                let setting = "model.implicit.bounding_sphere_slope";
+                decide(setting, &SPHERE_SLOPE, reason);
+            }
+            None => (),
+        }
+    }
+    if config.model.perceiver.junctions.fixed().is_none() {
+        let kept = earlier.and_then(|plan| plan.config.model.perceiver.junctions.fixed());
+        let count = kept.or_else(|| {
+            trains.then(|| {
+                let wireframes = scene.views.iter().map(|view| &view.wireframe);
+                let count = latents::latents_for(wireframes, config.data.min_segment_score);
+                let reason = "as the 2D wireframes have junctions".to_owned();
+                decide("model.perceiver.junctions", &count, reason);
+                count
+            })
+        });
+        if let Some(count) = count {
+            config.model.perceiver.junctions = JunctionCount::Fixed(count);
+        }
+    }
+}
+
 /// Decides what `asked` leaves open, by the scene and the machine, and tells it. What
 /// an `earlier` part of the run has decided stays.
 ///
@@ -175,37 +223,7 @@ pub fn settle(
     };
     let (_, field) = settle_distillation(&config.distill, background)?;
     let trains = field == FieldUse::Trained;
-    if trains && background == Some(Background::Photo) {
-        if asked.train.loss.mask != 0.0 {
-            config.train.loss.mask = 0.0;
-            let reason = "as photographs show no silhouettes".to_owned();
-            decide("train.loss.mask", &0, reason);
-        }
-        if earlier.is_none() && asked.model.implicit.bounding_sphere_slope == 0.0 {
-            config.model.implicit.bounding_sphere_slope = SPHERE_SLOPE;
-            let reason = "as the sphere stands for all that is behind the scene".to_owned();
-            let setting = "model.implicit.bounding_sphere_slope";
-            decide(setting, &SPHERE_SLOPE, reason);
-        }
-    }
-    if let Some(plan) = earlier
-        && asked.model.implicit.bounding_sphere_slope == 0.0
-    {
-        // The field was trained with it, whatever is said of the background now.
-        let slope = plan.config.model.implicit.bounding_sphere_slope;
-        config.model.implicit.bounding_sphere_slope = slope;
-    }
-    if trains && asked.model.perceiver.junctions.fixed().is_none() {
-        let kept = earlier.and_then(|plan| plan.config.model.perceiver.junctions.fixed());
-        let count = kept.unwrap_or_else(|| {
-            let wireframes = scene.views.iter().map(|view| &view.wireframe);
-            let count = latents::latents_for(wireframes, asked.data.min_segment_score);
-            let reason = "as the 2D wireframes have junctions".to_owned();
-            decide("model.perceiver.junctions", &count, reason);
-            count
-        });
-        config.model.perceiver.junctions = JunctionCount::Fixed(count);
-    }
+    settle_field(&mut config, scene, earlier, trains, &mut decide);
     let mut plan = Plan::new(config)?;
     if asked.distill.back_end == Choice::Auto {
         let reason = match plan.background {
