@@ -62,6 +62,11 @@ impl<const D: usize> LineSegment<D> {
         (self.point_at(self.line_parameter(point).clamp(0.0, 1.0)) - point).norm()
     }
 
+    /// Distance from `point` to the nearest point of the whole line.
+    pub fn distance_to_line(&self, point: &SVector<f64, D>) -> f64 {
+        (self.point_at(self.line_parameter(point)) - point).norm()
+    }
+
     /// `[start-to-start, end-to-end]` distances to `other`.
     pub fn end_distances(&self, other: &Self) -> [f64; 2] {
         [

@@ -110,7 +110,7 @@ fn joined(
     }
     fitter.fit_between_ends(&whole, DISTANCE).filter(|fitted| {
         let line = &fitted.segment;
-        let off_line = |end: &Vector2<f64>| (line.point_at(line.line_parameter(end)) - end).norm();
+        let off_line = |end: &Vector2<f64>| line.distance_to_line(end);
         let all_ends = long.segment.ends().into_iter().chain(short_way.ends());
         all_ends.map(|end| off_line(&end)).fold(0.0, f64::max) <= MAX_BEND
     })

@@ -10,7 +10,7 @@ use neat_wireframe::metrics::ImageEvidence;
 
 /// Turn a scene into a 3D wireframe, and write all results
 ///
-/// Objects on black take half a minute of training; photographs need none.
+/// Objects on black are trained on for some ten seconds; photographs need no training.
 ///
 /// RUN then holds report.html to open first (`neat view RUN`), the wireframe as .json, .obj and
 /// .ply in the frame of the scene's files, a picture of it, overlays/ on some of the photographs,

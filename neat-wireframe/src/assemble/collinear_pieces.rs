@@ -42,8 +42,8 @@ pub(super) fn merge_pieces(images: &Images, mut lines: Vec<ChosenLine>) -> Vec<C
 /// Whether `piece` lies on `line`, beside or next to it.
 fn continues(line: &LineSegment3, piece: &LineSegment3, pixel: f64, reach: f64) -> bool {
     let places = piece.ends().map(|end| line.line_parameter(&end));
-    let near = (piece.ends().iter().zip(places))
-        .all(|(end, place)| (end - line.point_at(place)).norm() <= REACHES * reach * pixel);
+    let near =
+        (piece.ends().iter()).all(|end| line.distance_to_line(end) <= REACHES * reach * pixel);
     let [low, high] = [places[0].min(places[1]), places[0].max(places[1])];
     near && (low - 1.0).max(-high) * line.length() <= MAX_GAP * pixel
 }

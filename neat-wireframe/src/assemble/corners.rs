@@ -37,6 +37,12 @@ pub(super) struct Corners {
 }
 
 impl Corners {
+    /// A line, from corner to corner.
+    pub(super) fn edge(&self, line: usize) -> LineSegment3 {
+        let [start, end] = self.ends[line].map(|end| self.junctions[end]);
+        LineSegment3::new(start, end)
+    }
+
     /// Takes away the other lines. Their junctions stay, though none may run there.
     pub(super) fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
         let mut new_index = vec![None; self.ends.len()];

@@ -73,7 +73,7 @@ fn drop_pieces(images: &Images, corners: &mut Corners, pairs: &[[usize; 2]]) {
             let [a, b] = corners.ends[*line];
             let free = if pair.contains(&a) { b } else { a };
             let place = edge.line_parameter(&junctions[free]);
-            let gap = (junctions[free] - edge.point_at(place)).norm();
+            let gap = edge.distance_to_line(&junctions[free]);
             let max_gap = MAX_GAP * images.reach * corners.pixels[*line];
             if degrees[free] == 1 && (0.0..1.0).contains(&place) && gap <= max_gap {
                 dropped[*line] = true;
@@ -125,13 +125,11 @@ fn drawn_pairs(images: &Images, corners: &Corners) -> Vec<[usize; 2]> {
 mod tests {
     use super::*;
     use crate::assemble::corners::find_corners;
-    use crate::assemble::test_cube::{CubeViews, chosen, cube_edge};
+    use crate::assemble::test_views::{TestViews, chosen, cube_edge};
 
     /// All edges of the cube but `left_out`, and what has the edgels.
     fn without(images: &Images, left_out: usize) -> (Corners, Vec<Vec<bool>>) {
-        let mut taken: Vec<Vec<bool>> = (images.maps.iter())
-            .map(|map| vec![false; map.len()])
-            .collect();
+        let mut taken = images.nothing_taken();
         let lines: Vec<_> = (0..12)
             .filter(|edge| *edge != left_out)
             .map(|edge| chosen(images, &cube_edge(edge)))
@@ -144,7 +142,7 @@ mod tests {
 
     #[test]
     fn the_missing_edge_is_found() {
-        let cube = CubeViews::new(20);
+        let cube = TestViews::of_cube(20);
         let images = cube.images();
         let (mut corners, mut taken) = without(&images, 7);
         assert_eq!(corners.junctions.len(), 8);
@@ -155,7 +153,7 @@ mod tests {
 
     #[test]
     fn pieces_of_a_new_edge_go() {
-        let cube = CubeViews::new(20);
+        let cube = TestViews::of_cube(20);
         let images = cube.images();
         let (mut corners, _) = without(&images, 7);
         let pair = [0, 1].map(|side| {

@@ -2,7 +2,7 @@
 
 use super::corners::{Corners, beyond_end, nearest_points};
 use super::edge_samples::Images;
-use neat_core::{LineSegment3, Wireframe3d};
+use neat_core::Wireframe3d;
 use std::collections::BTreeSet;
 
 /// A junction lies on an edge within so many reaches: less than where ends meet, since a cut
@@ -25,11 +25,8 @@ pub(super) fn cut_edges(images: &Images, mut corners: Corners) -> Wireframe3d {
     for meeting in &corners.meetings {
         for side in 0..2 {
             let [stem, bar] = [meeting.lines[side], meeting.lines[1 - side]];
-            let line = |k: usize| {
-                let [start, end] = corners.ends[k].map(|end| corners.junctions[end]);
-                LineSegment3::new(start, end)
-            };
-            let (beyond, end) = beyond_end(meeting.places[side], line(stem).length());
+            let [stem_line, bar_line] = [stem, bar].map(|line| corners.edge(line));
+            let (beyond, end) = beyond_end(meeting.places[side], stem_line.length());
             let junction = corners.ends[stem][end];
             let is_end = beyond.abs() <= corners.windows[stem];
             if !is_end
@@ -38,7 +35,6 @@ pub(super) fn cut_edges(images: &Images, mut corners: Corners) -> Wireframe3d {
             {
                 continue;
             }
-            let [stem_line, bar_line] = [line(stem), line(bar)];
             let place = if degrees[junction] > 1 {
                 bar_line.line_parameter(&corners.junctions[junction])
             } else {
@@ -90,10 +86,7 @@ pub(super) fn cut_edges(images: &Images, mut corners: Corners) -> Wireframe3d {
 /// Cuts edges where they cross each other: there is a junction, though none of them ends.
 fn cut_crossings(images: &Images, corners: &mut Corners, cuts: &mut [Vec<(f64, usize)>]) {
     for meeting in &corners.meetings {
-        let lines = meeting.lines.map(|k| {
-            let [start, end] = corners.ends[k].map(|end| corners.junctions[end]);
-            LineSegment3::new(start, end)
-        });
+        let lines = meeting.lines.map(|line| corners.edge(line));
         let pixel = (meeting.lines.iter().map(|k| corners.pixels[*k])).fold(0.0, f64::max);
         let Some((places, gap)) = nearest_points(&lines[0], &lines[1]) else {
             continue;
@@ -149,11 +142,12 @@ mod tests {
     use crate::assemble::corners::find_corners;
     use crate::assemble::line_evidence::{LineEvidence, Showing};
     use crate::assemble::line_selection::ChosenLine;
-    use crate::assemble::test_cube::CubeViews;
+    use crate::assemble::test_views::TestViews;
+    use neat_core::LineSegment3;
 
     #[test]
     fn lines_that_cross_have_a_junction_there_and_those_that_pass_have_none() {
-        let cube = CubeViews::new(4);
+        let cube = TestViews::of_cube(4);
         let images = cube.images();
         let graph = |height: f64| {
             let lines = [

@@ -41,6 +41,12 @@ pub(super) struct EdgeSamples {
 }
 
 impl Images<'_> {
+    /// For each edgel of each view, that no line has it.
+    pub(super) fn nothing_taken(&self) -> Vec<Vec<bool>> {
+        let of_map = |map: &EdgelMap| vec![false; map.len()];
+        self.maps.iter().map(of_map).collect()
+    }
+
     /// Samples of the part of `line` between two parameters; `None` where the view does
     /// not see enough of it. `count` is chosen by the length in pixels unless given.
     pub(super) fn samples(

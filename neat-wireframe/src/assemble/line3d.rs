@@ -290,7 +290,7 @@ fn parts_of_many_views(shown: Vec<(usize, [f64; 2])>, min_views: usize) -> Vec<[
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::test_cube::{cube_edge, end_distance};
+    use crate::assemble::test_views::{cube_edge, end_distance};
     use crate::test_scenes::{Noise, cameras_on_sphere, cube, views_of_edges};
 
     fn observations(noise_in_pixels: f64) -> Vec<ViewObservation> {

@@ -83,22 +83,18 @@ fn meeting_places(line: &LineSegment3, other: &LineSegment3, gap: f64) -> Vec<f6
         };
     }
     let places = other.ends().map(|end| line.line_parameter(&end));
-    let apart = |side: usize| (other.ends()[side] - line.point_at(places[side])).norm();
-    if apart(0).max(apart(1)) <= gap {
-        places.to_vec()
-    } else {
-        Vec::new()
-    }
+    let near = (other.ends().iter()).all(|end| line.distance_to_line(end) <= gap);
+    if near { places.to_vec() } else { Vec::new() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::test_cube::{CubeViews, chosen, cube_edge, end_distance};
+    use crate::assemble::test_views::{TestViews, chosen, cube_edge, end_distance};
 
     #[test]
     fn a_line_grows_to_what_it_meets_where_edgels_speak_for_it() {
-        let cube = CubeViews::new(20);
+        let cube = TestViews::of_cube(20);
         let images = cube.images();
         let edge = cube_edge(0);
         let mut lines: Vec<ChosenLine> = (1..12)
@@ -106,9 +102,7 @@ mod tests {
             .collect();
         let piece = LineSegment3::new(edge.point_at(0.3), edge.point_at(0.7));
         lines.push(chosen(&images, &piece));
-        let none: Vec<Vec<bool>> = (images.maps.iter())
-            .map(|map| vec![false; map.len()])
-            .collect();
+        let none = images.nothing_taken();
         let all: Vec<Vec<bool>> = none.iter().map(|map| vec![true; map.len()]).collect();
         let grown = |mut taken: Vec<Vec<bool>>| {
             let mut lines = lines.clone();

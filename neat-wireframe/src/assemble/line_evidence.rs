@@ -197,13 +197,13 @@ impl Images<'_> {
 
 #[cfg(test)]
 mod tests {
-    use crate::assemble::test_cube::{CubeViews, cube_edge};
+    use crate::assemble::test_views::{TestViews, cube_edge};
     use nalgebra::Vector3;
     use neat_core::LineSegment3;
 
     #[test]
     fn views_speak_for_edges_and_against_what_is_none() {
-        let cube = CubeViews::new(20);
+        let cube = TestViews::of_cube(20);
         let images = cube.images();
         for edge in 0..12 {
             let found = images.evidence(&cube_edge(edge), None, 0.0);
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn edgels_of_other_lines_do_not_count() {
-        let cube = CubeViews::new(12);
+        let cube = TestViews::of_cube(12);
         let images = cube.images();
         let taken: Vec<Vec<bool>> = images
             .maps

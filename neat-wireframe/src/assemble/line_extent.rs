@@ -74,7 +74,7 @@ fn best_stretch(gains: &[f64]) -> [usize; 2] {
 #[cfg(test)]
 mod tests {
     use super::best_stretch;
-    use crate::assemble::test_cube::{CubeViews, cube_edge, end_distance};
+    use crate::assemble::test_views::{TestViews, cube_edge, end_distance};
     use neat_core::LineSegment3;
 
     #[test]
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn a_piece_of_an_edge_grows_to_all_of_it() {
-        let cube = CubeViews::new(16);
+        let cube = TestViews::of_cube(16);
         let images = cube.images();
         let truth = cube_edge(4);
         let part = LineSegment3::new(truth.point_at(0.3), truth.point_at(0.9));

@@ -148,11 +148,11 @@ pub(super) fn directions_across(line: &LineSegment3) -> Option<Matrix3x2<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::test_cube::{CubeViews, cube_edge};
+    use crate::assemble::test_views::{TestViews, cube_edge};
 
     #[test]
     fn a_line_beside_an_edge_comes_to_lie_on_it() {
-        let cube = CubeViews::new(12);
+        let cube = TestViews::of_cube(12);
         let images = cube.images();
         let truth = cube_edge(5);
         let offset = Vector3::new(0.004, -0.003, 0.002);
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn gradients_agree_with_finite_differences() {
-        let cube = CubeViews::new(5);
+        let cube = TestViews::of_cube(5);
         let images = cube.images();
         let line = cube_edge(2).map(|end| end + Vector3::new(0.002, 0.001, -0.003));
         let observations = (0..5)

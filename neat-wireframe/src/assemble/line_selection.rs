@@ -175,11 +175,7 @@ fn choose<'a>(
     let mut chooser = Chooser {
         images,
         min_evidence,
-        taken: images
-            .maps
-            .iter()
-            .map(|map| vec![false; map.len()])
-            .collect(),
+        taken: images.nothing_taken(),
         explained: (images.views.iter())
             .map(|view| vec![false; view.segments.len()])
             .collect(),
@@ -301,8 +297,7 @@ pub(super) fn claim_edgels(images: &Images, line: &LineSegment3, taken: &mut [Ve
 /// Whether a 2D segment lies on another, for the most part of its length.
 fn lies_on(segment: &LineSegment2, on: &LineSegment2, reach: f64) -> bool {
     let places = segment.ends().map(|end| on.line_parameter(&end));
-    let near = (segment.ends().iter().zip(places))
-        .all(|(end, place)| (end - on.point_at(place)).norm() <= reach);
+    let near = (segment.ends().iter()).all(|end| on.distance_to_line(end) <= reach);
     let [low, high] = [places[0].min(places[1]), places[0].max(places[1])];
     near && high.min(1.0) - low.max(0.0) >= 0.5 * (high - low)
 }
@@ -310,17 +305,15 @@ fn lies_on(segment: &LineSegment2, on: &LineSegment2, reach: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::test_cube::{CubeViews, cube_edge};
+    use crate::assemble::test_views::{TestViews, cube_edge};
 
     #[test]
     fn what_no_view_shows_with_edgels_of_its_own_is_no_line() {
-        let cube = CubeViews::new(20);
+        let cube = TestViews::of_cube(20);
         let images = cube.images();
         let edge = cube_edge(3);
         let settled = |share_of_others: f64| {
-            let mut taken: Vec<Vec<bool>> = (images.maps.iter())
-                .map(|map| vec![false; map.len()])
-                .collect();
+            let mut taken = images.nothing_taken();
             let part = LineSegment3::new(edge.start, edge.point_at(share_of_others));
             claim_edgels(&images, &part, &mut taken);
             let chooser = Chooser {

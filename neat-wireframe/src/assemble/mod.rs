@@ -5,14 +5,13 @@
 //! (Hofer, Maurer and Bischof, *Efficient 3D scene abstraction using line segments*,
 //! Line3D++, 2017). The images decide: the line that they speak for most is fitted to the
 //! edgels of all views at once, takes them, and the next one is chosen by those that are
-//! left. Lines that bend are curves, and those that
-//! move aside from view to view are outlines of round things. Ends that meet become corners, all corners are fitted
-//! to the edgels together, and edges are cut where others end on them.
+//! left. Lines that bend are curves, and those that move aside from view to view are outlines
+//! of round things. Ends that meet become corners, all corners are fitted to the edgels
+//! together, and edges are cut where others end on them or cross them.
 //!
 //! Edgels are so noisy as the scene's poses and images make them, which the first lines tell;
 //! how near to a line is near are multiples of that. Along edges, ends have windows in
-//! pixels. Unless a
-//! comment says so, no constant has been measured on its own.
+//! pixels. Unless a comment says so, no constant has been measured on its own.
 //!
 //! All steps work in a world whose scene ball is the unit ball around the origin.
 
@@ -41,7 +40,7 @@ mod tangent_ends;
 mod view_segments;
 
 #[cfg(test)]
-mod test_cube;
+mod test_views;
 
 pub use config::AssembleConfig;
 pub use line3d::{Line3dConfig, Line3dSegment, SegmentSupport, line3d, wireframe_of_segments};

@@ -193,11 +193,10 @@ impl Images<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::test_cube::{CubeViews, cube_edge};
+    use crate::assemble::test_views::{TestViews, cube_edge};
     use crate::assemble::view_segments::PreparedView;
     use crate::test_scenes::{cameras_on_sphere, views_of_edges};
     use nalgebra::Vector3;
-    use neat_core::EdgelMap;
 
     /// The cylinder around the z axis.
     fn cylinder(radius: f64) -> Tube {
@@ -258,21 +257,14 @@ mod tests {
     #[test]
     fn a_line_of_a_round_surface_is_an_outline_and_an_edge_is_none() {
         let views = views_of_cylinder(0.15);
-        let maps: Vec<EdgelMap> = views
-            .iter()
-            .map(crate::assemble::edgels_of_segments)
-            .collect();
-        let images = Images {
-            views: &views,
-            maps: &maps,
-            reach: 0.5,
-        };
+        let views = TestViews::of(views);
+        let images = views.images();
         let line = cylinder(0.15).line;
         let evidence = images.evidence(&line, None, 0.0);
         assert!(evidence.showing.len() >= 3, "{}", evidence.showing.len());
         assert!(images.is_outline(&line, &evidence));
 
-        let cube = CubeViews::new(60);
+        let cube = TestViews::of_cube(60);
         let images = cube.images();
         for edge in 0..12 {
             let evidence = images.evidence(&cube_edge(edge), None, 0.0);

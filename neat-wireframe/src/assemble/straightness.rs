@@ -25,9 +25,9 @@ const BOW_NOISES: f64 = 2.0;
 const BOW_ERRORS: f64 = 3.0;
 /// … if two halves of the views agree on its direction to this cosine: what lies beside an
 /// edge in some views bends it there only.
-const BOW_AGREEMENT: f64 = 0.8;
+pub(super) const BOW_AGREEMENT: f64 = 0.8;
 /// Edgels of a view are not independent: variances are so many times larger.
-const CORRELATION: f64 = 4.0;
+pub(super) const CORRELATION: f64 = 4.0;
 
 /// The height of the arc that edgels draw over a line.
 #[derive(Clone, Copy)]

@@ -8,6 +8,7 @@ use super::line_evidence::LineEvidence;
 use super::line_fitting::directions_across;
 use super::line_selection::ChosenLine;
 use super::projected_line::ProjectedLine;
+use super::straightness::{BOW_AGREEMENT, CORRELATION};
 use nalgebra::{Matrix2, Vector2};
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -15,17 +16,14 @@ use rayon::prelude::*;
 /// Stations along a line: one for two pixels, within these bounds.
 const PIXELS_PER_STATION: f64 = 2.0;
 const COUNTS: [usize; 2] = [20, 400];
-/// An arc is at most this share of the line at each end: else it is none.
+/// An arc is at most this share of the line at each end, judged: what bends for more of it is a
+/// curve, which has been sought before.
 const MOST: f64 = 0.4;
 /// Fewer stations tell nothing of an arc.
 const MIN_STATIONS: usize = 3;
-/// The parabola must explain the edgels so much better, in nats.
+/// The parabola must explain the edgels so much better, in nats, as for outlines: it is the best
+/// of many tries.
 const ADVANTAGE: f64 = 12.0;
-/// Two halves of the views must agree on its direction to this cosine: what lies beside an edge
-/// in some views bends it there only.
-const AGREEMENT: f64 = 0.8;
-/// Edgels of neighbouring stations are not independent: variances are so many times larger.
-const CORRELATION: f64 = 4.0;
 
 /// What edgels say about the offset from the line at one station.
 #[derive(Clone, Copy, Default)]
@@ -135,7 +133,7 @@ fn straight_until(halves: &[Vec<Station>; 2], variance: f64) -> usize {
         let both = (0..2).flat_map(|half| halves[half][start..].iter().enumerate());
         let whole = parabola(both)?;
         let [one, other] = [of_half(0, start)?.bend, of_half(1, start)?.bend];
-        let agree = one.dot(&other) > AGREEMENT * one.norm() * other.norm();
+        let agree = one.dot(&other) > BOW_AGREEMENT * one.norm() * other.norm();
         (agree && whole.gain > ADVANTAGE * variance).then_some((whole.gain, start))
     };
     let best = (first..=count.saturating_sub(MIN_STATIONS))
@@ -147,11 +145,10 @@ fn straight_until(halves: &[Vec<Station>; 2], variance: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::test_cube::{CubeViews, cube_edge, end_distance};
+    use crate::assemble::test_views::{TestViews, cube_edge, end_distance};
     use crate::assemble::view_segments::PreparedView;
     use crate::test_scenes::{cameras_on_sphere, views_of_edges};
     use nalgebra::Vector3;
-    use neat_core::EdgelMap;
 
     #[test]
     fn a_line_ends_where_an_arc_begins() {
@@ -168,15 +165,8 @@ mod tests {
             .iter()
             .map(|observation| PreparedView::new(observation, 1.0, 0.0))
             .collect();
-        let maps: Vec<EdgelMap> = views
-            .iter()
-            .map(crate::assemble::edgels_of_segments)
-            .collect();
-        let images = Images {
-            views: &views,
-            maps: &maps,
-            reach: 0.5,
-        };
+        let views = TestViews::of(views);
+        let images = views.images();
         let truth = LineSegment3::new(points[0], points[1]);
         let late = LineSegment3::new(points[0], points[1] + Vector3::new(0.03, 0.0, 0.0));
         let evidence = images.evidence(&late, None, 0.0);
@@ -186,7 +176,7 @@ mod tests {
         assert_eq!(cut.start, late.start);
 
         // A corner is none.
-        let cube = CubeViews::new(20);
+        let cube = TestViews::of_cube(20);
         let images = cube.images();
         for edge in 0..12 {
             let evidence = images.evidence(&cube_edge(edge), None, 0.0);

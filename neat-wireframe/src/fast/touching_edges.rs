@@ -317,9 +317,7 @@ mod tests {
                 let part = LineSegment3::new(split[*a], split[*b]);
                 let off = |line: &[Vector3<f64>; 2]| {
                     let whole = LineSegment3::new(line[0], line[1]);
-                    let distances = part
-                        .ends()
-                        .map(|end| (whole.point_at(whole.line_parameter(&end)) - end).norm());
+                    let distances = part.ends().map(|end| whole.distance_to_line(&end));
                     distances[0].max(distances[1])
                 };
                 assert!(lines.iter().any(|line| off(line) < 0.004));

@@ -1,4 +1,4 @@
-//! A cube without noise, for the unit tests of the steps.
+//! Views without noise, mostly of a cube, for the unit tests of the steps.
 
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
@@ -6,20 +6,25 @@ use super::view_segments::PreparedView;
 use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
 use neat_core::{EdgelMap, LineSegment3};
 
-/// Views of all edges of the cube of half side 0.5; segment e shows edge e.
-pub(super) struct CubeViews {
+/// Views whose edgels are their segments.
+pub(super) struct TestViews {
     views: Vec<PreparedView>,
     maps: Vec<EdgelMap>,
 }
 
-impl CubeViews {
-    pub(super) fn new(count: usize) -> Self {
+impl TestViews {
+    /// Of all edges of the cube of half side 0.5; segment e shows edge e.
+    pub(super) fn of_cube(count: usize) -> Self {
         let (junctions, edges) = cube();
         let views: Vec<PreparedView> =
             views_of_edges(&cameras_on_sphere(count), &junctions, &edges)
                 .iter()
                 .map(|observation| PreparedView::new(observation, 1.0, 1.0))
                 .collect();
+        Self::of(views)
+    }
+
+    pub(super) fn of(views: Vec<PreparedView>) -> Self {
         Self {
             maps: views.iter().map(super::edgels_of_segments).collect(),
             views,

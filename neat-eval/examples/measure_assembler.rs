@@ -1,0 +1,228 @@
+//! What the assembler makes of scenes, measured against the truth that each folder holds.
+//!
+//! ```text
+//! cargo run --release -p neat-eval --example measure_assembler -- [--out DIR] SCENE…
+//! ```
+//!
+//! No field, no run folder and no confidence: the quickest way from a changed line of the
+//! assembler to its scores. A scene with `gt_wireframe.json` is measured as
+//! `scripts/measure_objects.py` does (neat-abc at 0.01, one to one), one with `truth/` as
+//! `scripts/measure_photographs.py` does (surface-and-creases), one without truth by how much
+//! of the 2D segments it explains. With `--out` the wireframes are kept, and so are the 2D
+//! segments, which the next call takes from there.
+
+#![expect(clippy::print_stdout, reason = "it measures for people to read")]
+
+use neat_core::{Camera, LoadOptions, Scene, View, hawp_json, load_scene};
+use neat_detect::{DetectorConfig, detect_views, edgel_maps};
+use neat_eval::{EvaluationInput, EvaluationOptions, NeatAbc, SceneTruth, Scores, foreign};
+use neat_eval::{Protocol, SurfaceAndCreases};
+use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble};
+use neat_wireframe::export::{WireframeDocument, write_json};
+use neat_wireframe::metrics::{ImageEvidenceConfig, Matching, PrecisionRecall, image_evidence};
+use neat_wireframe::{ViewObservation, Wireframe3d};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use std::{env, fs};
+
+/// As `neat reconstruct` has it.
+const MIN_SEGMENT_SCORE: f64 = 0.05;
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+fn main() -> Result<()> {
+    let (mut scenes, mut out) = (Vec::new(), None);
+    let mut arguments = env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--out" => out = arguments.next().map(PathBuf::from),
+            _ => scenes.push(PathBuf::from(argument)),
+        }
+    }
+    let mut scores = Vec::new();
+    for dir in &scenes {
+        let name = dir.file_name().unwrap_or_default().to_string_lossy();
+        let kept = out.as_ref().map(|out| out.join(&*name));
+        let scene = prepared(dir, kept.as_deref())?;
+        let start = Instant::now();
+        let built = assembled(&scene)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let original = |p: &_| scene.original_from_world.apply(p);
+        let wireframe = built.wireframe.map(original);
+        let (text, score) = measured(dir, &scene, &built.wireframe, &wireframe)?;
+        println!(
+            "{name:18} {text} {} edges {seconds:.1} s",
+            wireframe.edges.len()
+        );
+        scores.extend(score);
+        if let Some(kept) = &kept {
+            write_json(
+                &kept.join("wireframe.json"),
+                &WireframeDocument::from(&wireframe),
+            )?;
+        }
+    }
+    if !scores.is_empty() {
+        let mean =
+            |k: usize| scores.iter().map(|s: &[f64; 2]| s[k]).sum::<f64>() / scores.len() as f64;
+        println!(
+            "mean of {}: segments {:.3} junctions {:.3}",
+            scores.len(),
+            mean(0),
+            mean(1)
+        );
+    }
+    Ok(())
+}
+
+/// The scene in a unit ball, with 2D segments: those in `kept`, or else detected and kept.
+/// Segments of others are used where there is no truth.
+fn prepared(dir: &Path, kept: Option<&Path>) -> Result<Scene> {
+    let has_truth = dir.join("gt_wireframe.json").exists() || dir.join("truth").exists();
+    let given = dir.join("hawp").is_dir() && !has_truth;
+    let options = LoadOptions {
+        require_wireframes: given,
+        ..LoadOptions::default()
+    };
+    let mut scene = load_scene(dir, &options)?.scene;
+    if !given {
+        let folder = kept.map(|kept| kept.join("segments"));
+        let file = |folder: &Path, index: usize| folder.join(format!("{index:04}.json"));
+        let center = scene.pixel_center;
+        match &folder {
+            Some(folder) if folder.is_dir() => {
+                for (index, view) in scene.views.iter_mut().enumerate() {
+                    view.wireframe = hawp_json::read(&file(folder, index), center)?;
+                }
+            }
+            _ => detect_views(&mut scene, &DetectorConfig::default())?,
+        }
+        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+            fs::create_dir_all(&folder)?;
+            for (index, view) in scene.views.iter().enumerate() {
+                hawp_json::write(&file(&folder, index), &view.wireframe, center)?;
+            }
+        }
+    }
+    let radius = scene.sphere_radius;
+    Ok(scene.scaled(radius.recip()))
+}
+
+fn assembled(scene: &Scene) -> Result<Assembled> {
+    let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
+    let edgels = edgel_maps(&scene.views, &DetectorConfig::default(), scene.pixel_center)?;
+    Ok(assemble(&views, &edgels, 1.0, &AssembleConfig::default()))
+}
+
+/// The scores as text, and F of segments and of junctions where there is a true wireframe.
+fn measured(
+    dir: &Path,
+    scene: &Scene,
+    in_world: &Wireframe3d,
+    wireframe: &Wireframe3d,
+) -> Result<(String, Option<[f64; 2]>)> {
+    if dir.join("truth").exists() {
+        return Ok((creases(dir, scene, wireframe)?, None));
+    }
+    let truth = dir.join("gt_wireframe.json");
+    if truth.exists() {
+        let truth = foreign::read_truth(&truth)?;
+        if truth.wireframe.edges.is_empty() {
+            return Ok(("no straight edge,".to_owned(), None));
+        }
+        let input = EvaluationInput {
+            predicted: wireframe.clone().into(),
+            truth,
+            ..EvaluationInput::default()
+        };
+        let options = EvaluationOptions {
+            thresholds: Some(vec![NeatAbc::default().thresholds[0]]),
+            matching: Some(Matching::PerThreshold),
+            ..EvaluationOptions::default()
+        };
+        let Scores::NeatAbc(scores) = Protocol::NeatAbc.evaluate(&input, &options)? else {
+            return Err("neat-abc has other scores".into());
+        };
+        let (s, j) = (
+            &scores.wireframe.segments_max[0],
+            &scores.wireframe.junctions[0],
+        );
+        let f = |score: &PrecisionRecall| f_score(score.precision, score.recall);
+        let text = format!(
+            "segments {:.3}/{:.3}/{:.3} junctions {:.3}/{:.3}/{:.3}",
+            s.precision,
+            s.recall,
+            f(s),
+            j.precision,
+            j.recall,
+            f(j)
+        );
+        return Ok((text, Some([f(s), f(j)])));
+    }
+    let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
+    let points: Vec<_> = scene
+        .sparse_points
+        .iter()
+        .map(|p| p.position_in_world)
+        .collect();
+    let evidence = image_evidence(in_world, &views, &points, &ImageEvidenceConfig::default())?;
+    let distance = evidence.median_junction_to_point_distance;
+    let text = format!(
+        "explained {:.1} % of length, {:.2} px, points {:.4}, free ends {:.1} %",
+        100.0 * evidence.explained_length_share.unwrap_or(0.0),
+        evidence
+            .mean_reprojection_error_in_pixels
+            .unwrap_or(f64::NAN),
+        distance.map_or(f64::NAN, |d| d * scene.original_from_world.scale),
+        100.0 * free_ends(in_world),
+    );
+    Ok((text, None))
+}
+
+/// Precision, recall and F of creases at the thresholds of the protocol, and precision and
+/// recall of junctions at the last of them.
+fn creases(dir: &Path, scene: &Scene, wireframe: &Wireframe3d) -> Result<String> {
+    let mut truth = SceneTruth::read(dir)?;
+    if truth.edge_views.is_none() {
+        let of_files = |view: &View| Camera {
+            center_in_world: scene
+                .original_from_world
+                .apply(&view.camera.center_in_world),
+            ..view.camera
+        };
+        truth.cameras = scene.views.iter().map(of_files).collect();
+    }
+    let scores = SurfaceAndCreases::default().evaluate(wireframe, &truth)?;
+    let mut text = String::from("P/R/F");
+    for row in &scores.thresholds {
+        let (p, r) = (
+            row.length_on_crease.unwrap_or(0.0),
+            row.completeness.unwrap_or(0.0),
+        );
+        text += &format!(" {p:.3}/{r:.3}/{:.3}", f_score(p, r));
+    }
+    if let Some(last) = scores.thresholds.last() {
+        let (p, r) = (last.junction_precision, last.junction_recall);
+        text += &format!(" JP {:.3} JR {:.3}", p.unwrap_or(0.0), r.unwrap_or(0.0));
+    }
+    Ok(text)
+}
+
+/// Share of the junctions that belong to one edge only.
+fn free_ends(wireframe: &Wireframe3d) -> f64 {
+    let mut degree = vec![0_u32; wireframe.junctions.len()];
+    for &junction in wireframe.edges.iter().flatten() {
+        degree[junction] += 1;
+    }
+    degree.iter().filter(|d| **d == 1).count() as f64 / degree.len().max(1) as f64
+}
+
+fn f_score(precision: f64, recall: f64) -> f64 {
+    let sum = precision + recall;
+    if sum > 0.0 {
+        2.0 * precision * recall / sum
+    } else {
+        0.0
+    }
+}
