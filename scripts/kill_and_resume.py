@@ -225,7 +225,7 @@ class Subject:
         self.folder = folder
         self.scene = scene(options, folder)
         self.command = [
-            *(options.neat.absolute(), "reconstruct", self.scene, "--backend", "flex"),
+            *(options.neat.absolute(), "reconstruct", self.scene, "--backend", "flex", "--train"),
             *("--steps", str(options.steps), "--threads", str(options.threads)),
             *("--max-views", str(options.views), "--max-image-size", "256"),
             *itertools.chain.from_iterable(("--set", setting) for setting in SETTINGS),

@@ -59,7 +59,7 @@ def main():
     if options.scene is None:
         measure("synth", [neat, "synth", "--out", scene], out, failed)
     steps = ["--steps", options.steps] if options.steps else []
-    run = [neat, "reconstruct", scene, "--out", out / "run", "--preset", "fast"]
+    run = [neat, "reconstruct", scene, "--out", out / "run", "--train"]
     done = measure("reconstruct", [*run, "--backend", "wgpu", *steps], out, failed)
     truth = scene / "gt_wireframe.json"
     if done and truth.exists():

@@ -86,7 +86,7 @@ def main():
     if options.detect:
         scene = without_wireframes(scene, out)
     run = out / "run"
-    command = [options.neat, "reconstruct", scene, "--out", run, "--overwrite"]
+    command = [options.neat, "reconstruct", scene, "--out", run, "--overwrite", "--train"]
     command += ["--backend", "flex", "--preset", options.preset, "--steps", options.steps]
     command += ["--memory-limit", options.limit]
     if options.threads:

@@ -12,7 +12,7 @@ set -euo pipefail
 
 here=$(cd "$(dirname "$0")" && pwd)
 neat=$(realpath "${1:-$here/../../target/release/neat}")
-arguments=(--backend flex --steps "${STEPS:-300}" --no-cache --no-doctor)
+arguments=(--train --backend flex --steps "${STEPS:-300}" --no-cache --no-doctor)
 solids=(box l-prism stair-prism hexagonal-prism t-prism u-prism wedge truncated-pyramid)
 
 work=$(mktemp -d)

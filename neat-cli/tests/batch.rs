@@ -101,8 +101,16 @@ impl Scenes {
 }
 
 /// Arguments for every scene.
-fn method(steps: &str) -> [&str; 6] {
-    ["--", "--backend", "flex", "--no-cache", "--steps", steps]
+fn method(steps: &str) -> [&str; 7] {
+    [
+        "--",
+        "--train",
+        "--backend",
+        "flex",
+        "--no-cache",
+        "--steps",
+        steps,
+    ]
 }
 
 fn signal(name: &str, process: u32) {
@@ -273,7 +281,7 @@ fn mistakes_are_found_before_anything_is_run() {
     let said = stdout(&assert);
     assert!(said.starts_with("box: neat reconstruct "), "{said}");
     assert!(
-        said.contains(" --resume --backend flex --no-cache --steps 3"),
+        said.contains(" --resume --train --backend flex --no-cache --steps 3"),
         "{said}"
     );
     assert!(!scenes.file("out").exists());

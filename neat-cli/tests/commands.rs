@@ -27,8 +27,7 @@ fn reconstruct_leaves_every_result() {
     for config in [&asked, &plan] {
         assert_eq!(config["train"]["steps"].as_integer(), Some(2));
     }
-    assert_eq!(asked["distill"]["back_end"].as_str(), Some("auto"));
-    assert_eq!(plan["distill"]["back_end"].as_str(), Some("fast"));
+    assert_eq!(asked["data"]["background"].as_str(), Some("auto"));
     assert_eq!(plan["data"]["background"].as_str(), Some("black"));
     let manifest = json(&run.join("manifest.json"));
     assert_eq!(manifest["status"], "finished");
@@ -84,7 +83,7 @@ fn programs_read_what_is_decided_and_what_has_no_effect() {
     let scene = TestScene::new();
     let mut command = scene.run("reconstruct", "1");
     command.args(["--progress", "json"]);
-    command.args(["--set", "distill.assembler.min_evidence=6"]);
+    command.args(["--set", "distill.paper.visibility.min_views=6"]);
     let assert = command.assert().success();
     let events: Vec<Value> = stderr(&assert)
         .lines()
@@ -104,7 +103,7 @@ fn programs_read_what_is_decided_and_what_has_no_effect() {
     let warning = warnings.iter().find(|w| w["kind"] == "no_effect").unwrap();
     let message = warning["message"].as_str().unwrap();
     assert!(
-        message.contains("distill.assembler.min_evidence"),
+        message.contains("distill.paper.visibility.min_views"),
         "{message}"
     );
     let decisions = manifest["decisions"].as_array().unwrap();
@@ -256,13 +255,22 @@ fn demo_goes_all_the_way() {
     let out = scene.path("demo");
     let demo = || {
         let mut command = neat(&["demo", "--out", &out, "--backend", "flex"]);
-        command.args(["--views", "4", "--image-size", "48", "--steps", "1"]);
+        command.args([
+            "--views",
+            "4",
+            "--image-size",
+            "48",
+            "--train",
+            "--steps",
+            "1",
+        ]);
         command
     };
     let assert = demo().assert().success();
     assert!(stdout(&assert).contains("junctions"));
     assert!(scene.file("demo/scene/gt_wireframe.json").exists());
     assert!(scene.file("demo/run/wireframe.json").exists());
+    assert!(scene.file("demo/run/metrics.jsonl").exists());
     assert!(json(&scene.file("demo/evaluation.json"))["scores"]["wireframe"].is_object());
 
     demo().assert().code(2);

@@ -28,7 +28,7 @@ fn results_do_not_depend_on_it() {
     let scene = scene();
     let reconstruct = |out: &str, more: &[&str]| {
         let mut command = neat(&["reconstruct", &scene.path("scene")]);
-        command.args(["--out", &scene.path(out), "--no-cache"]);
+        command.args(["--out", &scene.path(out), "--no-cache", "--train"]);
         command.args(["--backend", "flex", "--steps", "4"]);
         let assert = command.args(more).assert().success();
         (scene.file(out), stderr(&assert))

@@ -10,7 +10,7 @@ use neat_core::{Scene, Wireframe3d, file, with_causes};
 use neat_eval::image_quality::psnr;
 use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
 use neat_field::region_pixels::RegionPixels;
-use neat_pipeline::config::{BackEnd, Choice, Config, FieldUse, apply_overrides};
+use neat_pipeline::config::{Choice, Config, FieldUse, apply_overrides};
 use neat_pipeline::distill::distill;
 use neat_pipeline::error::PipelineError;
 use neat_pipeline::event::{Event, OnEvent, Stage, Warning, WarningKind};
@@ -75,13 +75,9 @@ pub fn ablate(
     }
     let options = &options;
     folder::claim(options)?;
-    let expected = match options.config.distill.back_end {
-        Choice::Given(back_end) => variants(back_end).len(),
-        Choice::Auto => variants(BackEnd::Fast).len(),
-    };
+    let all = variants(options.config.distill.back_end);
     let base = run_variant(&variants::BASE, options, cancelled, on_event)
-        .map_err(|error| interrupted(error, 0, expected))?;
-    let all = variants(base.plan.back_end());
+        .map_err(|error| interrupted(error, 0, all.len()))?;
     let mut rows: Vec<Row> = Vec::with_capacity(all.len());
     for (index, variant) in all.iter().enumerate() {
         if cancelled.load(Ordering::Relaxed) {
@@ -311,24 +307,23 @@ fn masked_out(scene: &Scene, config: &Config) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use neat_pipeline::config::Preset;
+    use neat_pipeline::config::{BackEnd, Preset};
 
     #[test]
     fn variants_that_change_nothing_are_known() {
         let same = |preset: Preset, back_end| {
             let mut config = preset.config();
-            config.distill.back_end = Choice::Given(back_end);
+            config.distill.back_end = back_end;
             let all = variants(back_end).into_iter();
             all.filter(|variant| variant.is_base(&config).unwrap())
                 .map(|variant| variant.slug)
                 .collect::<Vec<_>>()
         };
-        for back_end in [BackEnd::Fast, BackEnd::Assembler] {
-            assert_eq!(
-                same(Preset::Fast, back_end),
-                ["base", "direction-no-clustering", "attraction-10"]
-            );
-        }
+        assert_eq!(same(Preset::Fast, BackEnd::Assembler), ["base"]);
+        assert_eq!(
+            same(Preset::Fast, BackEnd::Paper),
+            ["base", "direction-no-clustering", "attraction-10", "paper"]
+        );
         assert_eq!(
             same(Preset::PaperAbc, BackEnd::Paper),
             ["base", "direction-clustering", "attraction-10", "paper"]

@@ -30,7 +30,6 @@ use neat_tensor::Kernels;
 use neat_train::config::{ModelConfig, TrainConfig, TrainingConfig};
 use neat_wireframe::assemble::AssembleConfig;
 use neat_wireframe::confidence::ConfidenceConfig;
-use neat_wireframe::fast::FastBackEndConfig;
 use neat_wireframe::paper::PaperBackEndConfig;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -128,16 +127,14 @@ impl fmt::Display for Background {
 }
 
 /// What assembles the wireframe.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BackEnd {
     /// Section 4.3 of the paper.
     Paper,
-    /// Junctions from modes of the segment ends, re-triangulated and adjusted: for
-    /// single objects.
-    Fast,
-    /// Lines that the 2D segments propose and the edgels of all images choose: for
-    /// photographs. The field has no part in it.
+    /// Lines that the 2D segments propose and the edgels of all images choose. The field has
+    /// no part in it.
+    #[default]
     Assembler,
 }
 
@@ -145,7 +142,6 @@ impl fmt::Display for BackEnd {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Paper => "paper",
-            Self::Fast => "fast",
             Self::Assembler => "assembler",
         })
     }
@@ -185,9 +181,9 @@ pub enum OverlayGround {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DistillConfig {
-    /// What assembles the wireframe; `auto` is the assembler for photographs, else
-    /// the fast back end.
-    pub back_end: Choice<BackEnd>,
+    /// What assembles the wireframe.
+    #[serde(default)]
+    pub back_end: BackEnd,
     /// Whether a field is trained; `auto`: only for a back end that asks it. Without one
     /// there is nothing to render, and no mesh.
     #[serde(default)]
@@ -195,15 +191,11 @@ pub struct DistillConfig {
     /// What the wireframe is drawn on in `overlays/`.
     #[serde(default)]
     pub overlay: OverlayGround,
-    /// Rays of the fast back end along each 2D segment.
-    pub rays_per_segment: usize,
     /// What the results say about how sure they are.
     #[serde(default)]
     pub confidence: ConfidenceConfig,
     /// The paper's back end.
     pub paper: PaperBackEndConfig,
-    /// The fast back end.
-    pub fast: FastBackEndConfig,
     /// The assembler.
     #[serde(default)]
     pub assembler: AssembleConfig,

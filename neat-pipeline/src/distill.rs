@@ -1,4 +1,4 @@
-//! From the trained field to the wireframe (paper §4.3, or the fast back end).
+//! From the images, or a trained field (paper §4.3), to the wireframe.
 
 mod thin_regions;
 
@@ -14,15 +14,13 @@ use neat_wireframe::assemble::{AssembleReport, assemble};
 use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::curved_rims::curved_chains;
 use neat_wireframe::export::WireframeDocument;
-use neat_wireframe::fast::{self, FastBackEndReport};
 use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 use neat_wireframe::paper::{PaperBackEndCounts, PaperBackEndError, SupportedSegment};
-use neat_wireframe::proposals::{WeightedSegment, robust_segment};
 use neat_wireframe::validity::WireframeFlaw;
-use neat_wireframe::{SegmentProposal, SignedDistance, ViewObservation};
+use neat_wireframe::{SignedDistance, ViewObservation};
 use serde::{Deserialize, Serialize};
+use thin_regions::Query;
 pub use thin_regions::paper_regions;
-use thin_regions::{Query, spread_query};
 
 /// Rays per rendering call: bounds the memory.
 const RAY_CHUNK: usize = 2048;
@@ -75,13 +73,6 @@ pub enum BackEndReport {
         /// How many things entered and left its steps.
         steps: PaperBackEndCounts,
     },
-    /// Of the fast one.
-    Fast {
-        /// 3D segments that the field proposes.
-        proposals: usize,
-        /// What its steps kept.
-        steps: FastBackEndReport,
-    },
     /// Of the assembler.
     Assembler {
         /// What its steps found.
@@ -122,25 +113,18 @@ pub fn distill(
     let config = plan.config();
     let min_score = match plan.back_end() {
         BackEnd::Paper => config.distill.paper.neat_lines.min_segment_score,
-        BackEnd::Fast | BackEnd::Assembler => config.data.min_segment_score,
+        BackEnd::Assembler => config.data.min_segment_score,
     };
     let views = ViewObservation::from_scene(scene, min_score);
     let scene_radius = config.data.scene_radius.unwrap_or(scene.sphere_radius);
     let back_end = plan.back_end();
-    let field = field.ok_or(DistillError::NoField(back_end));
     let (wireframe, report, surface) = match back_end {
         BackEnd::Paper => {
-            let field = field?;
+            let field = field.ok_or(DistillError::NoField(back_end))?;
             let (wireframe, report) = paper(scene, field, config, &views, progress)?;
             (wireframe, report, Some(field.surface_grid()))
         }
-        BackEnd::Fast => {
-            let field = field?;
-            let surface = field.surface_grid();
-            let (wireframe, report) = fast(scene, field, &surface, config, &views, progress)?;
-            (wireframe, report, Some(surface))
-        }
-        // A learned surface of a photograph is too coarse to hide edges behind.
+        // A learned surface is too coarse to hide edges behind.
         BackEnd::Assembler => {
             let (wireframe, report) = assembled(scene, config, &views, scene_radius, progress)?;
             (wireframe, report, None)
@@ -154,33 +138,6 @@ pub fn distill(
         confidence,
         report,
     })
-}
-
-/// The fast back end, which takes one proposal per 2D segment.
-fn fast(
-    scene: &Scene,
-    field: &TrainedField,
-    surface: &dyn SignedDistance,
-    config: &Config,
-    views: &[ViewObservation],
-    progress: OnProgress<'_>,
-) -> Result<(Wireframe3d, BackEndReport), DistillError> {
-    let on_proposals = &mut |share| progress(0.7 * share);
-    let proposals = propose_segments(scene, field, config, views, on_proposals)?;
-    let built = fast::run(
-        views,
-        &proposals,
-        &field.junctions(),
-        surface,
-        field.scene_radius,
-        &config.distill.fast,
-    );
-    progress(0.9)?;
-    let report = BackEndReport::Fast {
-        proposals: proposals.len(),
-        steps: built.report,
-    };
-    Ok((built.wireframe, report))
 }
 
 /// The assembler, which asks the images and not the field.
@@ -235,7 +192,6 @@ pub fn agreement(scene: &Scene, config: &Config, wireframe: &Wireframe3d) -> Opt
 /// One rendered ray.
 struct RenderedRay {
     segment: LineSegment3,
-    opacity: f64,
     /// Rendered point `Σ w x`.
     point: Vector3<f64>,
 }
@@ -255,58 +211,18 @@ fn render_rays(field: &TrainedField, rays: &RayBundle) -> Vec<RenderedRay> {
         for (ray, ends) in ends.chunks_exact(6).enumerate() {
             let range = ray * samples.per_ray..(ray + 1) * samples.per_ray;
             let mut point = Vector3::zeros();
-            let mut opacity = 0.0;
             for i in range {
                 let weight = f64::from(weights[i]);
                 point += Vector3::from(chunk.point(ray, samples.z[i])).map(f64::from) * weight;
-                opacity += weight;
             }
             let end = |k: usize| Vector3::new(ends[k], ends[k + 1], ends[k + 2]).map(f64::from);
             rendered.push(RenderedRay {
                 segment: LineSegment3::new(end(0), end(3)),
-                opacity,
                 point,
             });
         }
     }
     rendered
-}
-
-/// One robust 3D segment for every detected 2D segment that the field answers.
-///
-/// # Errors
-/// If `progress` says so.
-pub fn propose_segments(
-    scene: &Scene,
-    field: &TrainedField,
-    config: &Config,
-    views: &[ViewObservation],
-    progress: OnProgress<'_>,
-) -> Result<Vec<SegmentProposal>, Cancelled> {
-    let mut proposals = Vec::new();
-    for (view, observation) in views.iter().enumerate() {
-        let query = spread_query(
-            observation,
-            scene.pixel_center,
-            config.distill.rays_per_segment,
-        );
-        let rendered = render_rays(field, &query.rays);
-        let mut of_segment = vec![Vec::new(); observation.segments.len()];
-        for (ray, segment) in rendered.iter().zip(&query.segments) {
-            of_segment[*segment].push(WeightedSegment {
-                segment: ray.segment,
-                weight: ray.opacity,
-            });
-        }
-        proposals.extend(
-            of_segment
-                .iter()
-                .enumerate()
-                .filter_map(|(segment, rays)| robust_segment(views, view, segment, rays)),
-        );
-        progress((view + 1) as f64 / views.len() as f64)?;
-    }
-    Ok(proposals)
 }
 
 /// The paper's back end, which takes every ray of the thin regions.
@@ -320,7 +236,7 @@ fn paper(
     let mut rays_by_view = Vec::with_capacity(views.len());
     for (index, view) in scene.views.iter().enumerate() {
         let regions = paper_regions(&view.wireframe, scene.pixel_center, config);
-        let query = Query::of_pixels(&view.camera, scene.pixel_center, &regions, 0..regions.len());
+        let query = Query::new(&view.camera, scene.pixel_center, &regions);
         let rendered = render_rays(field, &query.rays);
         let points: Vec<[f32; 3]> = rendered
             .iter()

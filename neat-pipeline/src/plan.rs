@@ -29,7 +29,6 @@ const SPHERE_SLOPE: f64 = 20.0;
 pub struct Plan {
     config: Config,
     background: Option<Background>,
-    back_end: BackEnd,
     field: FieldUse,
 }
 
@@ -70,14 +69,14 @@ impl Plan {
     /// # Errors
     /// If something is open or contradicts itself.
     pub fn new(mut config: Config) -> Result<Self, PlanError> {
+        let field = settle_field_use(&config.distill)?;
+        config.distill.field = Choice::Given(field);
         let background = match config.data.background {
             None => None,
             Some(Choice::Given(background)) => Some(background),
+            Some(Choice::Auto) if field == FieldUse::None => None,
             Some(Choice::Auto) => return Err(PlanError::Open("data.background")),
         };
-        let (back_end, field) = settle_distillation(&config.distill, background)?;
-        config.distill.back_end = Choice::Given(back_end);
-        config.distill.field = Choice::Given(field);
         config.detect.validate()?;
         if field == FieldUse::Trained {
             if config.model.perceiver.junctions.fixed().is_none() {
@@ -88,7 +87,6 @@ impl Plan {
         Ok(Self {
             config,
             background,
-            back_end,
             field,
         })
     }
@@ -98,14 +96,14 @@ impl Plan {
         &self.config
     }
 
-    /// What lies behind the object; `None` where nothing follows from it.
+    /// What lies behind the object; `None` where nothing follows from it, as without a field.
     pub fn background(&self) -> Option<Background> {
         self.background
     }
 
     /// What assembles the wireframe.
     pub fn back_end(&self) -> BackEnd {
-        self.back_end
+        self.config.distill.back_end
     }
 
     /// Whether a field is trained.
@@ -114,25 +112,14 @@ impl Plan {
     }
 }
 
-/// What assembles the wireframe, and whether there is a field: by the background alone.
-fn settle_distillation(
-    asked: &DistillConfig,
-    background: Option<Background>,
-) -> Result<(BackEnd, FieldUse), PlanError> {
-    let back_end = match asked.back_end {
-        Choice::Given(back_end) => back_end,
-        Choice::Auto if background == Some(Background::Photo) => BackEnd::Assembler,
-        Choice::Auto => BackEnd::Fast,
-    };
-    let field = match (asked.field, back_end) {
-        (Choice::Auto, BackEnd::Assembler) => FieldUse::None,
-        (Choice::Auto, _) => FieldUse::Trained,
-        (Choice::Given(FieldUse::None), BackEnd::Paper | BackEnd::Fast) => {
-            return Err(PlanError::NoField(back_end));
-        }
-        (Choice::Given(field), _) => field,
-    };
-    Ok((back_end, field))
+/// Whether a field is trained: by default for a back end that asks it.
+fn settle_field_use(asked: &DistillConfig) -> Result<FieldUse, PlanError> {
+    match (asked.field, asked.back_end) {
+        (Choice::Auto, BackEnd::Assembler) => Ok(FieldUse::None),
+        (Choice::Auto, BackEnd::Paper) => Ok(FieldUse::Trained),
+        (Choice::Given(FieldUse::None), BackEnd::Paper) => Err(PlanError::NoField(asked.back_end)),
+        (Choice::Given(field), _) => Ok(field),
+    }
 }
 
 /// Tells a decision: the setting, its value, and the reason.
@@ -206,7 +193,9 @@ pub fn settle(
         });
     };
     let mut config = asked.clone();
-    if asked.data.background == Some(Choice::Auto) {
+    let field = settle_field_use(&config.distill)?;
+    let trains = field == FieldUse::Trained;
+    if trains && asked.data.background == Some(Choice::Auto) {
         let background = match earlier.and_then(Plan::background) {
             Some(background) => background,
             None => {
@@ -217,22 +206,8 @@ pub fn settle(
         };
         config.data.background = Some(Choice::Given(background));
     }
-    let background = match config.data.background {
-        Some(Choice::Given(background)) => Some(background),
-        _ => None,
-    };
-    let (_, field) = settle_distillation(&config.distill, background)?;
-    let trains = field == FieldUse::Trained;
     settle_field(&mut config, scene, earlier, trains, &mut decide);
     let mut plan = Plan::new(config)?;
-    if asked.distill.back_end == Choice::Auto {
-        let reason = match plan.background {
-            Some(Background::Photo) => "for photographs",
-            Some(Background::Black) => "for an object on a black background",
-            None => "where nothing is said of the background",
-        };
-        decide("distill.back_end", &plan.back_end, reason.to_owned());
-    }
     if asked.distill.field == Choice::Auto && !trains {
         let reason = "as the images alone make the wireframe; --train trains one".to_owned();
         decide("distill.field", &field, reason);

@@ -155,11 +155,6 @@ pub fn distill_run(
         session.manifest.seconds.remove(&stage);
     }
     session.forget_distillation_warnings();
-    // Another back end than the scene's choice may have been asked for.
-    let back_end = session.plan.back_end().to_string();
-    let decisions = &mut session.manifest.decisions;
-    decisions
-        .retain(|decision| decision.setting != "distill.back_end" || decision.value == back_end);
     // How the training ended stays as it is.
     let result = session.distill(field.as_ref(), &AtomicBool::new(false));
     let recorded = session.write_manifest();

@@ -9,14 +9,13 @@
 #![expect(clippy::print_stdout, reason = "an example tells what it does")]
 
 use neat_core::layout::HAWP_DIR;
-use neat_core::{LineSegment2, LoadOptions, Scene, Wireframe3d, load_scene};
+use neat_core::{LoadOptions, load_scene};
 use neat_detect::{DetectorConfig, detect_views, edgel_maps};
 use neat_report::{FactGroup, PhotographConfig, Report};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::assemble::{AssembleConfig, assemble};
-use neat_wireframe::evidence::confirms;
-use neat_wireframe::export::{SupportingSegment, WireframeDocument, read_json};
-use rayon::prelude::*;
+use neat_wireframe::confidence::{ConfidenceConfig, assess};
+use neat_wireframe::export::{WireframeDocument, read_json};
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -55,7 +54,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     };
     let reconstructed = start.elapsed().as_secs_f64();
-    let document = document(&scene, &observations, &in_world);
+    let radius = scene.sphere_radius;
+    let config = ConfidenceConfig::default();
+    let confidence = assess(&in_world, &observations, None, radius, &config)?;
+    let original = in_world.map(|point| scene.original_from_world.apply(point));
+    let mut document = WireframeDocument::from(&original);
+    let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
+    confidence.fill(&mut document, &names, &scene.original_from_world);
 
     let start = Instant::now();
     let mut report = Report::of_scene(&scene, document, MIN_SCORE, &PhotographConfig::default())?;
@@ -75,45 +80,4 @@ fn main() -> Result<(), Box<dyn Error>> {
         start.elapsed().as_secs_f64()
     );
     Ok(())
-}
-
-/// The wireframe in the frame of the files, with the 2D segments that lie on its
-/// edges end on end.
-fn document(scene: &Scene, views: &[ViewObservation], in_world: &Wireframe3d) -> WireframeDocument {
-    let supporting = |edge: usize| -> Vec<SupportingSegment> {
-        let segment = in_world.segment(edge);
-        let in_view = |(index, view): (usize, &ViewObservation)| {
-            let ends = segment.ends().map(|end| view.camera.project(&end));
-            if ends.iter().any(|end| end.depth <= 0.0) {
-                return None;
-            }
-            let projected = LineSegment2::new(ends[0].pixel, ends[1].pixel);
-            let on_it = (view.segments.iter())
-                .map(|scored| projected.with_nearest_order(&scored.segment))
-                .filter(|observed| confirms(&projected, observed));
-            let residual = |observed: &LineSegment2| {
-                let distances = projected.end_distances(observed);
-                (distances.iter().map(|d| d * d).sum::<f64>() / 2.0).sqrt()
-            };
-            let (residual, best) = on_it
-                .map(|observed| (residual(&observed), observed))
-                .min_by(|a, b| a.0.total_cmp(&b.0))?;
-            Some(SupportingSegment {
-                view: index,
-                segment: [best.start.x, best.start.y, best.end.x, best.end.y],
-                residual,
-            })
-        };
-        views.iter().enumerate().filter_map(in_view).collect()
-    };
-    let support: Vec<_> = (0..in_world.edges.len())
-        .into_par_iter()
-        .map(supporting)
-        .collect();
-    let original = in_world.map(|point| scene.original_from_world.apply(point));
-    WireframeDocument {
-        views: scene.views.iter().map(|view| view.name.clone()).collect(),
-        edge_support: support,
-        ..WireframeDocument::from(&original)
-    }
 }

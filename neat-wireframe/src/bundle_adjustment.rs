@@ -1,23 +1,18 @@
 //! Bundle adjustment of the graph: all junctions move together until the
 //! projected edges lie on the detections.
 //!
-//! Every (view, edge) pair contributes its best detection: the distances of the
-//! detection's two ends from the edge's projected line, and the distances of the
-//! projected junctions from the detection's ends where these are near. Cameras
-//! stay fixed. Levenberg–Marquardt on Cauchy-weighted residuals with analytic
+//! Every detection of an edge contributes the distances of its two ends from the edge's
+//! projected line, and the distances of the projected junctions from its ends where these
+//! are given. Cameras stay fixed. Levenberg–Marquardt on Cauchy-weighted residuals with analytic
 //! derivatives.
 
-mod association;
 mod residuals;
 
-use crate::ViewObservation;
-use crate::solve::{Cauchy, Elimination, LeastSquares, OffDiagonal, Options, minimise};
+use crate::solve::{Elimination, LeastSquares, OffDiagonal, Options, minimise};
 pub use crate::solve::{Summary, Termination};
-use association::associate_edges;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
-pub(crate) use residuals::{EdgeObservation, Loss, ObservedEdge};
-use serde::{Deserialize, Serialize};
+pub use residuals::{EdgeObservation, Loss, ObservedEdge};
 
 const OPTIONS: Options = Options {
     max_iterations: 25,
@@ -28,58 +23,6 @@ const OPTIONS: Options = Options {
     relative_tolerance: 1e-6,
 };
 
-/// Settings of [`bundle_adjust`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BundleAdjustmentConfig {
-    /// Association distances in pixels of the passes that precede the final
-    /// choice of edges, one pass each.
-    pub association_in_pixels: Vec<f64>,
-    /// Association distance in pixels of the pass on the final graph.
-    pub final_association_in_pixels: f64,
-    /// The association distance never exceeds this share of the projected edge.
-    pub max_relative_distance: f64,
-    /// Edges that appear shorter than this are not observed.
-    pub min_projected_length_in_pixels: f64,
-    /// A detection must cover more than this share of the edge …
-    pub min_overlap: f64,
-    /// … and be shorter than this multiple of it.
-    pub max_relative_length: f64,
-    /// Residuals are weighted by the score to this power.
-    pub score_exponent: f64,
-    /// Weight of junction-to-end residuals relative to end-to-line ones.
-    pub end_weight: f64,
-    /// Scale of the Cauchy loss.
-    pub cauchy_scale_in_pixels: f64,
-}
-
-impl Default for BundleAdjustmentConfig {
-    fn default() -> Self {
-        Self {
-            association_in_pixels: vec![6.0, 4.0],
-            final_association_in_pixels: 3.0,
-            max_relative_distance: 0.2,
-            min_projected_length_in_pixels: 10.0,
-            min_overlap: 0.4,
-            max_relative_length: 1.3,
-            score_exponent: 0.25,
-            end_weight: 1.0,
-            cauchy_scale_in_pixels: 1.0,
-        }
-    }
-}
-
-impl BundleAdjustmentConfig {
-    fn loss(&self) -> Loss {
-        Loss {
-            cauchy: Cauchy {
-                scale: self.cauchy_scale_in_pixels,
-            },
-            end_weight: self.end_weight,
-        }
-    }
-}
-
 /// Junctions after an adjustment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Adjusted {
@@ -89,30 +32,12 @@ pub struct Adjusted {
     pub summary: Summary,
 }
 
-/// The junctions after one pass: association within `association_in_pixels` at
-/// their present positions, then optimisation.
+/// Moves all junctions, with the correspondences as they are. Junctions without any observed
+/// edge stay.
 ///
-/// Junctions without any observed edge stay. Edges must name two different
-/// existing junctions; others are passed over.
-pub fn bundle_adjust(
-    views: &[ViewObservation],
-    junctions: &[Vector3<f64>],
-    edges: &[[usize; 2]],
-    association_in_pixels: f64,
-    config: &BundleAdjustmentConfig,
-) -> Adjusted {
-    let observed = associate_edges(views, junctions, edges, association_in_pixels, config);
-    adjust_observed(&observed, junctions, config.loss())
-}
-
-/// Levenberg–Marquardt on all junctions, with the correspondences as they are.
-///
-/// Edges must name two different existing junctions.
-pub(crate) fn adjust_observed(
-    edges: &[ObservedEdge],
-    junctions: &[Vector3<f64>],
-    loss: Loss,
-) -> Adjusted {
+/// # Panics
+/// If an edge names a junction that does not exist.
+pub fn bundle_adjust(edges: &[ObservedEdge], junctions: &[Vector3<f64>], loss: Loss) -> Adjusted {
     let pairs = edges.iter().map(|edge| edge.junctions);
     let problem = GraphProblem {
         edges,
@@ -197,7 +122,9 @@ impl LeastSquares for GraphProblem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ViewObservation;
     use crate::test_scenes::{Noise, cameras_on_sphere, cube, views_of_edges};
+    use neat_core::Camera;
 
     /// The cube, its edges, and junctions to start from that are up to 0.01 off.
     struct NoisyCube {
@@ -217,43 +144,62 @@ mod tests {
         }
     }
 
+    const LOSS: Loss = Loss {
+        cauchy_scale_in_pixels: 1.5,
+        end_weight: 0.7,
+    };
+
+    /// The edges with their exact detections, whose weight is `weight`.
+    fn observed(cameras: &[Camera], cube: &NoisyCube, weight: f64) -> Vec<ObservedEdge> {
+        observed_edges(cameras, &cube.truth, &cube.edges, weight)
+    }
+
+    fn observed_edges(
+        cameras: &[Camera],
+        truth: &[Vector3<f64>],
+        edges: &[[usize; 2]],
+        weight: f64,
+    ) -> Vec<ObservedEdge> {
+        let views = views_of_edges(cameras, truth, edges);
+        let observation = |view: &ViewObservation, edge: usize| {
+            let detection = view.segments[edge].segment;
+            EdgeObservation {
+                camera: view.camera,
+                detection,
+                ends: detection.ends().map(Some),
+                weight,
+            }
+        };
+        (edges.iter().enumerate())
+            .map(|(edge, junctions)| ObservedEdge {
+                junctions: *junctions,
+                observations: views.iter().map(|view| observation(view, edge)).collect(),
+            })
+            .collect()
+    }
+
     #[test]
     fn gradient_of_the_cost_agrees_with_finite_differences() {
-        let NoisyCube {
-            truth,
-            edges,
-            start,
-        } = noisy_cube(7);
-        let mut views = views_of_edges(&cameras_on_sphere(5), &truth, &edges);
-        views[0].segments[2].score = 0.3;
-        let config = BundleAdjustmentConfig {
-            end_weight: 0.7,
-            cauchy_scale_in_pixels: 1.5,
-            ..Default::default()
-        };
-        let observed = associate_edges(&views, &start, &edges, 20.0, &config);
-        assert!(
-            observed
-                .iter()
-                .any(|e| e.observations.iter().any(|o| o.ends[0].is_some()))
-        );
+        let cube = noisy_cube(7);
+        let mut edges = observed(&cameras_on_sphere(5), &cube, 0.8);
+        edges[2].observations[0].ends[1] = None;
         let problem = GraphProblem {
-            edges: &observed,
-            loss: config.loss(),
-            elimination: Elimination::new(start.len(), edges.iter().copied()),
+            edges: &edges,
+            loss: LOSS,
+            elimination: Elimination::new(cube.start.len(), cube.edges.iter().copied()),
         };
-        let gradient = problem.linearise(&start).unwrap().gradient;
+        let gradient = problem.linearise(&cube.start).unwrap().gradient;
         let step = 1e-7;
         for (junction, analytic) in gradient.iter().enumerate() {
             for axis in 0..3 {
                 let cost_at = |offset: f64| {
-                    let mut moved = start.clone();
+                    let mut moved = cube.start.clone();
                     moved[junction][axis] += offset;
                     problem.cost(&moved)
                 };
                 let numeric = (cost_at(step) - cost_at(-step)) / (2.0 * step);
                 // d log(1 + r²/s²) = 2/s² · w r dr
-                let expected = 2.0 / config.cauchy_scale_in_pixels.powi(2) * analytic[axis];
+                let expected = 2.0 / LOSS.cauchy_scale_in_pixels.powi(2) * analytic[axis];
                 assert!(
                     (numeric - expected).abs() < 1e-3 + 1e-5 * expected.abs(),
                     "{numeric} {expected}"
@@ -264,15 +210,10 @@ mod tests {
 
     #[test]
     fn exact_detections_give_back_the_exact_junctions() {
-        let NoisyCube {
-            truth,
-            edges,
-            start,
-        } = noisy_cube(9);
-        let views = views_of_edges(&cameras_on_sphere(10), &truth, &edges);
-        let config = BundleAdjustmentConfig::default();
-        let Adjusted { junctions, summary } = bundle_adjust(&views, &start, &edges, 12.0, &config);
-        for (adjusted, truth) in junctions.iter().zip(&truth) {
+        let cube = noisy_cube(9);
+        let edges = observed(&cameras_on_sphere(10), &cube, 1.0);
+        let Adjusted { junctions, summary } = bundle_adjust(&edges, &cube.start, LOSS);
+        for (adjusted, truth) in junctions.iter().zip(&cube.truth) {
             assert!((adjusted - truth).norm() < 1e-4, "{adjusted} {truth}");
         }
         assert!(
@@ -294,9 +235,8 @@ mod tests {
         }
         let mut noise = Noise(31);
         let start: Vec<_> = truth.iter().map(|x| x + 0.002 * noise.vector()).collect();
-        let views = views_of_edges(&cameras_on_sphere(10), &truth, &edges);
-        let config = BundleAdjustmentConfig::default();
-        let adjusted = bundle_adjust(&views, &start, &edges, 6.0, &config);
+        let observed = observed_edges(&cameras_on_sphere(10), &truth, &edges, 1.0);
+        let adjusted = bundle_adjust(&observed, &start, LOSS);
         assert!(adjusted.junctions.len() > 100);
         for (adjusted, truth) in adjusted.junctions.iter().zip(&truth) {
             assert!((adjusted - truth).norm() < 1e-4);
@@ -305,23 +245,18 @@ mod tests {
 
     #[test]
     fn without_observations_nothing_moves() {
-        let NoisyCube {
-            truth,
-            edges,
-            mut start,
-        } = noisy_cube(1);
-        let config = BundleAdjustmentConfig::default();
-        let views = views_of_edges(&cameras_on_sphere(3), &truth, &edges);
-        let wrong = [[0, 8], [1, 1]];
-        for (views, edges) in [(&[][..], &edges[..]), (&views, &[]), (&views, &wrong)] {
-            let adjusted = bundle_adjust(views, &start, edges, 6.0, &config);
-            assert_eq!(adjusted.junctions, start);
-            assert_eq!(adjusted.summary.termination, Termination::Undetermined);
+        let mut cube = noisy_cube(1);
+        for edges in [vec![], observed(&[], &cube, 1.0)] {
+            let adjusted = bundle_adjust(&edges, &cube.start, LOSS);
+            assert_eq!(adjusted.junctions, cube.start);
         }
+        let nothing = bundle_adjust(&[], &cube.start, LOSS);
+        assert_eq!(nothing.summary.termination, Termination::Undetermined);
         // A junction of no edge stays where the others move.
-        start.push(Vector3::new(0.3, 0.1, 0.2));
-        let adjusted = bundle_adjust(&views, &start, &edges, 6.0, &config);
-        assert_eq!(adjusted.junctions[8], start[8]);
-        assert_ne!(adjusted.junctions[0], start[0]);
+        cube.start.push(Vector3::new(0.3, 0.1, 0.2));
+        let edges = observed(&cameras_on_sphere(3), &cube, 1.0);
+        let adjusted = bundle_adjust(&edges, &cube.start, LOSS);
+        assert_eq!(adjusted.junctions[8], cube.start[8]);
+        assert_ne!(adjusted.junctions[0], cube.start[0]);
     }
 }

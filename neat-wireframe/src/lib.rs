@@ -1,13 +1,11 @@
-//! From posed views with 2D segments, and what a field proposes, to a 3D wireframe
-//! graph that says how sure it is. No learning framework: anything that proposes 3D
-//! segments can use this crate.
+//! From posed views with 2D segments to a 3D wireframe graph that says how sure it is. No
+//! learning framework: what a field renders comes in as numbers, where one is used.
 //!
 //! | to | see |
 //! | --- | --- |
-//! | build a graph from 2D segments and edgels, as of photographs | [`mod@assemble`] |
-//! | build one from proposals, junctions and a surface, as of an object | [`fast`] |
-//! | build one as the paper does | [`paper`] |
-//! | make one robust proposal of what several rays rendered | [`proposals`] |
+//! | build a graph from 2D segments and edgels | [`mod@assemble`] |
+//! | build one as the paper does, from what a field renders | [`paper`] |
+//! | move the junctions of a graph until its edges lie on detections | [`bundle_adjustment`] |
 //! | learn how sure each junction and edge is, and which 2D segments say so | [`confidence`] |
 //! | find chains of edges that stand for a curve | [`curved_rims`] |
 //! | measure a wireframe, with and without ground truth | [`metrics`] |
@@ -34,29 +32,22 @@ pub mod assemble;
 pub mod bundle_adjustment;
 pub mod confidence;
 pub mod curved_rims;
-pub mod evidence;
 pub mod export;
-pub mod fast;
 pub mod metrics;
 pub mod paper;
 pub mod projection;
-pub mod proposals;
 pub mod validity;
 
-mod index;
 mod interval_cover;
 mod observation;
-mod segment_ends;
-mod segment_matching;
+mod segment_grid;
 mod signed_distance;
 mod solve;
 mod statistics;
-mod triangulation;
 mod used_junctions;
 
 pub use neat_core::Wireframe3d;
 pub use observation::ViewObservation;
-pub use proposals::SegmentProposal;
 pub use signed_distance::SignedDistance;
 
 #[cfg(test)]

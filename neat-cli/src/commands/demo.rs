@@ -9,6 +9,7 @@ use crate::progress::Progress;
 use crate::{interrupt, output};
 use clap::Args;
 use neat_lab::demo::demo;
+use neat_pipeline::config::{Choice, FieldUse};
 use neat_pipeline::reconstruct::RunOptions;
 use std::path::PathBuf;
 
@@ -20,7 +21,7 @@ use std::path::PathBuf;
 Examples:
   neat demo
   neat demo --overwrite --solid stair-prism --views 40
-  neat demo --out OTHER --time-budget 20s")]
+  neat demo --out OTHER --train --time-budget 20s")]
 pub struct DemoArgs {
     /// Folder for the scene and the run; it must be new or empty
     #[arg(long, value_name = "OUT", default_value = "neat-demo")]
@@ -30,6 +31,9 @@ pub struct DemoArgs {
     overwrite: bool,
     #[command(flatten)]
     scene: SceneArgs,
+    /// Train a field too, as `neat reconstruct --train`
+    #[arg(long)]
+    train: bool,
     #[command(flatten)]
     method: MethodArgs,
     /// Seed of the scene and of the reconstruction
@@ -41,11 +45,15 @@ pub struct DemoArgs {
 
 impl DemoArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
+        let mut config = self.method.config()?;
+        if self.train {
+            config.distill.field = Choice::Given(FieldUse::Trained);
+        }
         let options = RunOptions {
             scene: self.out.clone(),
             out: self.out,
             existing: existing(self.overwrite),
-            config: self.method.config()?,
+            config,
             preset: self.method.name(),
             backend: self.compute.backend.backend,
             seed: self.seed,

@@ -16,9 +16,10 @@ use neat_pipeline::config::Preset;
 use neat_pipeline::resources::{Resources, default_limit};
 use neat_pipeline::scene::{load_options, prepare_scene};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::evidence::required_views;
 use neat_wireframe::metrics::Matching;
-use neat_wireframe::metrics::{SupportedTruthConfig, supported_truth, without_curves};
+use neat_wireframe::metrics::{
+    SupportedTruthConfig, required_views, supported_truth, without_curves,
+};
 use std::path::{Path, PathBuf};
 
 /// Measure a wireframe against the truth or a scanned surface, by a published protocol

@@ -10,7 +10,7 @@ use neat_wireframe::metrics::ImageEvidence;
 
 /// Turn a scene into a 3D wireframe, and write all results
 ///
-/// Objects on black are trained on for some ten seconds; photographs need no training.
+/// The images alone make the wireframe, in seconds; a field is trained on request.
 ///
 /// RUN then holds report.html to open first (`neat view RUN`), the wireframe as .json, .obj and
 /// .ply in the frame of the scene's files, a picture of it, overlays/ on some of the photographs,
@@ -22,9 +22,9 @@ use neat_wireframe::metrics::ImageEvidence;
 #[command(after_help = "\
 Examples:
   neat reconstruct SCENE --out RUN
-  neat reconstruct SCENE --out RUN --time-budget 10m
+  neat reconstruct SCENE --out RUN --set distill.assembler.min_evidence=6
+  neat reconstruct SCENE --out RUN --train --time-budget 10m
   neat reconstruct SCENE --out RUN --preset paper-dtu --backend wgpu
-  neat reconstruct SCENE --out RUN --set train.rays=512 --set data.scene_radius=1.5
   neat reconstruct SCENE --out RUN --resume            after an interrupt
   neat reconstruct SCENE --out AGAIN --config RUN/config.toml
 
@@ -32,8 +32,7 @@ The keys of --set are those of a run's config.toml; a wrong one lists the right 
 pub struct ReconstructArgs {
     #[command(flatten)]
     run: RunArgs,
-    /// Train a field also where the images alone make the wireframe, as those of photographs do: to
-    /// render it, or for its mesh
+    /// Train a field too: to render it, for its mesh, or for the paper's back end
     #[arg(long)]
     train: bool,
 }

@@ -5,7 +5,7 @@ use crate::support::{TestScene, checkpoints};
 use std::fs;
 
 /// What continues the run of [`killed`].
-const RESUME: &str = "reconstruct scene --out run --resume --backend flex --steps 40 --set train.checkpoint_interval=4";
+const RESUME: &str = "reconstruct scene --out run --train --resume --backend flex --steps 40 --set train.checkpoint_interval=4";
 
 /// A run that was killed after its first checkpoint.
 fn killed(scene: &TestScene) {
@@ -103,7 +103,7 @@ fn changes_since_a_run_began() {
             Case {
                 kind: "other values of the configuration",
                 spoil: killed,
-                command: "reconstruct scene --out run --resume --backend flex --steps 50 --set train.rays=128",
+                command: "reconstruct scene --out run --train --resume --backend flex --steps 50 --set train.rays=128",
                 names: &[
                     "train.steps: 40 then, 50 now",
                     "train.rays: 256 then, 128 now",
@@ -113,13 +113,13 @@ fn changes_since_a_run_began() {
             Case {
                 kind: "another seed",
                 spoil: killed,
-                command: "reconstruct scene --out run --resume --backend flex --seed 5",
+                command: "reconstruct scene --out run --train --resume --backend flex --seed 5",
                 names: &["seed: 0 then, 5 now"],
             },
             Case {
                 kind: "another preset",
                 spoil: killed,
-                command: "reconstruct scene --out run --resume --backend flex --preset paper-abc",
+                command: "reconstruct scene --out run --train --resume --backend flex --preset paper-abc",
                 names: &[
                     "data.scene_radius: none then, 3.0 now",
                     "more",

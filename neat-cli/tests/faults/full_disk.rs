@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// the run needs more and more space.
 fn reconstruct(scene: &TestScene, run: &str) -> Command {
     let mut neat = neat(&["reconstruct", &scene.path("scene")]);
-    neat.args(["--out", &scene.path(run), "--resume", "--quiet"])
+    neat.args(["--out", &scene.path(run), "--resume", "--quiet", "--train"])
         .args(["--backend", "flex", "--steps", "4"])
         .args(["--set", "train.checkpoint_interval=2"]);
     neat

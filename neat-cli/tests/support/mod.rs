@@ -69,9 +69,12 @@ impl TestScene {
         self.dir.path().join(name)
     }
 
-    /// `neat COMMAND scene --out run` with few steps.
+    /// `neat COMMAND scene --out run` with few steps of training.
     pub fn run(&self, command: &str, steps: &str) -> Command {
         let mut neat = neat(&[command, &self.path("scene")]);
+        if command == "reconstruct" {
+            neat.arg("--train");
+        }
         neat.args(["--out", &self.path("run")]);
         neat.args(["--backend", "flex", "--steps", steps]);
         neat
@@ -81,7 +84,7 @@ impl TestScene {
     /// forty steps with a checkpoint after every fourth.
     pub fn resume(&self, run: &str) -> Command {
         let mut neat = neat(&["reconstruct", &self.path("scene")]);
-        neat.args(["--out", &self.path(run), "--resume"])
+        neat.args(["--out", &self.path(run), "--resume", "--train"])
             .args(["--backend", "flex", "--steps", "40"])
             .args(["--set", "train.checkpoint_interval=4"]);
         neat

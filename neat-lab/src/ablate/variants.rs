@@ -159,60 +159,6 @@ const PAPER_STEPS: [Variant; 3] = [
     },
 ];
 
-/// The steps of the fast back end, each switched off.
-const FAST_STEPS: [Variant; 10] = [
-    step_off(
-        "no modes of segment ends",
-        "fast-no-modes",
-        &["distill.fast.use_junction_modes=false"],
-    ),
-    step_off(
-        "no perceived junctions",
-        "fast-no-perceived",
-        &["distill.fast.use_perceived_junctions=false"],
-    ),
-    step_off(
-        "no re-triangulation",
-        "fast-no-retriangulation",
-        &["distill.fast.retriangulation=false"],
-    ),
-    step_off(
-        "no splitting of close junctions",
-        "fast-no-junction-splitting",
-        &["distill.fast.junction_splitting=false"],
-    ),
-    step_off(
-        "no edge completion",
-        "fast-no-completion",
-        &["distill.fast.edge_completion=false"],
-    ),
-    step_off(
-        "detections count for several edges",
-        "fast-no-exclusive-support",
-        &["distill.fast.exclusive_support=false"],
-    ),
-    step_off(
-        "no bundle adjustment",
-        "fast-no-adjustment",
-        &["distill.fast.bundle_adjustment=false"],
-    ),
-    step_off(
-        "no occlusion test",
-        "fast-no-occlusion",
-        &["distill.fast.occlusion_test=false"],
-    ),
-    step_off(
-        "no clean-up",
-        "fast-no-cleanup",
-        &["distill.fast.cleanup=false"],
-    ),
-    step_off(
-        "no splitting of edges",
-        "fast-no-edge-splitting",
-        &["distill.fast.edge_splitting=false"],
-    ),
-];
-
 /// The assembler with more and less of what a line needs.
 const ASSEMBLER_STEPS: [Variant; 4] = [
     step_off(
@@ -239,18 +185,12 @@ const ASSEMBLER_STEPS: [Variant; 4] = [
 
 /// All variants that make sense for a run with this back end, the base first.
 pub fn variants(back_end: BackEnd) -> Vec<Variant> {
-    let steps: &[Variant] = match back_end {
-        BackEnd::Fast => &FAST_STEPS,
+    let others: &[Variant] = match back_end {
         BackEnd::Assembler => &ASSEMBLER_STEPS,
-        BackEnd::Paper => &[],
+        // Only this one asks the field.
+        BackEnd::Paper => &TRAINING,
     };
-    [BASE]
-        .iter()
-        .chain(&TRAINING)
-        .chain(&PAPER_STEPS)
-        .chain(steps)
-        .copied()
-        .collect()
+    [&[BASE], others, &PAPER_STEPS].concat()
 }
 
 #[cfg(test)]
@@ -262,7 +202,7 @@ mod tests {
 
     #[test]
     fn every_variant_applies_to_every_preset_and_most_change_something() {
-        let all = [BackEnd::Fast, BackEnd::Assembler, BackEnd::Paper];
+        let all = [BackEnd::Assembler, BackEnd::Paper];
         for preset in Preset::ALL {
             let config = preset.config();
             for variant in all.into_iter().flat_map(variants) {
@@ -279,7 +219,7 @@ mod tests {
 
     #[test]
     fn folders_are_not_shared() {
-        for back_end in [BackEnd::Fast, BackEnd::Assembler, BackEnd::Paper] {
+        for back_end in [BackEnd::Assembler, BackEnd::Paper] {
             let variants = variants(back_end);
             let slugs: BTreeSet<_> = variants.iter().map(|v| v.slug).collect();
             assert_eq!(slugs.len(), variants.len());

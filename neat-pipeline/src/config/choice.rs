@@ -41,20 +41,20 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Choice<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::BackEnd;
+    use crate::config::FieldUse;
 
     #[test]
     fn a_choice_is_a_word() {
-        let read = |text: &str| serde_json::from_str::<Choice<BackEnd>>(text);
+        let read = |text: &str| serde_json::from_str::<Choice<FieldUse>>(text);
         for (text, choice) in [
             ("\"auto\"", Choice::Auto),
-            ("\"assembler\"", Choice::Given(BackEnd::Assembler)),
+            ("\"trained\"", Choice::Given(FieldUse::Trained)),
         ] {
             assert_eq!(read(text).unwrap(), choice);
             assert_eq!(serde_json::to_string(&choice).unwrap(), text);
         }
-        let error = read("\"asembler\"").unwrap_err().to_string();
-        assert!(error.contains("`assembler` or `auto`"), "{error}");
+        let error = read("\"trainde\"").unwrap_err().to_string();
+        assert!(error.contains("`none` or `auto`"), "{error}");
         assert!(read("3").is_err());
     }
 }

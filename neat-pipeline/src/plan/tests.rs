@@ -36,19 +36,7 @@ fn settled(asked: &Config, scene: &Scene) -> (Plan, Vec<String>) {
     (plan, decisions.into_iter().map(|d| d.setting).collect())
 }
 
-#[test]
-fn an_object_before_black_gets_the_fast_back_end() {
-    let asked = Preset::Fast.config();
-    let (plan, decisions) = settled(&asked, &black());
-    assert_eq!(plan.background(), Some(Background::Black));
-    assert_eq!(plan.back_end(), BackEnd::Fast);
-    assert_eq!(plan.config().train, asked.train);
-    assert_eq!(plan.config().model, asked.model);
-    assert!(plan.trains());
-    assert_eq!(decisions, ["data.background", "distill.back_end"]);
-}
-
-/// The fast preset, with a field whatever the scene.
+/// The fast preset, with a field.
 fn with_field() -> Config {
     let mut asked = Preset::Fast.config();
     asked.distill.field = Choice::Given(FieldUse::Trained);
@@ -56,18 +44,30 @@ fn with_field() -> Config {
 }
 
 #[test]
-fn photographs_get_the_assembler_and_no_field() {
+fn images_need_no_field() {
     let mut asked = Preset::Fast.config();
     asked.model.perceiver.junctions = JunctionCount::AUTO;
-    let (plan, decisions) = settled(&asked, &photographs());
-    assert_eq!(plan.background(), Some(Background::Photo));
-    assert_eq!(plan.back_end(), BackEnd::Assembler);
-    assert!(!plan.trains());
-    // Nothing is decided that only training looks at.
+    for scene in [black(), photographs()] {
+        let (plan, decisions) = settled(&asked, &scene);
+        assert_eq!(plan.back_end(), BackEnd::Assembler);
+        assert!(!plan.trains());
+        // Nothing is decided that only training looks at.
+        assert_eq!(plan.background(), None);
+        assert_eq!(plan.config().train, asked.train);
+        assert_eq!(plan.config().model, asked.model);
+        assert_eq!(decisions, ["distill.field"]);
+    }
+}
+
+#[test]
+fn a_field_of_an_object_before_black_is_as_configured() {
+    let asked = with_field();
+    let (plan, decisions) = settled(&asked, &black());
+    assert_eq!(plan.background(), Some(Background::Black));
     assert_eq!(plan.config().train, asked.train);
     assert_eq!(plan.config().model, asked.model);
-    let told = ["data.background", "distill.back_end", "distill.field"];
-    assert_eq!(decisions, told);
+    assert!(plan.trains());
+    assert_eq!(decisions, ["data.background"]);
 }
 
 #[test]
@@ -84,14 +84,13 @@ fn a_field_of_photographs_gets_a_sphere_behind_them() {
             "data.background",
             "train.loss.mask",
             "model.implicit.bounding_sphere_slope",
-            "distill.back_end",
         ]
     );
 }
 
 #[test]
 fn what_is_given_or_decided_stays() {
-    let (plan, _) = settled(&Preset::Fast.config(), &photographs());
+    let (plan, _) = settled(&with_field(), &photographs());
     // As a person has it who leaves nothing open.
     let (again, decisions) = settled(plan.config(), &black());
     assert_eq!(again, plan);
@@ -112,7 +111,7 @@ fn what_an_earlier_part_of_a_run_has_decided_stays() {
     let (again, _) = settle(&asked, &black(), MACHINE, Some(&first)).unwrap();
     assert_eq!(again, first);
     // But not against what is given.
-    asked.distill.back_end = Choice::Given(BackEnd::Paper);
+    asked.distill.back_end = BackEnd::Paper;
     asked.train.ray_chunk = Some(8);
     let (other, _) = settle(&asked, &black(), MACHINE, Some(&first)).unwrap();
     assert_eq!(other.back_end(), BackEnd::Paper);
@@ -125,7 +124,7 @@ fn a_trained_field_keeps_its_sphere_whatever_is_said_of_the_background() {
     let mut asked = with_field();
     asked.data.background = Some(Choice::Given(Background::Black));
     let (plan, _) = settle(&asked, &photographs(), MACHINE, Some(&trained)).unwrap();
-    assert_eq!(plan.back_end(), BackEnd::Fast);
+    assert_eq!(plan.background(), Some(Background::Black));
     assert_eq!(plan.config().model, trained.config().model);
 }
 
@@ -154,7 +153,7 @@ fn steps_are_taken_in_passes_where_memory_is_short_and_nobody_has_decided() {
 
 #[test]
 fn what_is_open_or_contradicts_itself_is_no_plan() {
-    let open = Plan::new(Preset::Fast.config()).unwrap_err();
+    let open = Plan::new(with_field()).unwrap_err();
     assert!(open.to_string().contains("data.background"), "{open}");
     let mut config = Preset::PaperAbc.config();
     config.train.rays = 0;

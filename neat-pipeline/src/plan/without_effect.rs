@@ -59,23 +59,16 @@ fn only_trains(key: &str) -> bool {
 /// How the keys of settings begin that do nothing, and why.
 fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)> {
     let mut idle = match plan.back_end() {
-        BackEnd::Paper => vec![
-            ("distill.fast.", PAPER_RUNS),
-            ("distill.assembler.", PAPER_RUNS),
-            ("distill.rays_per_segment", PAPER_RUNS),
-        ],
-        BackEnd::Fast => vec![
-            ("distill.paper.", FAST_RUNS),
-            ("distill.assembler.", FAST_RUNS),
-        ],
-        BackEnd::Assembler => vec![
-            ("distill.paper.", ASSEMBLER_RUNS),
-            ("distill.fast.", ASSEMBLER_RUNS),
-            ("distill.rays_per_segment", ASSEMBLER_RUNS),
-        ],
+        BackEnd::Paper => vec![("distill.assembler.", PAPER_RUNS)],
+        BackEnd::Assembler => vec![("distill.paper.", ASSEMBLER_RUNS)],
     };
     if !plan.trains() && !given.trained {
-        let keys = ["train.", "model.", "data.attraction_distance"];
+        let keys = [
+            "train.",
+            "model.",
+            "data.attraction_distance",
+            "data.background",
+        ];
         idle.extend(keys.map(|key| (key, NO_FIELD)));
     }
     if plan.background() == Some(Background::Photo) {
@@ -107,53 +100,56 @@ fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)>
 
 pub(crate) const NO_FIELD: &str = "no field is trained: --train trains one";
 const PAPER_RUNS: &str = "the wireframe is assembled by the paper's back end";
-const FAST_RUNS: &str = "the wireframe is assembled by the fast back end";
 const ASSEMBLER_RUNS: &str = "the wireframe is made by the assembler";
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Choice, apply_overrides};
+    use crate::config::apply_overrides;
 
     #[test]
     fn values_are_never_dropped_without_a_word() {
-        let told = |background: Background, sets: &[&str]| -> Vec<String> {
-            let mut config = Preset::Fast.config();
-            config.data.background = Some(Choice::Given(background));
+        let told = |sets: &[&str]| -> Vec<String> {
             let sets: Vec<String> = sets.iter().map(ToString::to_string).collect();
-            let asked = apply_overrides(&config, &sets).unwrap();
+            let asked = apply_overrides(&Preset::Fast.config(), &sets).unwrap();
             let plan = Plan::new(asked.clone()).unwrap();
             let changes = changes_of_presets(&asked);
             let warnings = settings_without_effect(&changes, &plan, Given::default());
-            warnings
-                .into_iter()
+            (warnings.into_iter())
                 .map(|warning| warning.message)
                 .collect()
         };
-        let (black, photo) = (Background::Black, Background::Photo);
         // What the preset itself says needs no word.
-        assert!(told(black, &[]).is_empty());
-        assert!(told(photo, &[]).is_empty());
-        let sets = ["train.loss.mask=0.7", "distill.fast.cleanup=false"];
-        assert!(told(black, &sets).is_empty());
-        let no_fast = format!("distill.fast.cleanup = false has no effect: {ASSEMBLER_RUNS}");
+        assert!(told(&[]).is_empty());
+        let sets = [
+            "train.loss.mask=0.7",
+            "distill.paper.visibility.min_views=3",
+        ];
+        let no_paper =
+            format!("distill.paper.visibility.min_views = 3 has no effect: {ASSEMBLER_RUNS}");
         let no_mask = format!("train.loss.mask = 0.7 has no effect: {NO_FIELD}");
-        assert_eq!(told(photo, &sets), [no_fast, no_mask]);
-        let sets = ["train.loss.mask=0.7", "distill.field=trained"];
+        assert_eq!(told(&sets), [no_paper, no_mask]);
+        let with = |background: &'static str, set: &'static str| {
+            told(&["distill.field=trained", background, set])
+        };
+        let (black, photo) = ("data.background=black", "data.background=photo");
+        assert!(with(black, "train.loss.mask=0.7").is_empty());
         let no_mask = "train.loss.mask = 0.7 has no effect: photographs show no silhouettes";
-        assert_eq!(told(photo, &sets), [no_mask]);
+        assert_eq!(with(photo, "train.loss.mask=0.7"), [no_mask]);
+        let no_background = format!("data.background = \"photo\" has no effect: {NO_FIELD}");
+        assert_eq!(told(&[photo]), [no_background]);
         // With 2D wireframes, what an edgel is matters to the assembler only.
         let sets = ["detect.min_gradient=2.0", "detect.min_score=0.2"];
-        assert_eq!(told(black, &sets).len(), 2);
-        let without_effect = told(photo, &sets);
+        let without_effect = told(&sets);
         assert_eq!(without_effect.len(), 1, "{without_effect:?}");
         assert!(without_effect[0].starts_with("detect.min_score"));
+        let paper = [&sets[..], &["distill.back_end=paper", black]].concat();
+        assert_eq!(told(&paper).len(), 2);
         let sets = [
             "train.steps=5".to_owned(),
             "train.sampler.lookups=32".to_owned(),
         ];
-        let mut fast = Preset::Fast.config();
-        fast.data.background = Some(Choice::Given(black));
+        let fast = Preset::Fast.config();
         let changes = differences(&fast, &apply_overrides(&fast, &sets).unwrap());
         let trained = Given {
             trained: true,
@@ -162,7 +158,7 @@ mod tests {
         let told_of_run = settings_without_effect(&changes, &Plan::new(fast).unwrap(), trained);
         assert_eq!(told_of_run.len(), 1);
         assert!(told_of_run[0].message.contains("train.steps = 5"));
-        let points = told(black, &["train.surface_points=8"]);
+        let points = with(black, "train.surface_points=8");
         assert!(points[0].contains("no sparse points"), "{points:?}");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::edge_samples::{Images, project_segment};
 use super::line_selection::ChosenLine;
-use crate::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, adjust_observed};
+use crate::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, bundle_adjust};
 use crate::projection::project_in_front;
 use crate::solve::{Cauchy, reweighted};
 use nalgebra::{Vector2, Vector3};
@@ -30,9 +30,7 @@ pub(super) fn fit_graph(
     junctions: &mut Vec<Vector3<f64>>,
 ) {
     let loss = Loss {
-        cauchy: Cauchy {
-            scale: LOSS_SCALE * images.reach,
-        },
+        cauchy_scale_in_pixels: LOSS_SCALE * images.reach,
         end_weight: END_WEIGHT,
     };
     for _ in 0..ROUNDS {
@@ -42,7 +40,7 @@ pub(super) fn fit_graph(
                 observations: observations(images, chosen, ends.map(|end| junctions[end])),
             })
             .collect();
-        *junctions = adjust_observed(&observed, junctions, loss).junctions;
+        *junctions = bundle_adjust(&observed, junctions, loss).junctions;
     }
 }
 

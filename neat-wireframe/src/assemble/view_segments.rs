@@ -2,7 +2,7 @@
 //! planes, and an index of where each segment lies.
 
 use crate::ViewObservation;
-use crate::index::SegmentGrid;
+use crate::segment_grid::SegmentGrid;
 use nalgebra::Vector3;
 use neat_core::{Camera, LineSegment2, LineSegment3};
 

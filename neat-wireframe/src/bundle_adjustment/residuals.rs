@@ -10,15 +10,16 @@ const MIN_PROJECTED_LENGTH: f64 = 1e-6;
 
 /// How residuals count.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Loss {
-    /// Of all residuals, in pixels.
-    pub cauchy: Cauchy,
+pub struct Loss {
+    /// Scale of the Cauchy loss of all residuals.
+    pub cauchy_scale_in_pixels: f64,
     /// Weight of junction-to-end residuals relative to end-to-line ones.
     pub end_weight: f64,
 }
 
 /// An edge with the detections that observe it.
-pub(crate) struct ObservedEdge {
+#[derive(Clone, Debug)]
+pub struct ObservedEdge {
     /// Indices of its junctions.
     pub junctions: [usize; 2],
     /// One for each detection.
@@ -26,7 +27,8 @@ pub(crate) struct ObservedEdge {
 }
 
 /// What one detection says about an edge.
-pub(crate) struct EdgeObservation {
+#[derive(Clone, Debug)]
+pub struct EdgeObservation {
     /// The view's camera. Both junctions lie in front of it.
     pub camera: Camera,
     /// Both ends lie on the edge's line.
@@ -35,6 +37,14 @@ pub(crate) struct EdgeObservation {
     pub ends: [Option<Vector2<f64>>; 2],
     /// Factor of all residuals.
     pub weight: f64,
+}
+
+impl Loss {
+    fn cauchy(&self) -> Cauchy {
+        Cauchy {
+            scale: self.cauchy_scale_in_pixels,
+        }
+    }
 }
 
 /// The contribution of one edge to the normal equations.
@@ -50,7 +60,8 @@ impl ObservedEdge {
     /// camera that sees it.
     pub(super) fn cost(&self, junctions: &[Vector3<f64>], loss: &Loss) -> f64 {
         let [a, b] = self.junctions.map(|junction| junctions[junction]);
-        let cost = |weighted_residual: f64| loss.cauchy.cost(weighted_residual);
+        let cauchy = loss.cauchy();
+        let cost = |weighted_residual: f64| cauchy.cost(weighted_residual);
         let mut sum = 0.0;
         for observation in &self.observations {
             let projected = Option::zip(
@@ -76,7 +87,8 @@ impl ObservedEdge {
     pub(super) fn linearise(&self, junctions: &[Vector3<f64>], loss: &Loss) -> EdgeBlocks {
         let [a, b] = self.junctions.map(|junction| junctions[junction]);
         let mut blocks = EdgeBlocks::default();
-        let robust = |squared: f64| loss.cauchy.weight(squared);
+        let cauchy = loss.cauchy();
+        let robust = |squared: f64| cauchy.weight(squared);
         for observation in &self.observations {
             let projected = Option::zip(
                 project_with_jacobian(&observation.camera, &a),

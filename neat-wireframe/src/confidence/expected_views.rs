@@ -1,35 +1,13 @@
 //! The views that ought to show an edge.
 
 use super::config::ProvenanceConfig;
-use crate::evidence::occlusion::{OcclusionConfig, views_that_see};
+use super::occlusion::Occluder;
+use crate::ViewObservation;
 use crate::metrics::visible_projection;
-use crate::{SignedDistance, ViewObservation};
 use neat_core::LineSegment3;
 
 /// The share of an edge that must lie in the image.
 const MIN_SHARE_IN_IMAGE: f64 = 0.6;
-
-/// A surface, and how far to look for what it hides.
-pub(super) struct Occluder<'a> {
-    surface: &'a dyn SignedDistance,
-    /// With lengths in the unit of the world.
-    config: OcclusionConfig,
-}
-
-impl<'a> Occluder<'a> {
-    /// For a scene whose ball has this radius.
-    pub(super) fn new(surface: &'a dyn SignedDistance, scene_radius: f64) -> Self {
-        let usual = OcclusionConfig::default();
-        let config = OcclusionConfig {
-            start_distance: usual.start_distance * scene_radius,
-            end_distance: usual.end_distance * scene_radius,
-            min_sdf: usual.min_sdf * scene_radius,
-            ball_radius: usual.ball_radius * scene_radius,
-            ..usual
-        };
-        Self { surface, config }
-    }
-}
 
 /// The views in which most of an edge lies in the image, is long enough to be
 /// detected, and is not hidden by the surface where there is one. Ascending.
@@ -39,8 +17,7 @@ pub(super) fn expected_views(
     occluder: Option<&Occluder>,
     config: &ProvenanceConfig,
 ) -> Vec<usize> {
-    let seen = occluder
-        .map(|occluder| views_that_see(observations, edge, occluder.surface, &occluder.config));
+    let seen = occluder.map(|occluder| occluder.views_that_see(observations, edge));
     let is_seen = |view: usize| {
         let sees = |seen: &Vec<bool>| seen.get(view).copied().unwrap_or(false);
         seen.as_ref().is_none_or(sees)
@@ -76,6 +53,7 @@ fn is_in_view(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::SignedDistance;
     use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
     use nalgebra::Vector3;
 
@@ -109,7 +87,10 @@ mod tests {
         assert_eq!(unhidden.len(), 10);
         assert!(!unhidden.contains(&3) && !unhidden.contains(&4));
 
-        let visible = expected(Some(&Occluder::new(&Cube, 3.0)));
+        let visible = expected(Some(&Occluder {
+            surface: &Cube,
+            scene_radius: 3.0,
+        }));
         // The edge y = z = -0.5 is seen from below or from one side.
         let outside = |view: &usize| {
             let center = observations[*view].camera.center_in_world;

@@ -33,6 +33,7 @@ mod document;
 mod existence;
 mod expected_views;
 mod noise;
+mod occlusion;
 mod provenance;
 mod view_correlation;
 
@@ -47,9 +48,10 @@ use config::ProvenanceConfig;
 use decoys::decoys;
 use detected_ends::detected_ends;
 use existence::{ExistenceModel, ViewCount};
-use expected_views::{Occluder, expected_views};
+use expected_views::expected_views;
 use nalgebra::Matrix3;
 use neat_core::LineSegment3;
+use occlusion::Occluder;
 use provenance::{EdgeProvenance, IndexedView, provenance};
 use rayon::prelude::*;
 use tracing::debug;
@@ -134,8 +136,10 @@ pub fn assess(
         (config.provenance(), config.existence(), config.covariance());
     let found = provenance(&views, &segments, &rules);
 
-    let occluder =
-        Option::zip(surface, radius).map(|(surface, radius)| Occluder::new(surface, radius));
+    let occluder = Option::zip(surface, radius).map(|(surface, scene_radius)| Occluder {
+        surface,
+        scene_radius,
+    });
     let count = |edges: &[LineSegment3], found: &[EdgeProvenance]| -> Vec<ViewCount> {
         let count = |(edge, found)| view_count(observations, edge, found, &occluder, &rules);
         // The surface answers in batches of its own; one edge after the other.

@@ -7,8 +7,8 @@
 
 use super::config::ProvenanceConfig;
 use crate::ViewObservation;
-use crate::index::SegmentGrid;
 use crate::metrics::visible_projection;
+use crate::segment_grid::SegmentGrid;
 use neat_core::{Camera, LineSegment2, LineSegment3};
 use rayon::prelude::*;
 

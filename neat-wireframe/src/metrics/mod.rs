@@ -15,7 +15,9 @@ pub use precision_recall::{
     Matching, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,
     segment_distances,
 };
-pub use supported_truth::{SupportedTruthConfig, WithoutCurves, supported_truth, without_curves};
+pub use supported_truth::{
+    SupportedTruthConfig, WithoutCurves, required_views, supported_truth, without_curves,
+};
 pub use surface_distance::{PointCloud, mean_nearest_distance, sample_segments};
 
 use crate::validity::WireframeFlaw;

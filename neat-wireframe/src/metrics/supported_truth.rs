@@ -11,7 +11,6 @@
 
 use crate::interval_cover::covered_length;
 use crate::projection::project_in_front;
-use crate::segment_matching::match_segment;
 use crate::used_junctions::UsedJunctions;
 use crate::{ViewObservation, Wireframe3d};
 use nalgebra::{Vector2, Vector3};
@@ -42,6 +41,14 @@ impl Default for SupportedTruthConfig {
             resolution_in_pixels: 2.0,
         }
     }
+}
+
+/// The number of views that must support an edge in a scene of `views` views, a
+/// fifth of them, but 2 to 5 (the paper's visibility check asks for 5 of some 50).
+pub fn required_views(views: usize) -> usize {
+    const SHARE: f64 = 0.2;
+    let share = (SHARE * views as f64).round_ties_even();
+    (share as usize).clamp(2, 5)
 }
 
 /// The part of `truth` that detections support in at least `required_views`
@@ -105,8 +112,8 @@ fn is_covered(
         .iter()
         .map(|detection| &detection.segment)
         .filter(|detection| {
-            let fit = match_segment(&edge, detection);
-            fit.overlap > 0.0 && fit.perpendicular_distance < config.max_distance_in_pixels
+            let near = |end| edge.distance_to_line(end) < config.max_distance_in_pixels;
+            detection.ends().iter().all(near)
         })
         .map(|detection| {
             let [t, u] = detection
@@ -277,6 +284,12 @@ mod tests {
 
     fn supported(truth: &Wireframe3d, views: &[ViewObservation]) -> Wireframe3d {
         supported_truth(truth, views, 5, &SupportedTruthConfig::default())
+    }
+
+    #[test]
+    fn required_views_are_a_share_of_all() {
+        let required = [0, 1, 10, 12, 13, 20, 25, 100].map(required_views);
+        assert_eq!(required, [2, 2, 2, 2, 3, 4, 5, 5]);
     }
 
     #[test]

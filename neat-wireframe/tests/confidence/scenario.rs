@@ -5,7 +5,7 @@ use crate::noise::Noise;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::synthetic::{Frustum, Solid, visible_parts};
 use neat_core::{Camera, Intrinsics, LineSegment2, ScoredSegment2, Wireframe3d};
-use neat_wireframe::bundle_adjustment::{BundleAdjustmentConfig, bundle_adjust};
+use neat_wireframe::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, bundle_adjust};
 use neat_wireframe::confidence::Confidence;
 use neat_wireframe::{SignedDistance, ViewObservation};
 
@@ -154,23 +154,63 @@ pub fn displaced(truth: &Wireframe3d, seed: u64) -> Wireframe3d {
     wireframe
 }
 
-/// The [`displaced`] truth as the passes of the fast back end's bundle adjustment
-/// bring it back.
+/// The [`displaced`] truth, adjusted to the detections of its edges, which are sought ever
+/// nearer.
 pub fn adjusted(observations: &[ViewObservation], truth: &Wireframe3d, seed: u64) -> Wireframe3d {
-    let config = BundleAdjustmentConfig::default();
+    let loss = Loss {
+        cauchy_scale_in_pixels: 1.0,
+        end_weight: 1.0,
+    };
     let mut wireframe = displaced(truth, seed);
-    let passes = config.association_in_pixels.iter();
-    for association in passes.chain([&config.final_association_in_pixels]) {
-        let adjusted = bundle_adjust(
-            observations,
-            &wireframe.junctions,
-            &wireframe.edges,
-            *association,
-            &config,
-        );
-        wireframe.junctions = adjusted.junctions;
+    for reach in [6.0, 4.0, 3.0] {
+        let observed: Vec<ObservedEdge> = (0..wireframe.edges.len())
+            .map(|edge| observed_edge(observations, &wireframe, edge, reach))
+            .collect();
+        wireframe.junctions = bundle_adjust(&observed, &wireframe.junctions, loss).junctions;
     }
     wireframe
+}
+
+/// An edge with the detection in each view that lies within `reach` pixels of its line, covers
+/// much of it and has the nearest ends.
+fn observed_edge(
+    observations: &[ViewObservation],
+    wireframe: &Wireframe3d,
+    edge: usize,
+    reach: f64,
+) -> ObservedEdge {
+    let in_space = wireframe.segment(edge);
+    let of_view = |view: &ViewObservation| {
+        let projected = in_space.map(|end| view.camera.project(end).pixel);
+        let near = reach.min(0.2 * projected.length());
+        let lies_on_it = |detection: &LineSegment2| {
+            let ends = detection.ends();
+            let [from, to] = ends.map(|end| projected.line_parameter(&end).clamp(0.0, 1.0));
+            ends.iter()
+                .all(|end| projected.distance_to_line(end) < near)
+                && (to - from).abs() > 0.4
+                && detection.length() < 1.3 * projected.length()
+        };
+        let detection = (view.segments.iter())
+            .map(|detected| projected.with_nearest_order(&detected.segment))
+            .filter(lies_on_it)
+            .min_by(|a, b| {
+                let distance = |s| projected.end_distances(s).into_iter().fold(0.0, f64::max);
+                distance(a).total_cmp(&distance(b))
+            })?;
+        let distances = projected.end_distances(&detection);
+        let ends = detection.ends();
+        Some(EdgeObservation {
+            camera: view.camera,
+            detection,
+            ends: [0, 1].map(|side| (distances[side] < reach).then_some(ends[side])),
+            weight: 1.0,
+        })
+    };
+    ObservedEdge {
+        junctions: wireframe.edges[edge],
+        observations: observations.iter().filter_map(of_view).collect(),
+    }
 }
 
 /// Quantiles of χ² with three degrees of freedom at 50, 68 and 95 %.
