@@ -5,6 +5,7 @@ use crate::{duration, output};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use neat_pipeline::event::{Event, Stage};
+use neat_train::LOSS_TERMS;
 use neat_train::trainer::StepReport;
 use serde_json::{Value, json};
 use std::io::{IsTerminal, stderr};
@@ -172,15 +173,17 @@ fn bar() -> ProgressBar {
 }
 
 fn describe(report: &StepReport) -> String {
-    let losses = &report.losses;
+    // Terms that are off are 0.
+    let terms: Vec<String> = (LOSS_TERMS.iter())
+        .map(|term| (term.name, term.of(&report.losses)))
+        .filter(|(_, value)| *value != 0.0)
+        .map(|(name, value)| format!("{name} {value:.4}"))
+        .collect();
     format!(
-        "step {}, loss {:.4} (rgb {:.4}, eikonal {:.4}, segment {:.4}, junction {:.4}), ends {:.1} px off",
+        "step {}, loss {:.4} ({}), ends {:.1} px off",
         report.iteration,
-        losses.total,
-        losses.rgb,
-        losses.eikonal,
-        losses.segment,
-        losses.junction_3d,
+        report.losses.total,
+        terms.join(", "),
         report.segment_error_in_pixels,
     )
 }

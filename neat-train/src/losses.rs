@@ -113,6 +113,8 @@ pub struct Losses {
 pub struct LossTerm {
     /// Its key in `metrics.jsonl` and, for its weight, in `train.loss`.
     pub name: &'static str,
+    /// Its name for people, before the word loss.
+    pub label: &'static str,
     /// What it is, with the function that computes it.
     pub what: &'static str,
     /// Its weight in the total.
@@ -121,6 +123,14 @@ pub struct LossTerm {
     pub value: fn(&mut Losses) -> &mut f64,
     mean_over: MeanOver,
     function: fn(&TermInput<'_>) -> Option<Tensor<1>>,
+}
+
+impl LossTerm {
+    /// The term among `losses`, before weighting.
+    pub fn of(&self, losses: &Losses) -> f64 {
+        let mut losses = *losses;
+        *(self.value)(&mut losses)
+    }
 }
 
 /// What a term is a mean over: of rays and gradients, the mean over a batch is the
@@ -137,6 +147,7 @@ enum MeanOver {
 pub static LOSS_TERMS: [LossTerm; 7] = [
     LossTerm {
         name: "rgb",
+        label: "Colour",
         what: "colour of rays, mean L1: `neat_sdf::losses::rgb_loss`",
         weight: |weights| weights.rgb,
         value: |losses| &mut losses.rgb,
@@ -149,6 +160,7 @@ pub static LOSS_TERMS: [LossTerm; 7] = [
     },
     LossTerm {
         name: "eikonal",
+        label: "Eikonal",
         what: "length of the distance's gradient: `neat_sdf::losses::eikonal_loss`",
         weight: |weights| weights.eikonal,
         value: |losses| &mut losses.eikonal,
@@ -157,6 +169,7 @@ pub static LOSS_TERMS: [LossTerm; 7] = [
     },
     LossTerm {
         name: "mask",
+        label: "Silhouette",
         what: "silhouette on a black background: `neat_sdf::losses::mask_loss`",
         weight: |weights| weights.mask,
         value: |losses| &mut losses.mask,
@@ -172,6 +185,7 @@ pub static LOSS_TERMS: [LossTerm; 7] = [
     },
     LossTerm {
         name: "segment",
+        label: "Segment",
         what: "3D segments in the image: `neat_field::segment_comparison::compare_segments`",
         weight: |weights| weights.segment,
         value: |losses| &mut losses.segment,
@@ -180,6 +194,7 @@ pub static LOSS_TERMS: [LossTerm; 7] = [
     },
     LossTerm {
         name: "junction_3d",
+        label: "Junction",
         what: "matched junctions in the world: `neat_gjp::junction_loss::JunctionMatching::loss`",
         weight: |weights| weights.junction_3d,
         value: |losses| &mut losses.junction_3d,
@@ -188,6 +203,7 @@ pub static LOSS_TERMS: [LossTerm; 7] = [
     },
     LossTerm {
         name: "junction_2d",
+        label: "Junction in the image",
         what: "matched junctions in the image: `neat_gjp::junction_loss::JunctionMatching::loss`",
         weight: |weights| weights.junction_2d,
         value: |losses| &mut losses.junction_2d,
@@ -196,6 +212,7 @@ pub static LOSS_TERMS: [LossTerm; 7] = [
     },
     LossTerm {
         name: "points",
+        label: "Sparse point",
         what: "distance of sparse points: `neat_sdf::losses::point_loss`",
         weight: |weights| weights.points,
         value: |losses| &mut losses.points,

@@ -4,6 +4,7 @@ use super::session::Session;
 use crate::config::OverlayGround;
 use crate::error::PipelineError;
 use neat_report::{Curve, FactGroup, JunctionSnapshot, PhotographConfig, Report};
+use neat_train::LOSS_TERMS;
 use neat_train::step_log::{JunctionsLine, read_log};
 use neat_train::trainer::StepReport;
 use neat_wireframe::export::WireframeDocument;
@@ -121,29 +122,26 @@ impl Session<'_> {
 /// The loss terms and figures that say how the training went; terms that are
 /// always 0 are left out.
 fn curves(metrics: &[StepReport]) -> Vec<Curve> {
-    type Figure = fn(&StepReport) -> f64;
-    let figures: [(&str, Figure); 10] = [
-        ("Loss", |step| step.losses.total),
-        ("Colour loss", |step| step.losses.rgb),
-        ("Segment loss", |step| step.losses.segment),
-        ("Junction loss", |step| step.losses.junction_3d),
-        ("Silhouette loss", |step| step.losses.mask),
-        ("Eikonal loss", |step| step.losses.eikonal),
-        ("Distance from sparse points", |step| step.losses.points),
-        ("Segment error in pixels", |step| {
-            step.segment_error_in_pixels
-        }),
-        ("Matched junctions", |step| step.targets as f64),
-        ("Density scale", |step| step.beta),
-    ];
-    figures
-        .into_iter()
-        .map(|(name, figure)| Curve {
-            name: name.to_owned(),
-            points: (metrics.iter())
-                .map(|step| (step.iteration, figure(step)))
-                .collect(),
+    let curve = |name: &str, figure: &dyn Fn(&StepReport) -> f64| Curve {
+        name: name.to_owned(),
+        points: (metrics.iter())
+            .map(|step| (step.iteration, figure(step)))
+            .collect(),
+    };
+    let terms = LOSS_TERMS.iter().map(|term| {
+        curve(&format!("{} loss", term.label), &|step| {
+            term.of(&step.losses)
         })
+    });
+    std::iter::once(curve("Loss", &|step| step.losses.total))
+        .chain(terms)
+        .chain([
+            curve("Segment error in pixels", &|step| {
+                step.segment_error_in_pixels
+            }),
+            curve("Matched junctions", &|step| step.targets as f64),
+            curve("Density scale", &|step| step.beta),
+        ])
         .filter(|curve| curve.points.iter().any(|(_, value)| *value != 0.0))
         .collect()
 }
