@@ -38,18 +38,19 @@ fn edgels(image: &RgbImage, config: &DetectorConfig) -> Vec<Edgel> {
         return Vec::new();
     }
     let prepared = PreparedImage::new(image, config);
-    let gradients = gradients(&prepared, width, height);
+    let strengths = strengths(&prepared, width, height);
     let min_strength = prepared.min_gradient as f32;
     let mut found = Vec::new();
     for row in 2..height - 2 {
         for column in 2..width - 2 {
-            let (strength, normal) = gradients[row * width + column];
+            let strength = strengths[row * width + column];
             if strength < min_strength {
                 continue;
             }
+            let normal = Gradient::at(&prepared, column, row).direction();
             let at = |side: f32| {
                 let place = Vector2::new(column as f32, row as f32) + side * normal;
-                interpolated(&gradients, width, &place)
+                interpolated(&strengths, width, &place)
             };
             let (before, after) = (at(-1.0), at(1.0));
             if strength < before || strength <= after {
@@ -71,34 +72,59 @@ fn edgels(image: &RgbImage, config: &DetectorConfig) -> Vec<Edgel> {
     found
 }
 
-/// Strength, in grey levels per pixel, and direction of the fastest change of each pixel.
-fn gradients(prepared: &PreparedImage, width: usize, height: usize) -> Vec<(f32, Vector2<f32>)> {
-    let mut gradients = vec![(0.0, Vector2::x()); width * height];
-    for row in 1..height - 1 {
-        for column in 1..width - 1 {
-            let mut tensor = Matrix2::<f32>::zeros();
-            for [x, y] in prepared.smoothed.differences(column, row) {
-                tensor += Matrix2::new(x * x, x * y, x * y, y * y);
-            }
-            let tensor = tensor / 3.0;
-            let half_difference = 0.5 * (tensor[(0, 0)] - tensor[(1, 1)]);
-            let mixed = tensor[(0, 1)];
-            let root = half_difference.hypot(mixed);
-            let largest = 0.5 * tensor.trace() + root;
-            let angle = 0.5 * mixed.atan2(half_difference);
-            gradients[row * width + column] =
-                (largest.sqrt(), Vector2::new(angle.cos(), angle.sin()));
+/// How fast the colours around a pixel change: the structure tensor, as the mean of its
+/// diagonal, half of the difference there, and the other element.
+struct Gradient {
+    mean: f32,
+    half_difference: f32,
+    mixed: f32,
+}
+
+impl Gradient {
+    /// That of an inner pixel.
+    fn at(prepared: &PreparedImage, column: usize, row: usize) -> Self {
+        let mut tensor = Matrix2::<f32>::zeros();
+        for [x, y] in prepared.smoothed.differences(column, row) {
+            tensor += Matrix2::new(x * x, x * y, x * y, y * y);
+        }
+        let tensor = tensor / 3.0;
+        Self {
+            mean: 0.5 * tensor.trace(),
+            half_difference: 0.5 * (tensor[(0, 0)] - tensor[(1, 1)]),
+            mixed: tensor[(0, 1)],
         }
     }
-    gradients
+
+    /// The fastest change, in grey levels per pixel.
+    fn strength(&self) -> f32 {
+        let [x, y] = [self.half_difference, self.mixed].map(f64::from);
+        (self.mean + (x * x + y * y).sqrt() as f32).sqrt()
+    }
+
+    /// The direction of the fastest change.
+    fn direction(&self) -> Vector2<f32> {
+        let angle = 0.5 * self.mixed.atan2(self.half_difference);
+        Vector2::new(angle.cos(), angle.sin())
+    }
+}
+
+/// Strength of the gradient at each pixel; zero at the border.
+fn strengths(prepared: &PreparedImage, width: usize, height: usize) -> Vec<f32> {
+    let mut strengths = vec![0.0; width * height];
+    for row in 1..height - 1 {
+        for column in 1..width - 1 {
+            strengths[row * width + column] = Gradient::at(prepared, column, row).strength();
+        }
+    }
+    strengths
 }
 
 /// Strength between pixels, linearly.
-fn interpolated(gradients: &[(f32, Vector2<f32>)], width: usize, place: &Vector2<f32>) -> f32 {
-    let (column, row) = (place.x.floor(), place.y.floor());
-    let (u, v) = (place.x - column, place.y - row);
-    let first = row as usize * width + column as usize;
-    let at = |offset: usize| gradients[first + offset].0;
+fn interpolated(strengths: &[f32], width: usize, place: &Vector2<f32>) -> f32 {
+    let (column, row) = (place.x as usize, place.y as usize);
+    let (u, v) = (place.x - column as f32, place.y - row as f32);
+    let first = row * width + column;
+    let at = |offset: usize| strengths[first + offset];
     (1.0 - v) * ((1.0 - u) * at(0) + u * at(1)) + v * ((1.0 - u) * at(width) + u * at(width + 1))
 }
 
