@@ -113,6 +113,7 @@ impl Intrinsics {
     }
 
     /// Calibrated coordinates → image coordinates.
+    #[inline]
     pub fn decalibrate(&self, calibrated: &Vector2<f64>) -> Vector2<f64> {
         Vector2::new(
             self.fx * calibrated.x + self.skew * calibrated.y + self.cx,
@@ -289,6 +290,7 @@ impl Camera {
     }
 
     /// World point → camera frame.
+    #[inline]
     pub fn to_camera(&self, point_in_world: &Vector3<f64>) -> Vector3<f64> {
         self.world_from_camera
             .tr_mul(&(point_in_world - self.center_in_world))
@@ -296,6 +298,7 @@ impl Camera {
 
     /// World point → image. Points behind the camera project too; look at
     /// [`Projection::depth`].
+    #[inline]
     pub fn project(&self, point_in_world: &Vector3<f64>) -> Projection {
         let p = self.to_camera(point_in_world);
         let z = if p.z.abs() < DEPTH_GUARD {

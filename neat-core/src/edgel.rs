@@ -3,11 +3,15 @@
 
 use crate::LineSegment2;
 use nalgebra::Vector2;
+use std::ops::{ControlFlow, Range};
 
 /// Side of a cell of the index, in pixels: a search of a few pixels visits four at most.
 const CELL: f64 = 4.0;
 /// The index has at most this many cells along one side, whatever size an image claims.
 const MAX_CELLS: f64 = 2048.0;
+/// An edgel lies beside a point within so many pixels along the edge: edgels are about a pixel
+/// apart.
+const ALONG: f64 = 0.75;
 
 /// A point of an image edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,39 +124,74 @@ impl EdgelMap {
         min_cosine: f64,
         wanted: impl Fn(usize) -> bool,
     ) -> Option<(f64, usize)> {
-        /// Edgels are about a pixel apart along an edge.
-        const ALONG: f64 = 0.75;
-        let box_of = |axis: usize, count: usize| {
-            let half = reach * normal[axis].abs() + ALONG;
-            let cell = |x: f64| (x / self.cell).floor();
-            let (low, high) = (cell(point[axis] - half), cell(point[axis] + half));
-            // Not so for NaN.
-            (high >= 0.0 && low < count as f64)
-                .then(|| (low.max(0.0) as usize, (high as usize).min(count - 1)))
-        };
-        if self.edgels.is_empty() {
-            return None;
-        }
-        let (columns, rows) = Option::zip(box_of(0, self.columns), box_of(1, self.rows))?;
         let mut nearest: Option<(f64, usize)> = None;
-        for row in rows.0..=rows.1 {
-            let first = self.starts[row * self.columns + columns.0] as usize;
-            let last = self.starts[row * self.columns + columns.1 + 1] as usize;
+        self.visit(point, normal, reach, min_cosine, |across, index| {
+            if nearest.is_none_or(|(best, _)| across.abs() < best.abs()) && wanted(index) {
+                nearest = Some((across, index));
+            }
+            ControlFlow::Continue(())
+        });
+        nearest
+    }
+
+    /// Calls `found` with the signed distance and the index of each edgel of which
+    /// [`Self::nearest`] finds the nearest one, until it breaks.
+    #[inline]
+    pub fn visit(
+        &self,
+        point: &Vector2<f64>,
+        normal: &Vector2<f64>,
+        reach: f64,
+        min_cosine: f64,
+        mut found: impl FnMut(f64, usize) -> ControlFlow<()>,
+    ) {
+        if self.edgels.is_empty() {
+            return;
+        }
+        let [x, y] = [point.x, point.y];
+        // Half of the strip's sides along the axes of the image: its length, its width.
+        let [length_x, length_y] = [reach * normal.x.abs(), reach * normal.y.abs()];
+        let [width_x, width_y] = [ALONG * normal.y.abs(), ALONG * normal.x.abs()];
+        let whole = [x - length_x - width_x, x + length_x + width_x];
+        let [first, last] = [y - length_y - width_y, y + length_y + width_y];
+        for row in self.cells([first, last], self.rows) {
+            // A strip that passes many rows is in few columns of each.
+            let columns = if length_y > ALONG {
+                let top = row as f64 * self.cell - y;
+                let [low, high] = [top - width_y, top + self.cell + width_y]
+                    .map(|y| (y / normal.y).clamp(-reach, reach) * normal.x);
+                [x + low.min(high) - width_x, x + low.max(high) + width_x]
+            } else {
+                whole
+            };
+            let cells = self.cells(columns, self.columns);
+            let first = self.starts[row * self.columns + cells.start] as usize;
+            let last = self.starts[row * self.columns + cells.end] as usize;
             for (index, edgel) in (first..last).zip(&self.edgels[first..last]) {
                 let offset = edgel.position.cast::<f64>() - point;
                 let across = offset.dot(normal);
                 let along = (offset.x * normal.y - offset.y * normal.x).abs();
-                if across.abs() <= reach
-                    && along <= ALONG
-                    && edgel.normal.cast::<f64>().dot(normal).abs() >= min_cosine
-                    && nearest.is_none_or(|(best, _)| across.abs() < best.abs())
-                    && wanted(index)
-                {
-                    nearest = Some((across, index));
+                let cosine = edgel.normal.cast::<f64>().dot(normal).abs();
+                // One branch: which of them fails cannot be foretold.
+                let beside = (across.abs() <= reach) & (along <= ALONG);
+                if beside & (cosine >= min_cosine) && found(across, index).is_break() {
+                    return;
                 }
             }
         }
-        nearest
+    }
+
+    /// The cells between two coordinates along an axis of `count` cells. A conversion is much
+    /// quicker than rounding down, and differs only before the first cell.
+    #[inline(always)]
+    fn cells(&self, [low, high]: [f64; 2], count: usize) -> Range<usize> {
+        let cell = |x: f64| ((x / self.cell) as usize).min(count);
+        // Not so for NaN.
+        if high >= 0.0 && low <= high {
+            cell(low)..(cell(high) + 1).min(count)
+        } else {
+            0..0
+        }
     }
 }
 
@@ -197,8 +236,19 @@ mod tests {
     #[test]
     fn every_place_finds_what_all_edgels_together_tell() {
         let map = map();
-        let normal = Vector2::new(0.8, 0.6);
-        for step in 0..2000_u32 {
+        // Oblique, along the rows and along the columns; within few cells and across many.
+        let strips = [
+            ([0.8, 0.6], 3.0),
+            ([0.6, -0.8], 12.5),
+            ([-0.96, 0.28], 12.5),
+            ([1.0, 0.0], 12.5),
+            ([0.0, -1.0], 12.5),
+        ];
+        let steps = strips
+            .iter()
+            .flat_map(|strip| (0..2000_u32).map(move |step| (strip, step)));
+        for (&(normal, reach), step) in steps {
+            let normal = Vector2::from(normal);
             let point = Vector2::new(
                 f64::from(step * 37 % 700) / 10.0 - 3.0,
                 f64::from(step * 53 % 540) / 10.0 - 3.0,
@@ -211,10 +261,10 @@ mod tests {
             };
             let expected = (0..map.len())
                 .filter_map(|i| beside(map.get(i)))
-                .filter(|d| *d <= 3.0)
+                .filter(|d| *d <= reach)
                 .reduce(f64::min);
             let found = map
-                .nearest(&point, &normal, 3.0, 0.5, |_| true)
+                .nearest(&point, &normal, reach, 0.5, |_| true)
                 .map(|(d, _)| d.abs());
             assert_eq!(found, expected);
         }
