@@ -5,6 +5,7 @@ use crate::projection::project_in_front;
 use crate::statistics::upper_median;
 use nalgebra::Vector2;
 use neat_core::{EdgelMap, LineSegment2, LineSegment3};
+use std::ops::ControlFlow;
 
 /// Edgels of a line have at most this angle to its normal (cosine): about 20°, judged.
 const MIN_COSINE: f64 = 0.93;
@@ -61,13 +62,12 @@ impl Images<'_> {
         let (length, normal) = across(&project_segment(&self.views[view], &part)?)?;
         let count =
             count.unwrap_or_else(|| ((length / SPACING) as usize).clamp(COUNTS[0], COUNTS[1]));
-        let points: Vec<(f64, Vector2<f64>)> = (0..count)
-            .filter_map(|i| {
-                let place = low + (high - low) * ((i as f64 + 0.5) / count as f64);
-                let pixel = project_in_front(camera, &line.point_at(place))?;
-                self.is_inside(view, &pixel).then_some((place, pixel))
-            })
-            .collect();
+        let mut points = Vec::with_capacity(count);
+        points.extend((0..count).filter_map(|i| {
+            let place = low + (high - low) * ((i as f64 + 0.5) / count as f64);
+            let pixel = project_in_front(camera, &line.point_at(place))?;
+            self.is_inside(view, &pixel).then_some((place, pixel))
+        }));
         let enough = points.len() >= COUNTS[0] && points.len() as f64 >= MIN_INSIDE * count as f64;
         enough.then_some(EdgeSamples { points, normal })
     }
@@ -94,23 +94,53 @@ impl Images<'_> {
             .map(|(_, index)| index)
     }
 
-    /// The share of the samples, moved by `shift` pixels across the line, that have an
-    /// edgel; edgels that are `taken` by another line do not count.
-    pub(super) fn share(
+    /// Whether an edgel lies beside a line at `pixel`; those that are `taken` by another line
+    /// do not count.
+    pub(super) fn has_edgel(
+        &self,
+        view: usize,
+        pixel: &Vector2<f64>,
+        normal: &Vector2<f64>,
+        taken: Option<&[Vec<bool>]>,
+    ) -> bool {
+        let mut found = false;
+        self.maps[view].visit(pixel, normal, self.reach, MIN_COSINE, |_, index| {
+            found = taken.is_none_or(|taken| !taken[view][index]);
+            if found {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        found
+    }
+
+    /// The shares of the samples, moved by each of some `shifts` in pixels across the line, that
+    /// have an edgel: one search for all of them.
+    pub(super) fn shares<const N: usize>(
         &self,
         view: usize,
         samples: &EdgeSamples,
-        shift: f64,
-        taken: Option<&[Vec<bool>]>,
-    ) -> f64 {
-        let offset = samples.normal * shift;
-        let is_free = |index: usize| taken.is_none_or(|taken| !taken[view][index]);
-        let hits = samples.points.iter().filter(|(_, pixel)| {
-            let place = pixel + offset;
-            let normal = &samples.normal;
-            (self.maps[view].nearest(&place, normal, self.reach, MIN_COSINE, is_free)).is_some()
-        });
-        hits.count() as f64 / samples.points.len() as f64
+        shifts: &[f64; N],
+    ) -> [f64; N] {
+        let farthest = shifts
+            .iter()
+            .fold(0.0, |far: f64, shift| far.max(shift.abs()));
+        let reach = farthest + self.reach;
+        let mut hits = [0; N];
+        for (_, pixel) in &samples.points {
+            let mut found = [false; N];
+            self.maps[view].visit(pixel, &samples.normal, reach, MIN_COSINE, |across, _| {
+                for (found, shift) in found.iter_mut().zip(shifts) {
+                    *found |= (across - shift).abs() <= self.reach;
+                }
+                ControlFlow::Continue(())
+            });
+            for (hits, found) in hits.iter_mut().zip(found) {
+                *hits += u32::from(found);
+            }
+        }
+        hits.map(|hits| f64::from(hits) / samples.points.len() as f64)
     }
 
     /// Positions of the edgels within `reach` pixels beside a line in a view, in order.

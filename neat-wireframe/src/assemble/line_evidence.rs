@@ -10,6 +10,7 @@
 use super::edge_samples::{EdgeSamples, Images};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
+use rayon::prelude::*;
 
 /// Two views show a line wherever they want.
 const FREE_VIEWS: usize = 2;
@@ -35,6 +36,8 @@ const HIDDEN_ELSEWHERE: f64 = 0.97;
 /// Views under at most this angle are beside each other, in degrees: 10, 15 and 20 differ by
 /// less than a point of F1 there.
 const BESIDE: f64 = 15.0;
+/// Fewer views are not worth another thread: one takes some microseconds.
+const MIN_VIEWS_OF_TASK: usize = 8;
 /// Bounds of the probability that an edgel lies beside a sample by chance.
 const CHANCE_OF_EDGEL: [f64; 2] = [0.02, 0.8];
 
@@ -96,6 +99,22 @@ fn most_of_view(state: State) -> f64 {
     gain_of_state(state, [shown, partly, not + DECOYS.len() as f64])
 }
 
+/// What one view does with a line, before decoys are asked.
+struct ViewOfLine {
+    view: usize,
+    state: State,
+    samples: EdgeSamples,
+    /// The most that it can say, and what it says if it does not show the line.
+    most: f64,
+}
+
+/// The most that all views can say, where `free` of those that show a line do not count.
+fn most_of_views(views: &[ViewOfLine], free: usize) -> f64 {
+    let shown = views.iter().filter(|of| of.state == State::Shown).count();
+    let of_free = shown.min(free) as f64 * most_of_view(State::Shown);
+    views.iter().map(|of| of.most).sum::<f64>() - of_free
+}
+
 impl Images<'_> {
     /// What all views say about a line; edgels that are `taken` do not count for it. Where it
     /// cannot be more than `least`, it is as good as nothing.
@@ -113,62 +132,32 @@ impl Images<'_> {
     pub(super) fn evidence_of(
         &self,
         line: &LineSegment3,
-        in_view: impl Fn(usize) -> Option<LineSegment3>,
+        in_view: impl Fn(usize) -> Option<LineSegment3> + Sync,
         taken: Option<&[Vec<bool>]>,
         least: f64,
         free: usize,
     ) -> LineEvidence {
-        let states: Vec<(usize, State, EdgeSamples)> = (0..self.views.len())
-            .filter(|view| !self.maps[*view].is_empty())
-            .filter_map(|view| {
-                let samples = self.samples(view, &in_view(view)?, [ENDS, 1.0 - ENDS], None)?;
-                let state = State::of(self.share(view, &samples, 0.0, taken));
-                Some((view, state, samples))
-            })
-            .collect();
-        let middle = line.point_at(0.5);
-        let toward = |view: usize| -> Vector3<f64> {
-            (self.views[view].camera.center_in_world - middle).normalize()
-        };
-        let shown: Vec<Vector3<f64>> = (states.iter())
-            .filter(|(_, state, _)| *state == State::Shown)
-            .map(|(view, ..)| toward(*view))
-            .collect();
+        let views = self.views_of(line, in_view, taken);
         let mut evidence = LineEvidence {
             gain: f64::NEG_INFINITY,
             showing: Vec::new(),
         };
-        // The most that views can say: most lines that are none end here.
-        let partly = (states.iter())
-            .filter(|(_, state, _)| *state == State::PartlyShown)
-            .count();
-        let most = shown.len().saturating_sub(free) as f64 * most_of_view(State::Shown)
-            + partly as f64 * most_of_view(State::PartlyShown);
-        if most <= least {
+        // Most lines that are none end here.
+        if most_of_views(&views, free) <= least {
             return evidence;
         }
-        let min_cosine = BESIDE.to_radians().cos();
         let mut gain = 0.0;
         let mut of_showing = Vec::new();
-        for (view, state, samples) in &states {
-            if *state == State::NotShown {
-                let here = toward(*view);
-                let beside = shown.iter().any(|there| there.dot(&here) > min_cosine);
-                let hidden = if beside {
-                    HIDDEN_BESIDE
-                } else {
-                    HIDDEN_ELSEWHERE
-                };
-                let [.., by_chance] = PRIOR_DECOYS;
-                let by_chance = by_chance / PRIOR_DECOYS.iter().sum::<f64>();
-                gain += (hidden + (1.0 - hidden) * OF_VISIBLE[2] / by_chance).ln();
+        for of_line in &views {
+            if of_line.state == State::NotShown {
+                gain += of_line.most;
                 continue;
             }
-            let (of_view, chance) = self.gain_of_view(*view, *state, samples);
+            let (of_view, chance) = self.gain_of_view(of_line);
             gain += of_view;
-            if *state == State::Shown {
+            if of_line.state == State::Shown {
                 evidence.showing.push(Showing {
-                    view: *view,
+                    view: of_line.view,
                     chance,
                 });
                 of_showing.push(of_view);
@@ -179,17 +168,82 @@ impl Images<'_> {
         evidence
     }
 
+    /// What the evidence of a line cannot exceed, for a small part of its price.
+    pub(super) fn most_evidence(&self, line: &LineSegment3) -> f64 {
+        most_of_views(&self.views_of(line, |_| Some(*line), None), FREE_VIEWS)
+    }
+
+    /// What each view does with a line.
+    fn views_of(
+        &self,
+        line: &LineSegment3,
+        in_view: impl Fn(usize) -> Option<LineSegment3> + Sync,
+        taken: Option<&[Vec<bool>]>,
+    ) -> Vec<ViewOfLine> {
+        let mut views: Vec<ViewOfLine> = (0..self.views.len())
+            .into_par_iter()
+            .with_min_len(MIN_VIEWS_OF_TASK)
+            .filter(|view| !self.maps[*view].is_empty())
+            .filter_map(|view| {
+                let samples = self.samples(view, &in_view(view)?, [ENDS, 1.0 - ENDS], None)?;
+                let state = self.state(view, &samples, taken);
+                Some(ViewOfLine {
+                    view,
+                    state,
+                    samples,
+                    most: most_of_view(state),
+                })
+            })
+            .collect();
+        let middle = line.point_at(0.5);
+        let toward = |view: usize| -> Vector3<f64> {
+            (self.views[view].camera.center_in_world - middle).normalize()
+        };
+        let shown: Vec<Vector3<f64>> = (views.iter())
+            .filter(|of| of.state == State::Shown)
+            .map(|of| toward(of.view))
+            .collect();
+        let min_cosine = BESIDE.to_radians().cos();
+        for of_line in views.iter_mut().filter(|of| of.state == State::NotShown) {
+            let here = toward(of_line.view);
+            let beside = shown.iter().any(|there| there.dot(&here) > min_cosine);
+            let hidden = if beside {
+                HIDDEN_BESIDE
+            } else {
+                HIDDEN_ELSEWHERE
+            };
+            let [.., by_chance] = PRIOR_DECOYS;
+            let by_chance = by_chance / PRIOR_DECOYS.iter().sum::<f64>();
+            of_line.most = (hidden + (1.0 - hidden) * OF_VISIBLE[2] / by_chance).ln();
+        }
+        views
+    }
+
+    /// What a view does with a line; its samples are asked until that is sure.
+    fn state(&self, view: usize, samples: &EdgeSamples, taken: Option<&[Vec<bool>]>) -> State {
+        let count = samples.points.len();
+        let of = |hits: usize| State::of(hits as f64 / count as f64);
+        let mut hits = 0;
+        for (k, (_, pixel)) in samples.points.iter().enumerate() {
+            hits += usize::from(self.has_edgel(view, pixel, &samples.normal, taken));
+            let left = count - k - 1;
+            if of(hits) == of(hits + left) {
+                break;
+            }
+        }
+        of(hits)
+    }
+
     /// What a view that shows at least parts says, and how likely an edgel lies beside a
     /// sample by chance.
-    fn gain_of_view(&self, view: usize, state: State, samples: &EdgeSamples) -> (f64, f64) {
+    fn gain_of_view(&self, of_line: &ViewOfLine) -> (f64, f64) {
         let mut decoys = PRIOR_DECOYS;
         let mut edgels = 0.0;
-        for shift in DECOYS {
-            let share = self.share(view, samples, shift, None);
+        for share in self.shares(of_line.view, &of_line.samples, &DECOYS) {
             edgels += share;
             decoys[State::of(share) as usize] += 1.0;
         }
-        let gain = gain_of_state(state, decoys);
+        let gain = gain_of_state(of_line.state, decoys);
         let chance = edgels / DECOYS.len() as f64;
         (gain, chance.clamp(CHANCE_OF_EDGEL[0], CHANCE_OF_EDGEL[1]))
     }

@@ -1,6 +1,7 @@
 //! Lines chosen one after the other, the best explained first, each by edgels that no line
 //! before it has.
 
+use super::candidate_queue::CandidateQueue;
 use super::config::AssembleConfig;
 use super::edge_samples::{Images, project_segment};
 use super::hypothesis_scoring::Alternatives;
@@ -10,7 +11,8 @@ use super::view_segments::SegmentId;
 use crate::statistics::{SIGMA_BY_MEDIAN, upper_median};
 use neat_core::{LineSegment2, LineSegment3};
 use rayon::prelude::*;
-use std::collections::BinaryHeap;
+use std::iter;
+use std::ops::ControlFlow;
 
 /// An edgel may be off by so many standard deviations of edgels: 99.7 % are not.
 const REACH_NOISES: f64 = 3.0;
@@ -134,26 +136,21 @@ fn noise_of_edgels(images: &Images, lines: &[ChosenLine]) -> f64 {
     }
 }
 
-/// A candidate by its evidence; the first of equals is the larger.
-struct Ranked(f64, usize);
-
-impl PartialEq for Ranked {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
+/// What a line that the images show stands for.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Straight,
+    Curve,
+    Outline,
 }
 
-impl Eq for Ranked {}
-
-impl PartialOrd for Ranked {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Ranked {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        (self.0.total_cmp(&other.0)).then(other.1.cmp(&self.1))
+fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
+    if images.is_curved(&found.line, &found.evidence, noise) {
+        Kind::Curve
+    } else if images.is_outline(&found.line, &found.evidence) {
+        Kind::Outline
+    } else {
+        Kind::Straight
     }
 }
 
@@ -164,50 +161,34 @@ fn choose<'a>(
     most: usize,
     noise: f64,
 ) -> Selection<'a> {
-    let gains: Vec<f64> = candidates
-        .par_iter()
-        .map(|candidate| images.evidence(&candidate.line, None, min_evidence).gain)
-        .collect();
-    let mut queue: BinaryHeap<Ranked> = (gains.iter().enumerate())
-        .filter(|(_, gain)| **gain > min_evidence)
-        .map(|(index, gain)| Ranked(*gain, index))
+    let bounds: Vec<f64> = (candidates.par_iter())
+        .map(|candidate| images.most_evidence(&candidate.line))
         .collect();
     let mut chooser = Chooser {
         images,
         min_evidence,
+        candidates,
+        queue: CandidateQueue::new(&bounds, min_evidence),
         taken: images.nothing_taken(),
         explained: (images.views.iter())
             .map(|view| vec![false; view.segments.len()])
             .collect(),
     };
     let (mut lines, mut curved, mut outlines) = (Vec::new(), 0, 0);
-    while let Some(Ranked(gain, index)) = queue.pop() {
-        let Candidate { segment, line } = &candidates[index];
-        if lines.len() >= most {
+    loop {
+        // A line takes its edgels whatever it stands for: that is asked of many at once.
+        let room = most - lines.len();
+        let found: Vec<ChosenLine> = iter::from_fn(|| chooser.next()).take(room).collect();
+        if found.is_empty() {
             break;
         }
-        if chooser.explained[segment.view][segment.segment] {
-            continue;
-        }
-        let evidence = images.evidence(line, Some(&chooser.taken), min_evidence);
-        if evidence.gain <= min_evidence {
-            continue;
-        }
-        if evidence.gain < gain - STALE {
-            queue.push(Ranked(evidence.gain, index));
-            continue;
-        }
-        let Some(found) = chooser.settle(line, evidence) else {
-            continue;
-        };
-        chooser.claim(&found, *segment);
-        if images.is_curved(&found.line, &found.evidence, noise) {
-            curved += 1;
-        } else if images.is_outline(&found.line, &found.evidence) {
-            outlines += 1;
-        } else {
-            lines.push(found);
-        }
+        let kinds: Vec<Kind> = (found.par_iter())
+            .map(|line| kind(&images, line, noise))
+            .collect();
+        curved += kinds.iter().filter(|kind| **kind == Kind::Curve).count();
+        outlines += kinds.iter().filter(|kind| **kind == Kind::Outline).count();
+        let of_kinds = found.into_iter().zip(kinds);
+        lines.extend(of_kinds.filter_map(|(line, kind)| (kind == Kind::Straight).then_some(line)));
     }
     Selection {
         images,
@@ -222,6 +203,8 @@ fn choose<'a>(
 struct Chooser<'a> {
     images: Images<'a>,
     min_evidence: f64,
+    candidates: &'a [Candidate],
+    queue: CandidateQueue,
     /// For each edgel of each view, whether a line has it.
     taken: Vec<Vec<bool>>,
     /// For each 2D segment of each view, whether it lies on a line.
@@ -229,6 +212,32 @@ struct Chooser<'a> {
 }
 
 impl Chooser<'_> {
+    /// The line that the images speak for most, of those that are left; it takes its edgels.
+    fn next(&mut self) -> Option<ChosenLine> {
+        loop {
+            let is_open = |index: usize| {
+                let SegmentId { view, segment } = self.candidates[index].segment;
+                !self.explained[view][segment]
+            };
+            let weigh = |index: usize| {
+                let line = &self.candidates[index].line;
+                (self.images.evidence(line, None, self.min_evidence)).gain
+            };
+            let (gain, index) = self.queue.pop(is_open, weigh)?;
+            let Candidate { segment, line } = &self.candidates[index];
+            let evidence = (self.images).evidence(line, Some(&self.taken), self.min_evidence);
+            if evidence.gain <= self.min_evidence {
+                continue;
+            }
+            if evidence.gain < gain - STALE {
+                self.queue.push(evidence.gain, index);
+            } else if let Some(found) = self.settle(line, evidence) {
+                self.claim(&found, *segment);
+                return Some(found);
+            }
+        }
+    }
+
     /// The line through the edgels beside a candidate, as far as they reach; `None` if too
     /// little speaks for it.
     fn settle(&self, line: &LineSegment3, mut evidence: LineEvidence) -> Option<ChosenLine> {
@@ -269,29 +278,27 @@ impl Chooser<'_> {
 /// Takes the edgels beside a line, in all views: where something hides the middle of an edge,
 /// its ends are still its own.
 pub(super) fn claim_edgels(images: &Images, line: &LineSegment3, taken: &mut [Vec<bool>]) {
-    for (view, prepared) in images.views.iter().enumerate() {
-        let Some(projected) = project_segment(prepared, line) else {
-            continue;
-        };
-        let count = (CLAIM_DENSITY * projected.length())
-            .ceil()
-            .clamp(8.0, 4000.0);
-        let Some(samples) = images.samples(view, line, [0.0, 1.0], Some(count as usize)) else {
-            continue;
-        };
-        let (map, taken) = (&images.maps[view], &mut taken[view]);
-        for (_, pixel) in &samples.points {
-            while let Some((_, edgel)) = map.nearest(
-                pixel,
-                &samples.normal,
-                images.reach,
-                CLAIM_COSINE,
-                |edgel| !taken[edgel],
-            ) {
-                taken[edgel] = true;
+    let views = images.views.par_iter().zip(images.maps).zip(taken);
+    views
+        .enumerate()
+        .for_each(|(view, ((prepared, map), taken))| {
+            let Some(projected) = project_segment(prepared, line) else {
+                return;
+            };
+            let count = (CLAIM_DENSITY * projected.length())
+                .ceil()
+                .clamp(8.0, 4000.0);
+            let Some(samples) = images.samples(view, line, [0.0, 1.0], Some(count as usize)) else {
+                return;
+            };
+            for (_, pixel) in &samples.points {
+                let normal = &samples.normal;
+                map.visit(pixel, normal, images.reach, CLAIM_COSINE, |_, edgel| {
+                    taken[edgel] = true;
+                    ControlFlow::Continue(())
+                });
             }
-        }
-    }
+        });
 }
 
 /// Whether a 2D segment lies on another, for the most part of its length.
@@ -319,6 +326,8 @@ mod tests {
             let chooser = Chooser {
                 images,
                 min_evidence: 0.0,
+                candidates: &[],
+                queue: CandidateQueue::new(&[], 0.0),
                 taken,
                 explained: Vec::new(),
             };

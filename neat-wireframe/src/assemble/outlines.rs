@@ -170,11 +170,15 @@ impl Images<'_> {
         let Some((projected, normal, samples)) = prepared else {
             return Vec::new();
         };
-        let edgels: Vec<usize> = (samples.points.iter())
-            .filter_map(|(_, pixel)| self.edgel(view, pixel, &samples.normal, reach))
-            .collect();
-        if (edgels.len() as f64) < FOUND * samples.points.len() as f64 {
-            return Vec::new();
+        let count = samples.points.len();
+        let mut edgels = Vec::with_capacity(count);
+        for (k, (_, pixel)) in samples.points.iter().enumerate() {
+            edgels.extend(self.edgel(view, pixel, &samples.normal, reach));
+            // Most tubes are none: this is soon known.
+            let most = edgels.len() + (count - k - 1);
+            if (most as f64) < FOUND * count as f64 {
+                return Vec::new();
+            }
         }
         let row = |edgel: usize| {
             let position = self.maps[view].get(edgel).position.cast();
