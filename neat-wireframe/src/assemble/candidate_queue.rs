@@ -1,12 +1,12 @@
-//! Candidates by what speaks for them, where a bound costs much less than the exact evidence:
-//! most are explained by others before their turn comes, and are never weighed.
+//! Candidates by what speaks for them, where a bound costs less than the exact evidence: those
+//! that others explain before their turn comes are never weighed.
 
 use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// So many candidates are weighed at once: enough for the threads of a machine, few beside all
-/// that there are.
+/// So many candidates are weighed at once, judged: enough for the threads of a machine, few
+/// beside all that there are.
 const BATCH: usize = 64;
 /// Sums in another order differ by less, relative to one nat or to the sum.
 const ROUNDING: f64 = 1e-9;

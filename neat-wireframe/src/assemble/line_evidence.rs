@@ -36,7 +36,7 @@ const HIDDEN_ELSEWHERE: f64 = 0.97;
 /// Views under at most this angle are beside each other, in degrees: 10, 15 and 20 differ by
 /// less than a point of F1 there.
 const BESIDE: f64 = 15.0;
-/// Fewer views are not worth another thread: one takes some microseconds.
+/// Fewer views are not worth another thread, judged.
 const MIN_VIEWS_OF_TASK: usize = 8;
 /// Bounds of the probability that an edgel lies beside a sample by chance.
 const CHANCE_OF_EDGEL: [f64; 2] = [0.02, 0.8];
@@ -168,7 +168,7 @@ impl Images<'_> {
         evidence
     }
 
-    /// What the evidence of a line cannot exceed, for a small part of its price.
+    /// What the evidence of a line cannot exceed, for a part of its price.
     pub(super) fn most_evidence(&self, line: &LineSegment3) -> f64 {
         most_of_views(&self.views_of(line, |_| Some(*line), None), FREE_VIEWS)
     }
