@@ -7,7 +7,7 @@
 //! | build one as the paper does, from what a field renders | [`paper`] |
 //! | move the junctions of a graph until its edges lie on detections | [`bundle_adjustment`] |
 //! | learn how sure each junction and edge is, and which 2D segments say so | [`confidence`] |
-//! | find chains of edges that stand for a curve | [`curved_rims`] |
+//! | tell creases from paint and shadows, pieces of curves, and corners from ends | [`kinds`] |
 //! | measure a wireframe, with and without ground truth | [`metrics`] |
 //! | write and read one | [`export`], [`validity`] |
 //!
@@ -31,8 +31,8 @@
 pub mod assemble;
 pub mod bundle_adjustment;
 pub mod confidence;
-pub mod curved_rims;
 pub mod export;
+pub mod kinds;
 pub mod metrics;
 pub mod paper;
 pub mod projection;

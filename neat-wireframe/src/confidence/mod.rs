@@ -102,6 +102,17 @@ pub struct EdgeConfidence {
     pub probability: f64,
 }
 
+/// For every edge the views that show it, ascending.
+pub(crate) fn showing_views(
+    wireframe: &Wireframe3d,
+    observations: &[ViewObservation],
+) -> Vec<Vec<usize>> {
+    let views: Vec<Option<IndexedView>> = observations.par_iter().map(IndexedView::new).collect();
+    let rules = ConfidenceConfig::default().provenance();
+    let found = provenance(&views, &wireframe.segments(), &rules);
+    found.into_iter().map(|edge| edge.showing_views).collect()
+}
+
 /// Asks the images, and the surface if there is one, about a wireframe.
 ///
 /// - `wireframe`: in the world of the cameras, with junctions and edges in any

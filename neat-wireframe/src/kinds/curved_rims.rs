@@ -30,7 +30,7 @@ const MIN_TURNS: usize = 3;
 /// ```
 /// use nalgebra::Vector3;
 /// use neat_wireframe::Wireframe3d;
-/// use neat_wireframe::curved_rims::curved_chains;
+/// use neat_wireframe::kinds::curved_chains;
 ///
 /// let angle = |i: usize| std::f64::consts::TAU * i as f64 / 16.0;
 /// let circle = Wireframe3d {

@@ -1,0 +1,87 @@
+//! What an edge is: a crease of the surface, its boundary, paint on it, or light.
+//!
+//! Images show painted lines, joints of planks and shadows as clearly as they show creases,
+//! and a wireframe holds them all. Four witnesses tell them apart: whether the two sides lie
+//! in one plane that looks the same from all views (`coplanarity.rs`), whether the edge is a
+//! dark line rather than a step and whether its sides differ in colour (`side_colours.rs`),
+//! and whether the edges around it leave its plane (`junctions.rs`). `model.rs` weighs them.
+//! Without any, an edge is most likely a crease: an image without texture cannot say that
+//! two faces are one.
+//!
+//! How the structure is divided into creases and boundaries, and the rest into texture and
+//! shadows, follows rules that no truth has calibrated.
+
+mod coplanarity;
+mod curved_rims;
+mod edge_frame;
+mod edge_samples;
+mod junctions;
+mod model;
+mod side_colours;
+
+#[cfg(test)]
+mod tests;
+
+pub use curved_rims::curved_chains;
+pub use junctions::{JunctionType, junction_types};
+pub use model::{EdgeKind, EdgeKinds};
+
+use crate::ViewObservation;
+use crate::confidence::showing_views;
+use coplanarity::coplanarity;
+use edge_frame::EdgeFrame;
+use edge_samples::edge_samples;
+use junctions::leaves_plane;
+use model::Witnesses;
+use nalgebra::Vector3;
+use neat_core::{Camera, Scene, SceneError, Wireframe3d};
+use rayon::prelude::*;
+use side_colours::SideColours;
+
+/// The probabilities of the kinds of every edge.
+///
+/// - `wireframe`: valid, in the world of the cameras, with edges cut where others meet them.
+/// - `scene`: images and cameras; one image at a time is in memory.
+/// - `observations`: of the same views: their 2D segments say which of them show an edge.
+///
+/// The result does not depend on the number of threads.
+///
+/// # Errors
+/// If an image cannot be read.
+pub fn edge_kinds(
+    wireframe: &Wireframe3d,
+    scene: &Scene,
+    observations: &[ViewObservation],
+) -> Result<Vec<EdgeKinds>, SceneError> {
+    let _span = tracing::debug_span!("edge_kinds", edges = wireframe.edges.len()).entered();
+    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
+    let shown = showing_views(wireframe, observations);
+    let segments = wireframe.segments();
+    let frames: Vec<Option<EdgeFrame>> = (segments.par_iter().zip(&shown))
+        .map(|(segment, views)| EdgeFrame::new(*segment, views, &cameras))
+        .collect();
+    let samples = edge_samples(&frames, scene)?;
+    let directions: Vec<Option<Vector3<f64>>> = (segments.iter())
+        .map(|segment| (segment.end - segment.start).try_normalize(0.0))
+        .collect();
+    let leaving = leaves_plane(wireframe, &directions);
+    let of_edge = |index: usize| {
+        let mut witnesses = Witnesses {
+            leaves_plane: leaving[index],
+            ..Witnesses::default()
+        };
+        if let Some(frame) = &frames[index] {
+            let colours = SideColours::new(&samples[index]);
+            witnesses.chroma = colours.chroma;
+            witnesses.step = colours.step;
+            witnesses.instability = colours.instability;
+            // An edge that is seen all around lies within no plane.
+            if frame.common_planes().next().is_some() {
+                witnesses.coplanarity = coplanarity(frame, &samples[index]);
+                witnesses.darkness = colours.darkness;
+            }
+        }
+        witnesses.kinds()
+    };
+    Ok((0..segments.len()).into_par_iter().map(of_edge).collect())
+}

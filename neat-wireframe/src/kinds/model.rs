@@ -1,0 +1,119 @@
+//! From witnesses to probabilities.
+//!
+//! The log-odds that an edge is structure are a sum: the prior, and what each witness adds.
+//! A witness that knows nothing is 0 and adds nothing. The weights are those of a logistic
+//! regression whose signs are given, each edge counted by its length, on the edges of three
+//! rendered scenes with exact truth (a house, a façade, parts on a table). Edges that lie on
+//! no surface were left out: no kind is true of them. With one scene left out they are 0.8
+//! to 1, 1 to 1.4, −1.8 to −2.8 and −3.1 to −4.2, in the order below.
+
+/// Of the edges that are found in photographs of buildings five in six are structure.
+const PRIOR: f64 = 1.609;
+/// Neighbours that leave the plane of the edge.
+const LEAVES_PLANE: f64 = 0.9;
+/// Sides of two colours: two materials, mostly two faces.
+const CHROMA: f64 = 1.5;
+/// One plane on both sides.
+const COPLANARITY: f64 = -2.2;
+/// A joint, or a line that is drawn, is darker than both its sides; a crease is a step, and
+/// often catches light.
+const DARKNESS: f64 = -3.9;
+
+/// Logarithm of the ratio of colours at which a difference is clear: ten percent.
+const CLEAR_CHROMA: f64 = 0.1;
+/// Logarithm of the ratio at which darkness says all it can: a third darker.
+const CLEAR_DARKNESS: f64 = 0.4;
+/// Added to brightnesses before they are compared: less is noise.
+const FAINT: f64 = 0.03;
+
+/// What is known about an edge; all zero where nothing is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Witnesses {
+    /// 0 to 1, see `leaves_plane`.
+    pub leaves_plane: f64,
+    /// 0 to 1, see `coplanarity`.
+    pub coplanarity: f64,
+    /// The others as in `SideColours`.
+    pub chroma: f64,
+    pub step: f64,
+    pub darkness: f64,
+    pub instability: f64,
+}
+
+/// What an edge can be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EdgeKind {
+    /// Two faces meet.
+    Crease,
+    /// A surface ends before what lies behind it, or turns away.
+    Boundary,
+    /// Paint, a joint, a change of material within a face.
+    Texture,
+    /// The border of a shadow, or a reflection.
+    Shadow,
+}
+
+/// The probabilities of the kinds of an edge; their sum is 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeKinds {
+    /// Of [`EdgeKind::Crease`].
+    pub crease: f64,
+    /// Of [`EdgeKind::Boundary`].
+    pub boundary: f64,
+    /// Of [`EdgeKind::Texture`].
+    pub texture: f64,
+    /// Of [`EdgeKind::Shadow`].
+    pub shadow: f64,
+}
+
+impl EdgeKinds {
+    /// Probability that the edge belongs to the shape of things: a crease or a boundary.
+    pub fn structure(&self) -> f64 {
+        self.crease + self.boundary
+    }
+
+    /// The most likely kind and its probability; of structure, if that is more likely than
+    /// not, else of the rest.
+    pub fn most_likely(&self) -> (EdgeKind, f64) {
+        let pair = if self.structure() >= 0.5 {
+            [
+                (EdgeKind::Crease, self.crease),
+                (EdgeKind::Boundary, self.boundary),
+            ]
+        } else {
+            [
+                (EdgeKind::Texture, self.texture),
+                (EdgeKind::Shadow, self.shadow),
+            ]
+        };
+        if pair[1].1 > pair[0].1 {
+            pair[1]
+        } else {
+            pair[0]
+        }
+    }
+}
+
+impl Witnesses {
+    pub(super) fn kinds(&self) -> EdgeKinds {
+        let clear = |difference: f64| 1.0 - (-difference / CLEAR_CHROMA).exp();
+        let chroma = clear(self.chroma);
+        let log_odds = PRIOR
+            + LEAVES_PLANE * self.leaves_plane
+            + CHROMA * chroma
+            + COPLANARITY * self.coplanarity
+            + DARKNESS * (self.darkness / CLEAR_DARKNESS).clamp(0.0, 1.0);
+        let structure = (1.0 + (-log_odds).exp()).recip();
+        // One side that changes its colours from view to view is background.
+        let boundary = clear(self.instability);
+        // A shadow is a step within one material, paint a line or another colour.
+        let step = (self.step + FAINT) / (self.step + self.darkness.abs() + 2.0 * FAINT);
+        let shadow = step * (1.0 - chroma);
+        EdgeKinds {
+            crease: structure * (1.0 - boundary),
+            boundary: structure * boundary,
+            texture: (1.0 - structure) * (1.0 - shadow),
+            shadow: (1.0 - structure) * shadow,
+        }
+    }
+}

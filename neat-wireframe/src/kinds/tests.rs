@@ -1,0 +1,170 @@
+//! Rendered edges whose kinds are known.
+
+use super::*;
+use crate::test_scenes::{camera_looking_at_origin, views_of_edges};
+use nalgebra::Vector2;
+use neat_core::synthetic::{Solid, render};
+use neat_core::{Ray, Similarity, View, Wireframe2d};
+use std::f64::consts::TAU;
+
+/// Twelve cameras at 15° and 30° from the z axis.
+fn cameras() -> Vec<Camera> {
+    let center = |i: usize| {
+        let tilt = [15_f64, 30.0][i % 2].to_radians();
+        let (sin, cos) = (TAU * i as f64 / 12.0).sin_cos();
+        2.5 * Vector3::new(tilt.sin() * cos, tilt.sin() * sin, tilt.cos())
+    };
+    (0..12)
+        .map(|i| camera_looking_at_origin(&center(i)))
+        .collect()
+}
+
+/// Smooth noise from 0 to 1 on a surface; its grains are five pixels wide.
+fn grain(x: f64, y: f64) -> f64 {
+    let (x, y) = (x / 0.02 + 1e4, y / 0.02 + 1e4);
+    let at = |i: f64, j: f64| {
+        let seed = (x.floor() + i) * 12.9898 + (y.floor() + j) * 78.233;
+        (seed.sin() * 43_758.547).rem_euclid(1.0)
+    };
+    let row = |j: f64| at(0.0, j) * (1.0 - x.fract()) + at(1.0, j) * x.fract();
+    row(0.0) * (1.0 - y.fract()) + row(1.0) * y.fract()
+}
+
+/// The surface z = −slope·|y|, seen by all cameras; `brightness` is that of a point.
+fn scene_of(slope: f64, brightness: impl Fn(f64, f64) -> f64) -> Scene {
+    let height = |ray: &Ray, side: f64| {
+        // On this side z = −slope·side·y.
+        let normal = Vector3::new(0.0, slope * side, 1.0);
+        let point =
+            ray.origin - ray.direction * normal.dot(&ray.origin) / normal.dot(&ray.direction);
+        (point.y * side >= 0.0).then_some(point)
+    };
+    let view = |(index, camera): (usize, &Camera)| {
+        let mut image = render(&Solid::Box.frustum(), camera, false);
+        for (column, row, pixel) in image.enumerate_pixels_mut() {
+            let at = Vector2::new(f64::from(column) + 0.5, f64::from(row) + 0.5);
+            let ray = camera.ray_through(&at);
+            let distance = |point: &Vector3<f64>| (point - ray.origin).norm();
+            let hits = [1.0, -1.0].map(|side| height(&ray, side));
+            let nearest =
+                (hits.into_iter().flatten()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            let value = nearest.map_or(0.0, |p| brightness(p.x, p.y));
+            pixel.0 = [value.clamp(0.0, 255.0) as u8; 3];
+        }
+        View {
+            name: format!("{index:04}"),
+            camera: *camera,
+            wireframe: Wireframe2d::empty(camera.width, camera.height),
+            image: image.into(),
+        }
+    };
+    Scene {
+        name: "edge".into(),
+        views: cameras().iter().enumerate().map(view).collect(),
+        original_from_world: Similarity::identity(),
+        pixel_center: 0.5,
+        sphere_radius: 1.0,
+        sparse_points: Vec::new(),
+    }
+}
+
+/// The kinds of an edge along x through the origin.
+fn kinds_of(scene: &Scene) -> EdgeKinds {
+    let wireframe = Wireframe3d {
+        junctions: vec![Vector3::new(-0.4, 0.0, 0.0), Vector3::new(0.4, 0.0, 0.0)],
+        edges: vec![[0, 1]],
+    };
+    let observations = views_of_edges(&cameras(), &wireframe.junctions, &wireframe.edges);
+    edge_kinds(&wireframe, scene, &observations).unwrap()[0]
+}
+
+/// A step of brightness along the edge, and grain on both sides.
+fn step(x: f64, y: f64) -> f64 {
+    let side = if y > 0.0 { 200.0 } else { 120.0 };
+    side * (0.7 + 0.3 * grain(x, y))
+}
+
+#[test]
+fn a_step_is_a_crease_of_two_faces_and_perhaps_a_shadow_on_one() {
+    let roof = kinds_of(&scene_of(0.8, step));
+    assert_eq!(roof.most_likely().0, EdgeKind::Crease, "{roof:?}");
+    assert!(roof.structure() > 0.8, "{roof:?}");
+    let floor = kinds_of(&scene_of(0.0, step));
+    assert!(floor.structure() < 0.6, "{floor:?}");
+    assert!(floor.shadow > 2.0 * floor.texture, "{floor:?}");
+}
+
+#[test]
+fn a_dark_line_within_a_face_is_texture() {
+    let joint = |x: f64, y: f64| {
+        if y.abs() < 0.01 {
+            40.0
+        } else {
+            160.0 + 60.0 * grain(x, y)
+        }
+    };
+    let kinds = kinds_of(&scene_of(0.0, joint));
+    assert_eq!(kinds.most_likely().0, EdgeKind::Texture, "{kinds:?}");
+    assert!(kinds.texture > 0.8, "{kinds:?}");
+}
+
+#[test]
+fn without_texture_a_step_stays_a_crease() {
+    let kinds = kinds_of(&scene_of(0.0, |_, y| if y > 0.0 { 200.0 } else { 120.0 }));
+    assert_eq!(kinds.most_likely().0, EdgeKind::Crease, "{kinds:?}");
+}
+
+#[test]
+fn probabilities_add_up_and_anything_may_be_asked() {
+    let scene = scene_of(0.0, grain);
+    let wireframe = Wireframe3d {
+        junctions: vec![
+            Vector3::zeros(),
+            Vector3::zeros(),
+            Vector3::new(9.0, 9.0, 9e9),
+        ],
+        edges: vec![[0, 1], [1, 2], [2, 2]],
+    };
+    let observations = views_of_edges(&cameras(), &wireframe.junctions, &wireframe.edges);
+    for observations in [observations.as_slice(), &[]] {
+        for kinds in edge_kinds(&wireframe, &scene, observations).unwrap() {
+            let rest = kinds.texture + kinds.shadow;
+            assert!((kinds.structure() + rest - 1.0).abs() < 1e-12, "{kinds:?}");
+            assert_eq!(kinds.most_likely().0, EdgeKind::Crease);
+        }
+    }
+    assert!(
+        edge_kinds(&Wireframe3d::default(), &scene, &[])
+            .unwrap()
+            .is_empty()
+    );
+}
+
+#[test]
+fn junctions_have_types_and_edges_leave_planes() {
+    let point = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
+    // A bar along x that another one ends on, and at its end a corner; an L in a plane.
+    let wireframe = Wireframe3d {
+        junctions: vec![
+            point(0.0, 0.0, 0.0),
+            point(1.0, 0.0, 0.0),
+            point(2.0, 0.0, 0.0),
+            point(1.0, 1.0, 0.0),
+            point(2.0, 1.0, 0.0),
+            point(2.0, 0.0, 1.0),
+            point(0.0, -1.0, 0.0),
+        ],
+        edges: vec![[0, 1], [1, 2], [3, 1], [2, 4], [2, 5], [0, 6]],
+    };
+    use JunctionType::{Corner, End, Planar, Tee};
+    let types = junction_types(&wireframe);
+    assert_eq!(types, [Planar, Tee, Corner, End, End, End, End]);
+    let directions: Vec<_> = (wireframe.segments().iter())
+        .map(|segment| (segment.end - segment.start).try_normalize(0.0))
+        .collect();
+    let leaving = leaves_plane(&wireframe, &directions);
+    let expected = [0.0, 1.0, 0.0, 1.0, 1.0, 0.0];
+    for (found, expected) in leaving.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-12, "{leaving:?}");
+    }
+}
