@@ -1,7 +1,7 @@
 //! What the assembler makes of scenes, measured against the truth that each folder holds.
 //!
 //! ```text
-//! cargo run --release -p neat-eval --example measure_assembler -- [--out DIR] SCENE…
+//! cargo run --release -p neat-eval --example measure_assembler -- [--structure] [--out DIR] SCENE…
 //! ```
 //!
 //! No field, no run folder and no confidence: the quickest way from a changed line of the
@@ -9,7 +9,8 @@
 //! `scripts/measure_objects.py` does (neat-abc at 0.01, one to one), one with `truth/` as
 //! `scripts/measure_photographs.py` does (surface-and-creases), one without truth by how much
 //! of the 2D segments it explains. With `--out` the wireframes are kept, and so are the 2D
-//! segments, which the next call takes from there.
+//! segments, which the next call takes from there. With `--structure` only edges are measured
+//! that are rather creases or boundaries than texture or shadows.
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
 
@@ -19,6 +20,7 @@ use neat_eval::{EvaluationInput, EvaluationOptions, NeatAbc, SceneTruth, Scores,
 use neat_eval::{Protocol, SurfaceAndCreases};
 use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble};
 use neat_wireframe::export::{WireframeDocument, write_json};
+use neat_wireframe::kinds::edge_kinds;
 use neat_wireframe::metrics::{ImageEvidenceConfig, Matching, PrecisionRecall, image_evidence};
 use neat_wireframe::{ViewObservation, Wireframe3d};
 use std::error::Error;
@@ -32,11 +34,12 @@ const MIN_SEGMENT_SCORE: f64 = 0.05;
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 fn main() -> Result<()> {
-    let (mut scenes, mut out) = (Vec::new(), None);
+    let (mut scenes, mut out, mut structure) = (Vec::new(), None, false);
     let mut arguments = env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--out" => out = arguments.next().map(PathBuf::from),
+            "--structure" => structure = true,
             _ => scenes.push(PathBuf::from(argument)),
         }
     }
@@ -46,7 +49,10 @@ fn main() -> Result<()> {
         let kept = out.as_ref().map(|out| out.join(&*name));
         let scene = prepared(dir, kept.as_deref())?;
         let start = Instant::now();
-        let built = assembled(&scene)?;
+        let mut built = assembled(&scene)?;
+        if structure {
+            built.wireframe = structure_of(&built.wireframe, &scene)?;
+        }
         let seconds = start.elapsed().as_secs_f64();
         let original = |p: &_| scene.original_from_world.apply(p);
         let wireframe = built.wireframe.map(original);
@@ -113,6 +119,20 @@ fn assembled(scene: &Scene) -> Result<Assembled> {
     let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
     let edgels = edgel_maps(&scene.views, &DetectorConfig::default(), scene.pixel_center)?;
     Ok(assemble(&views, &edgels, 1.0, &AssembleConfig::default()))
+}
+
+/// The edges that are more likely creases or boundaries than anything else.
+fn structure_of(wireframe: &Wireframe3d, scene: &Scene) -> Result<Wireframe3d> {
+    let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
+    let kinds = edge_kinds(wireframe, scene, &views)?;
+    let edges = wireframe.edges.iter().zip(&kinds);
+    Ok(Wireframe3d {
+        junctions: wireframe.junctions.clone(),
+        edges: edges
+            .filter(|(_, kinds)| kinds.structure() >= 0.5)
+            .map(|(edge, _)| *edge)
+            .collect(),
+    })
 }
 
 /// The scores as text, and F of segments and of junctions where there is a true wireframe.
