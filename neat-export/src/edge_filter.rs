@@ -1,4 +1,4 @@
-//! Only the edges that are certain enough.
+//! Only the edges that are certain enough, or of the shape of things.
 
 use crate::ExportError;
 use neat_wireframe::export::WireframeDocument;
@@ -17,6 +17,9 @@ pub struct EdgeFilter {
     pub min_probability: Option<f64>,
     /// Only edges whose field `supporting_views` is at least this.
     pub min_views: Option<u32>,
+    /// Only edges that are more likely creases and boundaries of surfaces than texture and
+    /// shadows.
+    pub only_structure: bool,
 }
 
 impl EdgeFilter {
@@ -59,6 +62,18 @@ impl EdgeFilter {
         ];
         let fields = document.edge_fields.named();
         let mut passes = vec![true; document.edges.len()];
+        if self.only_structure {
+            let structure = document
+                .edge_fields
+                .structure()
+                .ok_or(ExportError::NoField {
+                    field: "crease",
+                    option: "only structure",
+                })?;
+            for (passes, structure) in passes.iter_mut().zip(structure) {
+                *passes = structure >= 0.5;
+            }
+        }
         for (field, option, minimum) in minima {
             let Some(minimum) = minimum else { continue };
             let values = fields
@@ -71,7 +86,11 @@ impl EdgeFilter {
         let mut kept = with_edges(document, &passes);
         kept.metadata.insert(
             "edge_filter".into(),
-            json!({"min_probability": self.min_probability, "min_views": self.min_views}),
+            json!({
+                "min_probability": self.min_probability,
+                "min_views": self.min_views,
+                "only_structure": self.only_structure,
+            }),
         );
         Ok(kept)
     }
@@ -169,6 +188,7 @@ mod tests {
         let filter = EdgeFilter {
             min_probability: Some(0.5),
             min_views: Some(2),
+            ..EdgeFilter::default()
         };
         let kept = filter.apply(&document()).unwrap();
         kept.check(Path::new("w")).unwrap();
@@ -181,18 +201,33 @@ mod tests {
         assert_eq!(kept.metadata["edge_filter"]["min_views"], 2);
 
         let only_views = EdgeFilter {
-            min_probability: None,
             min_views: Some(1),
+            ..EdgeFilter::default()
         };
         let kept = only_views.apply(&document()).unwrap();
         assert_eq!(kept.edges, [[1, 0], [1, 2]]);
     }
 
     #[test]
+    fn paint_and_shadows_are_left_out_on_request() {
+        let mut document = document();
+        document.edge_fields.crease = Some(vec![0.2, 0.3, 0.9]);
+        document.edge_fields.boundary = Some(vec![0.2, 0.3, 0.0]);
+        let filter = EdgeFilter {
+            only_structure: true,
+            ..EdgeFilter::default()
+        };
+        let kept = filter.apply(&document).unwrap();
+        assert_eq!(kept.edges, [[1, 0], [1, 2]]);
+        assert_eq!(kept.edge_fields.crease, Some(vec![0.3, 0.9]));
+        assert_eq!(kept.metadata["edge_filter"]["only_structure"], true);
+    }
+
+    #[test]
     fn nothing_passes_an_impossible_minimum() {
         let filter = EdgeFilter {
-            min_probability: None,
             min_views: Some(u32::MAX),
+            ..EdgeFilter::default()
         };
         let kept = filter.apply(&document()).unwrap();
         kept.check(Path::new("w")).unwrap();
@@ -206,10 +241,16 @@ mod tests {
         let filter = |min_probability, min_views| EdgeFilter {
             min_probability,
             min_views,
+            ..EdgeFilter::default()
+        };
+        let structure = EdgeFilter {
+            only_structure: true,
+            ..EdgeFilter::default()
         };
         for (filter, named) in [
             (filter(Some(0.5), None), "`probability`"),
             (filter(None, Some(3)), "`supporting_views`"),
+            (structure, "`crease`"),
             (filter(Some(f64::NAN), None), "NaN"),
             (filter(Some(-0.1), None), "-0.1"),
             (filter(Some(50.0), None), "from 0 to 1"),

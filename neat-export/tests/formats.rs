@@ -301,7 +301,7 @@ fn the_filter_acts_in_every_format() {
     let options = ExportOptions {
         filter: EdgeFilter {
             min_probability: Some(0.9),
-            min_views: None,
+            ..EdgeFilter::default()
         },
         ..ExportOptions::default()
     };

@@ -13,7 +13,7 @@ use neat_train::TrainedField;
 use neat_wireframe::assemble::{AssembleReport, assemble};
 use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::export::WireframeDocument;
-use neat_wireframe::kinds::curved_chains;
+use neat_wireframe::kinds::{EdgeKinds, curved_chains, edge_kinds, fill_kinds, junction_types};
 use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 use neat_wireframe::paper::{PaperBackEndCounts, PaperBackEndError, SupportedSegment};
 use neat_wireframe::validity::WireframeFlaw;
@@ -60,6 +60,8 @@ pub struct Distilled {
     pub wireframe: Wireframe3d,
     /// How sure every junction and edge is, and by which 2D segments.
     pub confidence: Confidence,
+    /// What each edge is: of the shape of things, or on it.
+    pub kinds: Vec<EdgeKinds>,
     /// What each step kept and removed.
     pub report: BackEndReport,
 }
@@ -90,6 +92,7 @@ impl Distilled {
         let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
         self.confidence
             .fill(&mut document, &names, original_from_world);
+        fill_kinds(&mut document, &self.kinds, &junction_types(&self.wireframe));
         let curved = curved_chains(&self.wireframe);
         if curved.contains(&true) {
             document.edge_fields.curved = Some(curved);
@@ -133,9 +136,11 @@ pub fn distill(
     let hiding = surface.as_ref().map(|grid| grid as &dyn SignedDistance);
     let assessing = &config.distill.confidence;
     let confidence = assess(&wireframe, &views, hiding, scene_radius, assessing)?;
+    let kinds = edge_kinds(&wireframe, scene, &views)?;
     Ok(Distilled {
         wireframe,
         confidence,
+        kinds,
         report,
     })
 }

@@ -26,10 +26,11 @@ const MAX_SLOPE: f64 = 2.0;
 
 /// Options that --mesh and all that belongs to it exclude. Both have to be said: clap does
 /// not ask for a required option that another one excludes.
-const OF_WIREFRAMES: [&str; 6] = [
+const OF_WIREFRAMES: [&str; 7] = [
     "format",
     "min_probability",
     "min_views",
+    "only",
     "view",
     "width",
     "unit",
@@ -38,13 +39,14 @@ const OF_WIREFRAMES: [&str; 6] = [
 /// Write a wireframe for other programs
 ///
 /// Everything is in the frame and unit of your files. The ending of --out chooses the format.
-/// --min-probability and --min-views leave out uncertain edges and the junctions that only
-/// they joined. With --mesh the learned surface is written instead, as triangles.
+/// --min-probability and --min-views leave out uncertain edges, --only structure paint and
+/// shadows, and each the junctions that only those joined. With --mesh the learned surface is written instead, as triangles.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   neat export RUN --out house.dxf
   neat export RUN --out house.step --unit m --min-probability 0.9
+  neat export RUN --out house.dxf --only structure
   neat export RUN --out house.svg --view top
   neat export RUN --format colmap --out colmap
   neat export RUN/wireframe.json --format glb
@@ -71,6 +73,9 @@ pub struct ExportArgs {
     /// Only edges that at least so many views support
     #[arg(long, value_name = "N")]
     min_views: Option<u32>,
+    /// Only edges of one sort
+    #[arg(long, value_enum, value_name = "SORT")]
+    only: Option<Only>,
     /// From where svg and png look, isometric by default; +z is up
     #[arg(long, value_enum, value_name = "FROM")]
     view: Option<ViewArg>,
@@ -93,6 +98,13 @@ pub struct ExportArgs {
     backend: BackendArg,
     #[command(flatten)]
     cache: CacheArgs,
+}
+
+/// A sort of edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Only {
+    /// Creases and boundaries of surfaces; no paint, joints within faces, shadows or reflections
+    Structure,
 }
 
 /// From where a drawing looks.
@@ -219,6 +231,7 @@ impl ExportArgs {
             filter: EdgeFilter {
                 min_probability: self.min_probability,
                 min_views: self.min_views,
+                only_structure: self.only == Some(Only::Structure),
             },
             direction: self.view.map_or(default.direction, ViewDirection::from),
             width: self.width.unwrap_or(default.width),
@@ -333,10 +346,11 @@ mod tests {
     const ALL: EdgeFilter = EdgeFilter {
         min_probability: None,
         min_views: None,
+        only_structure: false,
     };
     const SOME: EdgeFilter = EdgeFilter {
         min_probability: Some(0.0),
-        min_views: None,
+        ..ALL
     };
 
     #[test]

@@ -19,6 +19,7 @@ function readData() {
   data.extent = data.points.concat(data.views.map((view) => view.position))
     .reduce((most, point) => Math.max(most, norm(point)), 1) + 1;
   data.up = upDirection(data);
+  data.structure = structureOf(data);
   data.supportCounts = supportCounts(data);
   data.measures = edgeMeasures(data);
   for (const snapshot of data.evolution) snapshot.points = decodePoints(snapshot.junctions, toModel);
@@ -92,6 +93,11 @@ function upDirection({ views, edges, points }) {
   return norm(best) > 0.3 * total && steep.length >= 6 ? normalize(best) : up;
 }
 
+/** How likely each edge is of the shape of things and not on it; null where nobody says. */
+function structureOf({ edgeFields: { crease, boundary } }) {
+  return crease && boundary ? crease.map((value, edge) => value + boundary[edge]) : null;
+}
+
 /** In how many views each edge has support; null where nothing is known of it. */
 function supportCounts({ edgeFields, support }) {
   if (edgeFields.supporting_views) return edgeFields.supporting_views;
@@ -111,6 +117,7 @@ function edgeMeasures(data) {
     measures.push({ key, label, values, range: options.range ?? spread(values), ...options });
   };
   offer("probability", "Probability", edgeFields.probability, { good: "high", range: [0, 1] });
+  offer("structure", "Structure, not paint or shadow", data.structure, { good: "high", range: [0, 1] });
   offer("support", "Supporting views", supportCounts, { good: "high", whole: true });
   const residuals = edgeFields.residual_in_pixels ?? support.map(rootMeanSquare);
   offer("residual", "Residual in pixels", residuals, { good: "low" });

@@ -58,7 +58,7 @@ function histogram(measure, colors) {
   });
 }
 
-/** Sliders that hide edges of which little is known, or null if nothing is. */
+/** What hides edges of which little is known or that are no structure, or null if nothing is. */
 function makeFilter(viewer) {
   const { data } = viewer;
   const { section, content } = panel("Filter");
@@ -76,13 +76,20 @@ function makeFilter(viewer) {
       oninput: (minViews) => viewer.change({ minViews }),
     }).row);
   }
+  if (data.structure) {
+    const box = element("input", {
+      type: "checkbox", id: "only-structure",
+      onchange: () => viewer.change({ onlyStructure: box.checked }),
+    });
+    content.append(element("label", { class: "check" }, box, " Only structure, no paint and shadows"));
+  }
   if (!content.childElementCount || !data.edges.length) return null;
   const count = element("p", { class: "quiet", id: "shown-count", role: "status" });
   content.append(count);
   const show = () => {
     count.textContent = `${viewer.visibleCount} of ${countOf(data.edges.length, "segment")} shown`;
   };
-  viewer.onChange((keys) => { if (keys.some((key) => key.startsWith("min"))) show(); });
+  viewer.onChange((keys) => { if (keys.some(filters)) show(); });
   show();
   return section;
 }

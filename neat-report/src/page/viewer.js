@@ -1,5 +1,8 @@
 // The 3D view: its state, and who draws it when.
 
+/** Whether a change of this part of the state hides or shows edges. */
+const filters = (key) => ["minProbability", "minViews", "onlyStructure"].includes(key);
+
 class Viewer {
   constructor(data) {
     this.data = data;
@@ -13,6 +16,7 @@ class Viewer {
       measure: data.measures[0],
       minProbability: 0,
       minViews: 0,
+      onlyStructure: false,
       showCameras: data.views.length > 0,
       showJunctions: true,
       showSegments: false,
@@ -76,8 +80,8 @@ class Viewer {
   /** Changes the state. */
   change(changes) {
     Object.assign(this.state, changes);
-    if ("minProbability" in changes || "minViews" in changes) this.filter();
     const keys = Object.keys(changes);
+    if (keys.some(filters)) this.filter();
     this.stale ||= !(keys.length === 1 && keys[0] === "hover");
     this.markedStale = true;
     this.redraw();
@@ -90,7 +94,8 @@ class Viewer {
     const probability = data.edgeFields.probability;
     this.visible = data.edges.map((_, edge) =>
       (!probability || probability[edge] >= state.minProbability) &&
-      (!data.supportCounts || data.supportCounts[edge] >= state.minViews));
+      (!data.supportCounts || data.supportCounts[edge] >= state.minViews) &&
+      (!state.onlyStructure || data.structure[edge] >= 0.5));
     this.junctionVisible = data.points.map((_, index) => data.degrees[index] === 0);
     data.edges.forEach((ends, edge) => {
       if (this.visible[edge]) for (const end of ends) this.junctionVisible[end] = true;

@@ -13,6 +13,9 @@ type NamedNumbers = BTreeMap<String, Vec<f64>>;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "NamedNumbers", into = "NamedNumbers")]
 pub struct JunctionFields {
+    /// What it is: 0 an end, 1 a tee, 2 a meeting of edges in one plane, 3 a corner. See
+    /// `neat_wireframe::kinds::JunctionType`.
+    pub junction_type: Option<Vec<usize>>,
     /// Largest standard deviation of the position, in the unit of the files.
     pub sigma: Option<Vec<f64>>,
     /// Views with a 2D segment on one of its edges.
@@ -25,6 +28,11 @@ pub struct JunctionFields {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "NamedNumbers", into = "NamedNumbers")]
 pub struct EdgeFields {
+    /// Probability that the surface ends there, before what lies behind it. This, `crease`,
+    /// `shadow` and `texture` add up to 1.
+    pub boundary: Option<Vec<f64>>,
+    /// Probability that two faces meet there.
+    pub crease: Option<Vec<f64>>,
     /// Whether it is a piece of a curve; 1 and 0 in JSON.
     pub curved: Option<Vec<bool>>,
     /// Views that ought to show it, or do.
@@ -34,8 +42,12 @@ pub struct EdgeFields {
     /// Root mean square distance of the ends of its supporting segments from its
     /// projected line.
     pub residual_in_pixels: Option<Vec<f64>>,
+    /// Probability that it is the border of a shadow or a reflection.
+    pub shadow: Option<Vec<f64>>,
     /// Views with a 2D segment on it.
     pub supporting_views: Option<Vec<usize>>,
+    /// Probability that it is paint, a joint or another change within a face.
+    pub texture: Option<Vec<f64>>,
     /// Whatever another program has written.
     pub other: NamedNumbers,
 }
@@ -44,6 +56,11 @@ impl JunctionFields {
     /// All facts as numbers, by name.
     pub fn named(&self) -> NamedNumbers {
         let mut named = self.other.clone();
+        put(
+            &mut named,
+            "junction_type",
+            self.junction_type.as_deref().map(from_counts),
+        );
         put(&mut named, "sigma", self.sigma.clone());
         put(
             &mut named,
@@ -63,6 +80,10 @@ impl EdgeFields {
     /// All facts as numbers, by name.
     pub fn named(&self) -> NamedNumbers {
         let mut named = self.other.clone();
+        put(&mut named, "boundary", self.boundary.clone());
+        put(&mut named, "crease", self.crease.clone());
+        put(&mut named, "shadow", self.shadow.clone());
+        put(&mut named, "texture", self.texture.clone());
         let curved = self.curved.as_ref();
         let as_number = |is: &bool| f64::from(u8::from(*is));
         put(
@@ -89,6 +110,13 @@ impl EdgeFields {
         named
     }
 
+    /// Probability that each edge belongs to the shape of things, a crease or a boundary, where
+    /// that is known.
+    pub fn structure(&self) -> Option<Vec<f64>> {
+        let (crease, boundary) = (self.crease.as_ref()?, self.boundary.as_ref()?);
+        Some(crease.iter().zip(boundary).map(|(a, b)| a + b).collect())
+    }
+
     /// Whether nothing is known.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
@@ -98,6 +126,7 @@ impl EdgeFields {
 impl From<NamedNumbers> for JunctionFields {
     fn from(mut named: NamedNumbers) -> Self {
         Self {
+            junction_type: take_counts(&mut named, "junction_type"),
             sigma: named.remove("sigma"),
             supporting_views: take_counts(&mut named, "supporting_views"),
             other: named,
@@ -109,11 +138,15 @@ impl From<NamedNumbers> for EdgeFields {
     fn from(mut named: NamedNumbers) -> Self {
         let curved = take_counts(&mut named, "curved");
         Self {
+            boundary: named.remove("boundary"),
+            crease: named.remove("crease"),
             curved: curved.map(|all| all.into_iter().map(|count| count > 0).collect()),
             expected_views: take_counts(&mut named, "expected_views"),
             probability: named.remove("probability"),
             residual_in_pixels: named.remove("residual_in_pixels"),
+            shadow: named.remove("shadow"),
             supporting_views: take_counts(&mut named, "supporting_views"),
+            texture: named.remove("texture"),
             other: named,
         }
     }

@@ -13,6 +13,7 @@
 
 mod coplanarity;
 mod curved_rims;
+mod document;
 mod edge_frame;
 mod edge_samples;
 mod junctions;
@@ -23,6 +24,7 @@ mod side_colours;
 mod tests;
 
 pub use curved_rims::curved_chains;
+pub use document::fill_kinds;
 pub use junctions::{JunctionType, junction_types};
 pub use model::{EdgeKind, EdgeKinds};
 
