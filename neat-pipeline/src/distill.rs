@@ -10,7 +10,7 @@ use neat_detect::{DetectorConfig, edgel_maps};
 use neat_sdf::RayBundle;
 use neat_tensor::host::host_vec;
 use neat_train::TrainedField;
-use neat_wireframe::assemble::{AssembleReport, assemble};
+use neat_wireframe::assemble::{AssembleReport, assemble_with_progress};
 use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::kinds::{EdgeKinds, curved_chains, edge_kinds, fill_kinds, junction_types};
@@ -19,6 +19,7 @@ use neat_wireframe::paper::{PaperBackEndCounts, PaperBackEndError, SupportedSegm
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SignedDistance, ViewObservation};
 use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
 use thin_regions::Query;
 pub use thin_regions::paper_regions;
 
@@ -154,8 +155,15 @@ fn assembled(
     progress: OnProgress<'_>,
 ) -> Result<(Wireframe3d, BackEndReport), DistillError> {
     let edgels = edgels(scene, &config.detect, &mut |share| progress(0.3 * share))?;
-    let built = assemble(views, &edgels, scene_radius, &config.distill.assembler);
-    progress(0.9)?;
+    let on_progress = &mut |share| match progress(0.3 + 0.6 * share) {
+        Ok(()) => ControlFlow::Continue(()),
+        Err(Cancelled) => ControlFlow::Break(()),
+    };
+    let config = &config.distill.assembler;
+    let built = assemble_with_progress(views, &edgels, scene_radius, config, on_progress);
+    let ControlFlow::Continue(built) = built else {
+        return Err(Cancelled.into());
+    };
     let report = BackEndReport::Assembler {
         steps: built.report,
     };

@@ -87,6 +87,11 @@ impl CandidateQueue {
         }
     }
 
+    /// Those that are left.
+    pub(super) fn len(&self) -> usize {
+        self.bounded.len() + self.weighed.len()
+    }
+
     /// Puts a candidate back; one with too little evidence is dropped.
     pub(super) fn push(&mut self, gain: f64, index: usize) {
         if gain > self.min_evidence {

@@ -6,12 +6,12 @@ use super::config::AssembleConfig;
 use super::edge_samples::{Images, project_segment};
 use super::hypothesis_scoring::Alternatives;
 use super::line_evidence::LineEvidence;
+use super::progress::{OnProgress, part};
 use super::projected_line::ProjectedLine;
 use super::view_segments::SegmentId;
 use crate::statistics::{SIGMA_BY_MEDIAN, upper_median};
 use neat_core::{LineSegment2, LineSegment3};
 use rayon::prelude::*;
-use std::iter;
 use std::ops::ControlFlow;
 
 /// An edgel may be off by so many standard deviations of edgels: 99.7 % are not.
@@ -28,6 +28,12 @@ const SEGMENTS_FOR_NOISE: usize = 4;
 const NOISE_REACH: f64 = 2.0;
 /// Fewer do not.
 const MIN_EDGELS_FOR_NOISE: usize = 20;
+/// Shares of the time after which the noise is known, and after which all lines are found, whose
+/// kinds are asked then.
+const TOLD_NOISE: f64 = 0.2;
+const FOUND: f64 = 0.7;
+/// So many lines are asked for their kind between two words about progress.
+const LINES_AT_ONCE: usize = 64;
 /// The noise where no line tells of it, in pixels.
 const USUAL_NOISE: f64 = 0.3;
 /// The least noise, in pixels: a bow of more tells of a curve, not of noise.
@@ -76,7 +82,8 @@ pub(super) fn select_lines<'a>(
     images: Images<'a>,
     alternatives: &Alternatives,
     config: &AssembleConfig,
-) -> Selection<'a> {
+    progress: OnProgress<'_>,
+) -> ControlFlow<(), Selection<'a>> {
     let first = Images {
         reach: FIRST_REACH,
         ..images
@@ -88,13 +95,22 @@ pub(super) fn select_lines<'a>(
         config.min_evidence,
         LINES_FOR_NOISE,
         LEAST_NOISE,
-    );
+        &mut part(progress, [0.0, TOLD_NOISE]),
+    )?;
     let noise = noise_of_edgels(&first, &sure.lines);
     let reach = (REACH_NOISES * noise).clamp(REACH_BOUNDS[0], REACH_BOUNDS[1]);
     let images = Images { reach, ..images };
     let all = candidates(&images, alternatives, 1);
     tracing::debug!(noise, candidates = all.len(), "lines are proposed");
-    choose(images, &all, config.min_evidence, usize::MAX, noise)
+    let progress = &mut part(progress, [TOLD_NOISE, 1.0]);
+    choose(
+        images,
+        &all,
+        config.min_evidence,
+        usize::MAX,
+        noise,
+        progress,
+    )
 }
 
 /// The candidates of one of `step` segments of each view.
@@ -160,7 +176,8 @@ fn choose<'a>(
     min_evidence: f64,
     most: usize,
     noise: f64,
-) -> Selection<'a> {
+    progress: OnProgress<'_>,
+) -> ControlFlow<(), Selection<'a>> {
     let bounds: Vec<f64> = (candidates.par_iter())
         .map(|candidate| images.most_evidence(&candidate.line))
         .collect();
@@ -178,26 +195,34 @@ fn choose<'a>(
     loop {
         // A line takes its edgels whatever it stands for: that is asked of many at once.
         let room = most - lines.len();
-        let found: Vec<ChosenLine> = iter::from_fn(|| chooser.next()).take(room).collect();
+        let mut found = Vec::new();
+        while found.len() < room
+            && let Some(line) = chooser.next()
+        {
+            progress(FOUND * (1.0 - chooser.queue.len() as f64 / bounds.len() as f64))?;
+            found.push(line);
+        }
         if found.is_empty() {
             break;
         }
-        let kinds: Vec<Kind> = (found.par_iter())
-            .map(|line| kind(&images, line, noise))
-            .collect();
+        let mut kinds: Vec<Kind> = Vec::with_capacity(found.len());
+        for some in found.chunks(LINES_AT_ONCE) {
+            kinds.par_extend(some.par_iter().map(|line| kind(&images, line, noise)));
+            progress(FOUND + (1.0 - FOUND) * kinds.len() as f64 / found.len() as f64)?;
+        }
         curved += kinds.iter().filter(|kind| **kind == Kind::Curve).count();
         outlines += kinds.iter().filter(|kind| **kind == Kind::Outline).count();
         let of_kinds = found.into_iter().zip(kinds);
         lines.extend(of_kinds.filter_map(|(line, kind)| (kind == Kind::Straight).then_some(line)));
     }
-    Selection {
+    ControlFlow::Continue(Selection {
         images,
         noise,
         lines,
         curved,
         outlines,
         taken: chooser.taken,
-    }
+    })
 }
 
 struct Chooser<'a> {

@@ -34,6 +34,7 @@ mod line_fitting;
 mod line_selection;
 mod neighbours;
 mod outlines;
+mod progress;
 mod projected_line;
 mod report;
 mod straightness;
@@ -45,6 +46,7 @@ mod test_views;
 
 pub use config::AssembleConfig;
 pub use line3d::{Line3dConfig, Line3dSegment, SegmentSupport, line3d, wireframe_of_segments};
+pub use progress::OnProgress;
 pub use report::{AssembleReport, Assembled};
 
 use crate::ViewObservation;
@@ -58,12 +60,21 @@ use hypothesis_scoring::{Scoring, score_hypotheses};
 use line_continuation::continue_lines;
 use line_selection::select_lines;
 use neat_core::{EdgelMap, LineSegment2};
+use progress::part;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 use tangent_ends::cut_tangent_ends;
 use view_segments::PreparedView;
 
 /// Views that must agree on a position for it to be proposed; the images decide.
 const MIN_VIEWS: usize = 2;
+
+/// Shares of the time after which lines are proposed, selected, cut where arcs begin, and
+/// continued: about those of a house.
+const PROPOSED: f64 = 0.05;
+const SELECTED: f64 = 0.8;
+const ENDED: f64 = 0.85;
+const CONTINUED: f64 = 0.95;
 
 /// Builds the wireframe.
 ///
@@ -83,9 +94,24 @@ pub fn assemble(
     scene_radius: f64,
     config: &AssembleConfig,
 ) -> Assembled {
+    let go_on = &mut |_| ControlFlow::Continue(());
+    match assemble_with_progress(observations, edgels, scene_radius, config, go_on) {
+        ControlFlow::Continue(assembled) => assembled,
+        ControlFlow::Break(()) => Assembled::default(),
+    }
+}
+
+/// [`assemble`], which ends as soon as `progress` says so.
+pub fn assemble_with_progress(
+    observations: &[ViewObservation],
+    edgels: &[EdgelMap],
+    scene_radius: f64,
+    config: &AssembleConfig,
+    progress: OnProgress<'_>,
+) -> ControlFlow<(), Assembled> {
     let usable = scene_radius.is_normal() && scene_radius > 0.0;
     if !usable || !(edgels.is_empty() || edgels.len() == observations.len()) {
-        return Assembled::default();
+        return ControlFlow::Continue(Assembled::default());
     }
     let _span = tracing::debug_span!("assemble", views = observations.len()).entered();
     let views: Vec<PreparedView> = (observations.par_iter())
@@ -105,6 +131,7 @@ pub fn assemble(
     let scoring = Scoring::default();
     let margin = config.ball_margin;
     let alternatives = score_hypotheses(&views, &neighbours, margin, MIN_VIEWS, &scoring);
+    progress(PROPOSED)?;
     let mut report = AssembleReport {
         usable_views: views
             .iter()
@@ -123,7 +150,10 @@ pub fn assemble(
         maps,
         reach: 0.0,
     };
-    let mut selection = select_lines(images, &alternatives, config);
+    let mut selection = {
+        let progress = &mut part(progress, [PROPOSED, SELECTED]);
+        select_lines(images, &alternatives, config, progress)?
+    };
     drop(alternatives);
     let images = selection.images;
     report.noise_in_pixels = selection.noise;
@@ -132,6 +162,7 @@ pub fn assemble(
     report.outlines = selection.outlines;
 
     cut_tangent_ends(&images, &mut selection.lines, selection.noise);
+    progress(ENDED)?;
     let mut lines = merge_pieces(&images, selection.lines);
     continue_lines(
         &images,
@@ -140,6 +171,7 @@ pub fn assemble(
         config.min_evidence,
     );
     lines = merge_pieces(&images, lines);
+    progress(CONTINUED)?;
     report.merged_pieces = report.lines - lines.len();
     let mut corners = find_corners(&images, &lines);
     report.ends = corners.junctions.len();
@@ -150,7 +182,7 @@ pub fn assemble(
     report.junctions = wireframe.junctions.len();
     report.edges = wireframe.edges.len();
     tracing::debug!(?report, "assembled");
-    Assembled { wireframe, report }
+    ControlFlow::Continue(Assembled { wireframe, report })
 }
 
 /// The edgels of a view that is known by its segments only.
