@@ -40,6 +40,9 @@ const USUAL_NOISE: f64 = 0.3;
 const LEAST_NOISE: f64 = 0.05;
 /// Reaches of the rounds of fitting: the first line is a guess.
 const FITTING_REACHES: [f64; 3] = [1.3, 1.0, 1.0];
+/// So many views must show a line whole: two do wherever they want, and parts of other edges in
+/// more of them make it no line.
+const MIN_SHOWING: usize = 3;
 /// An evidence that others have lowered by more goes back into the queue, in nats.
 const STALE: f64 = 0.5;
 /// A line has the edgels beside it whose normals have this cosine to its own …
@@ -272,8 +275,7 @@ impl Chooser<'_> {
             line = images.fit(&line, evidence.views(), share * images.reach);
             line = images.extent(&line, &evidence.showing)?;
             evidence = images.evidence(&line, Some(&self.taken), self.min_evidence);
-            // Parts of others' edges make evidence too, but no view that a fit could ask.
-            if evidence.gain <= self.min_evidence || evidence.showing.is_empty() {
+            if evidence.gain <= self.min_evidence || evidence.showing.len() < MIN_SHOWING {
                 return None;
             }
         }
@@ -360,5 +362,31 @@ mod tests {
         };
         assert!(settled(0.1).unwrap().evidence.showing.len() >= 18);
         assert!(settled(0.6).is_none());
+    }
+
+    #[test]
+    fn what_only_two_views_show_whole_is_no_line() {
+        let cube = TestViews::of_cube(20);
+        let images = cube.images();
+        let edge = cube_edge(3);
+        let settled = |whole_in: usize| {
+            let mut taken = images.nothing_taken();
+            let part = LineSegment3::new(edge.start, edge.point_at(0.5));
+            claim_edgels(&images, &part, &mut taken);
+            for map in &mut taken[..whole_in] {
+                map.fill(false);
+            }
+            let chooser = Chooser {
+                images,
+                min_evidence: 0.0,
+                taken,
+                explained: Vec::new(),
+            };
+            let evidence = images.evidence(&edge, Some(&chooser.taken), 0.0);
+            assert!(evidence.gain > 0.0);
+            chooser.settle(&edge, evidence)
+        };
+        assert!(settled(2).is_none());
+        assert!(settled(4).is_some());
     }
 }
