@@ -164,9 +164,10 @@ enum Kind {
 }
 
 fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
-    if images.is_curved(&found.line, &found.evidence, noise) {
+    let ChosenLine { line, evidence } = found;
+    if images.is_curved(line, evidence, noise) || images.is_chord(line, evidence, noise) {
         Kind::Curve
-    } else if images.is_outline(&found.line, &found.evidence) {
+    } else if images.is_outline(line, evidence) {
         Kind::Outline
     } else {
         Kind::Straight

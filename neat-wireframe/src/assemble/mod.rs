@@ -15,6 +15,7 @@
 //!
 //! All steps work in a world whose scene ball is the unit ball around the origin.
 
+mod arcs;
 mod candidate_queue;
 mod collinear_pieces;
 mod config;

@@ -31,11 +31,11 @@ pub(super) const CORRELATION: f64 = 4.0;
 
 /// The height of the arc that edgels draw over a line.
 #[derive(Clone, Copy)]
-struct Bow {
+pub(super) struct Bow {
     /// In two directions across the line, in pixels of the median view.
-    height: Vector2<f64>,
+    pub height: Vector2<f64>,
     /// Standard deviation of its length.
-    error: f64,
+    pub error: f64,
 }
 
 impl Bow {
@@ -77,6 +77,14 @@ impl Images<'_> {
         };
         bow(0, 1).is_some()
             && Option::zip(bow(0, 2), bow(1, 2)).is_some_and(|(one, other)| one.agrees(&other))
+    }
+
+    /// The bow that the edgels of all views that show a line draw over it.
+    pub(super) fn whole_bow(&self, line: &LineSegment3, evidence: &LineEvidence) -> Option<Bow> {
+        let rows: Vec<RowsOfView> = (evidence.views())
+            .map(|view| (view, self.rows(line, view)))
+            .collect();
+        self.bow(line, rows.iter())
     }
 
     /// A row for each edgel beside the inner part of a line in a view.
