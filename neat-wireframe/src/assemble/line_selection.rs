@@ -342,6 +342,18 @@ mod tests {
     use super::*;
     use crate::assemble::test_views::{TestViews, cube_edge};
 
+    /// One without candidates.
+    fn chooser(images: Images<'_>, taken: Vec<Vec<bool>>) -> Chooser<'_> {
+        Chooser {
+            images,
+            min_evidence: 0.0,
+            candidates: &[],
+            queue: CandidateQueue::new(&[], 0.0),
+            taken,
+            explained: Vec::new(),
+        }
+    }
+
     #[test]
     fn what_no_view_shows_with_edgels_of_its_own_is_no_line() {
         let cube = TestViews::of_cube(20);
@@ -351,14 +363,7 @@ mod tests {
             let mut taken = images.nothing_taken();
             let part = LineSegment3::new(edge.start, edge.point_at(share_of_others));
             claim_edgels(&images, &part, &mut taken);
-            let chooser = Chooser {
-                images,
-                min_evidence: 0.0,
-                candidates: &[],
-                queue: CandidateQueue::new(&[], 0.0),
-                taken,
-                explained: Vec::new(),
-            };
+            let chooser = chooser(images, taken);
             chooser.settle(&edge, images.evidence(&edge, None, 0.0))
         };
         assert!(settled(0.1).unwrap().evidence.showing.len() >= 18);
@@ -377,12 +382,7 @@ mod tests {
             for map in &mut taken[..whole_in] {
                 map.fill(false);
             }
-            let chooser = Chooser {
-                images,
-                min_evidence: 0.0,
-                taken,
-                explained: Vec::new(),
-            };
+            let chooser = chooser(images, taken);
             let evidence = images.evidence(&edge, Some(&chooser.taken), 0.0);
             assert!(evidence.gain > 0.0);
             chooser.settle(&edge, evidence)
