@@ -4,7 +4,8 @@
     scripts/measure_photographs.py DATA OUT                  seeds 0, 1 and 2
     scripts/measure_photographs.py DATA OUT --set KEY=VALUE  with another setting
 
-DATA holds one folder per scene, with images, a COLMAP model and truth/. The baseline of
+DATA holds one folder per scene, with images, a COLMAP model and truth/. *Structure* is what
+`neat export --only structure` leaves. The baseline of
 Hofer et al. and, where PyPI's pylimap is installed, LIMAP 2 get the 2D segments that neat
 detected. OUT keeps every run, so that an interrupted measurement goes on. Prints a Markdown
 table; OUT/measurements.json holds every number. Needs Python 3.9 and nothing else.
@@ -81,6 +82,11 @@ def measure(options):
             seconds = sum(manifest["seconds"].values())
             scores = evaluate(options, scene, run / "wireframe.json")
             results.append({"scene": scene.name, "of": "neat", "seed": seed, "seconds": seconds, **scores})
+            structure = options.out / "structure" / scene.name / f"seed-{seed}.json"
+            structure.parent.mkdir(parents=True, exist_ok=True)
+            call(options.neat, "export", run, "--only", "structure", "--out", structure)
+            scores = evaluate(options, scene, structure)
+            results.append({"scene": scene.name, "of": "neat, structure", "seed": seed, "seconds": seconds, **scores})
             runs.append(run)
             print(".", end="", file=sys.stderr, flush=True)
         if not options.no_rivals:
