@@ -15,6 +15,8 @@ use rayon::prelude::*;
 
 /// Radii that are tried, in pixels, on both sides of a line; the fit finds those between.
 const RADII: [f64; 8] = [2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0];
+/// Thinner tubes are lines, in reaches of edgels; with 3 all objects and parts are as with 2.
+const MIN_REACHES: f64 = 2.0;
 /// Reach of each round of the fit, and how far its views may have turned, in degrees: the
 /// first guess is good for little.
 const ROUNDS: [(f64, f64); 3] = [(2.5, 20.0), (2.5, 45.0), (1.0, 60.0)];
@@ -94,6 +96,10 @@ impl Images<'_> {
             let Some(tube) = self.fit_tube(&tube, pixel) else {
                 return false;
             };
+            // The outline of a thinner one stays where a line has its edgels.
+            if tube.radius.abs() < MIN_REACHES * self.reach * pixel {
+                return false;
+            }
             let least = of_line + ADVANTAGE;
             let in_view = |view| Some(tube.outline(self, view)?.0);
             let found = self.evidence_of(line, in_view, None, least, FREE_VIEWS);
@@ -103,7 +109,7 @@ impl Images<'_> {
             if found.gain <= least || (common as f64) < COMMON * shown {
                 return false;
             }
-            // A thin tube is a line, though not this one.
+            // It may stand for another line.
             let [start, end] = tube.axis.map(|axis| across * axis);
             let axis = LineSegment3::new(line.start + start, line.end + end);
             let axis = self.fit(&axis, found.views(), ROUNDS[0].0 * self.reach);
