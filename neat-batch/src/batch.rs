@@ -31,8 +31,8 @@ impl Batch {
     /// [defaults]                     # for every job; all keys are optional
     /// preset = "fast"
     /// seed = 0
-    /// set = ["train.rays=512"]
-    /// args = ["--time-budget", "10m"]
+    /// set = ["data.max_image_size=1600"]
+    /// args = ["--train", "--time-budget", "10m"]
     ///
     /// [[job]]
     /// scene = "scenes/house"         # relative to the folder of the manifest

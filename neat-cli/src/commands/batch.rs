@@ -37,7 +37,7 @@ const SIGNAL_INTERVAL: Duration = Duration::from_millis(25);
 Examples:
   neat batch 'scenes/*' --out OUT                          every folder there is a scene
   neat batch scenes.toml --out OUT --workers 4             as a manifest says
-  neat batch 'scenes/*' --out OUT -- --time-budget 10m     arguments of `neat reconstruct` for all
+  neat batch 'scenes/*' --out OUT -- --train               arguments of `neat reconstruct` for all
   neat batch scenes.toml --out OUT --dry-run               what would be done
   neat batch scenes.toml --out OUT --shard 2/8             the second eighth; in a Slurm job array
                                                            without --shard
@@ -47,8 +47,8 @@ A manifest:
   [defaults]                       # for every job; all keys are optional
   preset = \"fast\"                  # or config = \"FILE\"
   seed = 0
-  set = [\"train.rays=512\"]
-  args = [\"--time-budget\", \"10m\"]
+  set = [\"data.max_image_size=1600\"]
+  args = [\"--train\", \"--time-budget\", \"10m\"]
 
   [[job]]
   scene = \"scenes/house\"           # relative to the folder of the manifest

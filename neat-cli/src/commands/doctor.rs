@@ -109,7 +109,7 @@ impl DoctorArgs {
             text.push('\n');
         }
         if !costs.is_empty() {
-            text.push_str("\ntraining on this machine if it is idle, within a factor of two; photographs need none:\n");
+            text.push_str("\ntraining, where it is asked for, on this machine if it is idle, within a factor of two:\n");
         }
         for Cost { preset, estimate } in costs {
             let time = duration::display(estimate.seconds);

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Prints one line per noise, number of views, detector and back end: "adjusted"
-//! is the true graph, displaced and brought back by the bundle adjustment of the
-//! fast back end, "given" the displaced graph itself (0.003 per coordinate),
+//! is the true graph, displaced and brought back by bundle adjustment to the
+//! detections of its edges, "given" the displaced graph itself (0.003 per coordinate),
 //! "assembled" what the assembler finds. A second table compares the
 //! probabilities of true and false edges with the truth.
 
