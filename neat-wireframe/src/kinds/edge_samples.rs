@@ -69,6 +69,13 @@ pub(super) fn strip_index(side: Side, half_plane: usize, piece: usize, pieces: u
     (side as usize * HALF_PLANES + half_plane) * pieces + piece
 }
 
+/// What the samples of an edge in all its views take in memory.
+pub(super) fn sampled_bytes(frame: &EdgeFrame) -> usize {
+    let stations: usize = pieces(frame).iter().map(Vec::len).sum();
+    let of_view = Side::BOTH.len() * HALF_PLANES * ROWS.len() * stations;
+    frame.asked_views().count() * of_view
+}
+
 /// For every edge what each of its asked views shows; image after image.
 ///
 /// # Errors

@@ -32,13 +32,17 @@ use crate::ViewObservation;
 use crate::confidence::showing_views;
 use coplanarity::coplanarity;
 use edge_frame::EdgeFrame;
-use edge_samples::edge_samples;
+use edge_samples::{ViewSamples, edge_samples, sampled_bytes};
 use junctions::leaves_plane;
 use model::Witnesses;
 use nalgebra::Vector3;
 use neat_core::{Camera, Scene, SceneError, Wireframe3d};
 use rayon::prelude::*;
 use side_colours::SideColours;
+
+/// Samples of so many bytes are in memory at once; what takes more is taken in turns, for each of
+/// which the images are read again.
+const SAMPLED_AT_ONCE: usize = 256 << 20;
 
 /// The probabilities of the kinds of every edge.
 ///
@@ -62,28 +66,48 @@ pub fn edge_kinds(
     let frames: Vec<Option<EdgeFrame>> = (segments.par_iter().zip(&shown))
         .map(|(segment, views)| EdgeFrame::new(*segment, views, &cameras))
         .collect();
-    let samples = edge_samples(&frames, scene)?;
     let directions: Vec<Option<Vector3<f64>>> = (segments.iter())
         .map(|segment| (segment.end - segment.start).try_normalize(0.0))
         .collect();
     let leaving = leaves_plane(wireframe, &directions);
-    let of_edge = |index: usize| {
-        let mut witnesses = Witnesses {
-            leaves_plane: leaving[index],
-            ..Witnesses::default()
-        };
-        if let Some(frame) = &frames[index] {
-            let colours = SideColours::new(&samples[index]);
-            witnesses.chroma = colours.chroma;
-            witnesses.step = colours.step;
-            witnesses.instability = colours.instability;
-            // An edge that is seen all around lies within no plane.
-            if frame.common_planes().next().is_some() {
-                witnesses.coplanarity = coplanarity(frame, &samples[index]);
-                witnesses.darkness = colours.darkness;
-            }
-        }
-        witnesses.kinds()
+    let mut kinds = Vec::with_capacity(frames.len());
+    while kinds.len() < frames.len() {
+        let (frames, leaving) = (&frames[kinds.len()..], &leaving[kinds.len()..]);
+        let count = so_many_at_once(frames, SAMPLED_AT_ONCE);
+        let samples = edge_samples(&frames[..count], scene)?;
+        let of_edges = frames.par_iter().zip(leaving).zip(samples);
+        kinds.par_extend(of_edges.map(|((frame, leaves_plane), samples)| {
+            witnesses(frame.as_ref(), *leaves_plane, &samples).kinds()
+        }));
+    }
+    Ok(kinds)
+}
+
+/// How many of the first edges have samples of `most` bytes together, but one at least.
+fn so_many_at_once(frames: &[Option<EdgeFrame>], most: usize) -> usize {
+    let sizes = frames.iter().map(|f| f.as_ref().map_or(0, sampled_bytes));
+    let sums = sizes.scan(0, |sum: &mut usize, bytes| {
+        *sum = sum.saturating_add(bytes);
+        Some(*sum)
+    });
+    sums.take_while(|sum| *sum <= most).count().max(1)
+}
+
+fn witnesses(frame: Option<&EdgeFrame>, leaves_plane: f64, samples: &[ViewSamples]) -> Witnesses {
+    let mut witnesses = Witnesses {
+        leaves_plane,
+        ..Witnesses::default()
     };
-    Ok((0..segments.len()).into_par_iter().map(of_edge).collect())
+    if let Some(frame) = frame {
+        let colours = SideColours::new(samples);
+        witnesses.chroma = colours.chroma;
+        witnesses.step = colours.step;
+        witnesses.instability = colours.instability;
+        // An edge that is seen all around lies within no plane.
+        if frame.common_planes().next().is_some() {
+            witnesses.coplanarity = coplanarity(frame, samples);
+            witnesses.darkness = colours.darkness;
+        }
+    }
+    witnesses
 }

@@ -4,7 +4,7 @@ use super::*;
 use crate::test_scenes::{camera_looking_at_origin, views_of_edges};
 use nalgebra::Vector2;
 use neat_core::synthetic::{Solid, render};
-use neat_core::{Ray, Similarity, View, Wireframe2d};
+use neat_core::{LineSegment3, Ray, Similarity, View, Wireframe2d};
 use std::f64::consts::TAU;
 
 /// Twelve cameras at 15° and 30° from the z axis.
@@ -167,4 +167,18 @@ fn junctions_have_types_and_edges_leave_planes() {
     for (found, expected) in leaving.iter().zip(expected) {
         assert!((found - expected).abs() < 1e-12, "{leaving:?}");
     }
+}
+
+#[test]
+fn as_many_edges_are_sampled_at_once_as_memory_holds() {
+    let views: Vec<usize> = (0..12).collect();
+    let edge = LineSegment3::new(Vector3::zeros(), Vector3::new(0.5, 0.0, 0.0));
+    let frame = EdgeFrame::new(edge, &views, &cameras());
+    let bytes = sampled_bytes(frame.as_ref().unwrap());
+    assert!(bytes > 0);
+    let frames = [frame.clone(), None, frame.clone(), frame];
+    assert_eq!(so_many_at_once(&frames, 3 * bytes), 4);
+    assert_eq!(so_many_at_once(&frames, 3 * bytes - 1), 3);
+    assert_eq!(so_many_at_once(&frames, bytes), 2);
+    assert_eq!(so_many_at_once(&frames, 0), 1);
 }
