@@ -19,6 +19,7 @@ use neat_detect::{DetectorConfig, detect_views, edgel_maps};
 use neat_eval::{EvaluationInput, EvaluationOptions, NeatAbc, SceneTruth, Scores, foreign};
 use neat_eval::{Protocol, SurfaceAndCreases};
 use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble};
+use neat_wireframe::confidence::{ConfidenceConfig, assess};
 use neat_wireframe::export::{WireframeDocument, write_json};
 use neat_wireframe::kinds::edge_kinds;
 use neat_wireframe::metrics::{ImageEvidenceConfig, Matching, PrecisionRecall, image_evidence};
@@ -124,7 +125,11 @@ fn assembled(scene: &Scene) -> Result<Assembled> {
 /// The edges that are more likely creases or boundaries than anything else.
 fn structure_of(wireframe: &Wireframe3d, scene: &Scene) -> Result<Wireframe3d> {
     let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
-    let kinds = edge_kinds(wireframe, scene, &views)?;
+    let config = ConfidenceConfig::default();
+    let confidence = assess(wireframe, &views, None, 1.0, &config)?;
+    let edges = confidence.edges.into_iter();
+    let shown: Vec<Vec<usize>> = edges.map(|edge| edge.showing_views).collect();
+    let kinds = edge_kinds(wireframe, scene, &shown)?;
     let edges = wireframe.edges.iter().zip(&kinds);
     Ok(Wireframe3d {
         junctions: wireframe.junctions.clone(),

@@ -137,7 +137,9 @@ pub fn distill(
     let hiding = surface.as_ref().map(|grid| grid as &dyn SignedDistance);
     let assessing = &config.distill.confidence;
     let confidence = assess(&wireframe, &views, hiding, scene_radius, assessing)?;
-    let kinds = edge_kinds(&wireframe, scene, &views)?;
+    let edges = confidence.edges.iter();
+    let shown: Vec<Vec<usize>> = edges.map(|edge| edge.showing_views.clone()).collect();
+    let kinds = edge_kinds(&wireframe, scene, &shown)?;
     Ok(Distilled {
         wireframe,
         confidence,

@@ -1,7 +1,7 @@
 //! Hand-made cameras, views and noise for the unit tests of this crate.
 
-use crate::ViewObservation;
 use crate::projection::project_in_front;
+use crate::{SignedDistance, ViewObservation};
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{Camera, Intrinsics, LineSegment2, ScoredSegment2};
 
@@ -90,6 +90,22 @@ impl Noise {
     /// Three independent uniform numbers in [-1, 1).
     pub(crate) fn vector(&mut self) -> Vector3<f64> {
         Vector3::from_fn(|_, _| self.uniform())
+    }
+}
+
+/// The surface of a cube around the origin with this half side.
+pub(crate) struct CubeSurface(pub(crate) f64);
+
+impl SignedDistance for CubeSurface {
+    fn sdf(&self, points: &[Vector3<f64>]) -> Vec<f64> {
+        points.iter().map(|p| p.amax() - self.0).collect()
+    }
+
+    fn sdf_and_gradient(&self, points: &[Vector3<f64>]) -> Vec<(f64, Vector3<f64>)> {
+        let gradient = |p: &Vector3<f64>| Vector3::ith(p.iamax(), p[p.iamax()].signum());
+        (points.iter().zip(self.sdf(points)))
+            .map(|(p, sdf)| (sdf, gradient(p)))
+            .collect()
     }
 }
 

@@ -8,10 +8,10 @@
 
 use super::edge_samples::{Images, across, project_segment};
 use super::line_evidence::LineEvidence;
-use super::line_fitting::directions_across;
+use super::line_fitting::{change_by_edgels, directions_across};
 use super::projected_line::ProjectedLine;
+use super::straightness::Bow;
 use crate::projection::project_in_front;
-use crate::solve::{Cauchy, Reweighted, reweighted};
 use nalgebra::{Matrix3x2, SVector, Vector2, Vector3};
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -110,16 +110,16 @@ struct Gain {
 }
 
 impl Images<'_> {
-    /// Whether a line is a chord of an arc that goes on beyond its ends. `noise` is the standard
-    /// deviation of an edgel, in pixels.
+    /// Whether a line is a chord of an arc that goes on beyond its ends. `bow` is what edgels
+    /// beside the line show, `noise` the standard deviation of an edgel, in pixels.
     pub(super) fn is_chord(
         &self,
         line: &LineSegment3,
         evidence: &LineEvidence,
+        bow: Option<&Bow>,
         noise: f64,
     ) -> bool {
-        let Some((across, bow)) = directions_across(line).zip(self.whole_bow(line, evidence))
-        else {
+        let Some((across, bow)) = directions_across(line).zip(bow) else {
             return false;
         };
         // Most lines end here.
@@ -191,15 +191,10 @@ impl Images<'_> {
             let rows: Vec<(SVector<f64, 6>, f64)> = (evidence.views())
                 .flat_map(|view| self.rows_of_arc(&arc, view, range, reach))
                 .collect();
-            if rows.len() < MIN_EDGELS {
-                return None;
-            }
-            let loss = Cauchy { scale: 0.5 * reach };
-            let ridge = RIDGE * rows.len() as f64 / (pixel * pixel);
-            let Reweighted { solution, .. } = reweighted(&rows, loss, ridge)?;
-            arc.shift += solution.fixed_rows::<2>(0);
-            arc.tilt += solution.fixed_rows::<2>(2);
-            arc.bend += solution.fixed_rows::<2>(4) * (2.0 / arc.line.length());
+            let change = change_by_edgels(&rows, MIN_EDGELS, reach, RIDGE, pixel)?.solution;
+            arc.shift += change.fixed_rows::<2>(0);
+            arc.tilt += change.fixed_rows::<2>(2);
+            arc.bend += change.fixed_rows::<2>(4) * (2.0 / arc.line.length());
             if arc.bend.norm() * range[1].max(-range[0]) > MAX_TURN {
                 return None;
             }
@@ -304,7 +299,8 @@ mod tests {
         let images = views.images();
         let evidence = images.evidence(line, None, 0.0);
         assert!(evidence.showing.len() > 10, "{}", evidence.showing.len());
-        images.is_chord(line, &evidence, NOISE)
+        let bow = images.bend(line, &evidence).bow;
+        images.is_chord(line, &evidence, bow.as_ref(), NOISE)
     }
 
     #[test]

@@ -3,8 +3,8 @@
 use super::edge_samples::Images;
 use super::projected_line::ProjectedLine;
 use super::view_segments::PreparedView;
-use crate::solve::{Cauchy, LeastSquares, Options, minimise};
-use nalgebra::{Matrix3x2, Matrix4, Vector2, Vector3, Vector4};
+use crate::solve::{Cauchy, LeastSquares, Options, Reweighted, minimise, reweighted};
+use nalgebra::{Const, DimMin, Matrix3x2, Matrix4, SVector, Vector2, Vector3, Vector4};
 use neat_core::LineSegment3;
 
 /// Fewer edgels determine no line in space.
@@ -135,6 +135,27 @@ impl LeastSquares for LineProblem<'_> {
             line.end - across * step.fixed_rows::<2>(2),
         ))
     }
+}
+
+/// The change of a model's parameters that takes away the distances of edgels, by how each
+/// distance changes with them: robustly, for edgels within `reach` pixels. Parameters that no
+/// edgel tells of are kept by `ridge` per edgel, where a pixel is `pixel` long. `None` with fewer
+/// than `least` edgels.
+pub(super) fn change_by_edgels<const N: usize>(
+    rows: &[(SVector<f64, N>, f64)],
+    least: usize,
+    reach: f64,
+    ridge: f64,
+    pixel: f64,
+) -> Option<Reweighted<N>>
+where
+    Const<N>: DimMin<Const<N>, Output = Const<N>>,
+{
+    if rows.len() < least {
+        return None;
+    }
+    let loss = Cauchy { scale: 0.5 * reach };
+    reweighted(rows, loss, ridge * rows.len() as f64 / (pixel * pixel))
 }
 
 /// Two directions perpendicular to a line and to each other.

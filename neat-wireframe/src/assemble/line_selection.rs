@@ -165,7 +165,10 @@ enum Kind {
 
 fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
     let ChosenLine { line, evidence } = found;
-    if images.is_curved(line, evidence, noise) || images.is_chord(line, evidence, noise) {
+    let bend = images.bend(line, evidence);
+    if images.is_curved(line, &bend, noise)
+        || images.is_chord(line, evidence, bend.bow.as_ref(), noise)
+    {
         Kind::Curve
     } else if images.is_outline(line, evidence) {
         Kind::Outline

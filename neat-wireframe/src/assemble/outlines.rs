@@ -6,9 +6,8 @@
 
 use super::edge_samples::Images;
 use super::line_evidence::LineEvidence;
-use super::line_fitting::directions_across;
+use super::line_fitting::{change_by_edgels, directions_across};
 use super::projected_line::ProjectedLine;
-use crate::solve::{Cauchy, Reweighted, reweighted};
 use nalgebra::{Matrix2, Matrix3x2, SVector, Vector2};
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -144,15 +143,10 @@ impl Images<'_> {
             let rows: Vec<(SVector<f64, 5>, f64)> = (0..self.views.len())
                 .flat_map(|view| self.rows_of_tube(&tube, view, reach, min_cosine))
                 .collect();
-            if rows.len() < MIN_EDGELS {
-                return None;
-            }
-            let loss = Cauchy { scale: 0.5 * reach };
-            let ridge = RIDGE * rows.len() as f64 / (pixel * pixel);
-            let Reweighted { solution, .. } = reweighted(&rows, loss, ridge)?;
-            tube.axis[0] += solution.fixed_rows::<2>(0);
-            tube.axis[1] += solution.fixed_rows::<2>(2);
-            tube.radius += solution[4];
+            let change = change_by_edgels(&rows, MIN_EDGELS, reach, RIDGE, pixel)?.solution;
+            tube.axis[0] += change.fixed_rows::<2>(0);
+            tube.axis[1] += change.fixed_rows::<2>(2);
+            tube.radius += change[4];
         }
         Some(tube)
     }

@@ -5,9 +5,9 @@
 
 use super::edge_samples::Images;
 use super::line_evidence::LineEvidence;
-use super::line_fitting::directions_across;
+use super::line_fitting::{change_by_edgels, directions_across};
 use super::projected_line::ProjectedLine;
-use crate::solve::{Cauchy, Reweighted, reweighted};
+use crate::solve::Reweighted;
 use nalgebra::{SVector, Vector2};
 use neat_core::LineSegment3;
 
@@ -20,6 +20,8 @@ const MIN_WIDE_REACH: f64 = 0.8;
 const INNER: [f64; 2] = [0.1, 0.9];
 /// Fewer edgels tell nothing of a bow.
 const MIN_OF_BOW: usize = 20;
+/// What keeps a direction that no view tells of where it is.
+const RIDGE: f64 = 1e-6;
 /// A bow of so many standard deviations of an edgel, and of itself, is one …
 const BOW_NOISES: f64 = 2.0;
 const BOW_ERRORS: f64 = 3.0;
@@ -55,36 +57,36 @@ type Row = (SVector<f64, 6>, f64);
 /// The rows of a view.
 type RowsOfView = (usize, Vec<Row>);
 
+/// What the edgels beside a line say of a bow over it.
+pub(super) struct Bend {
+    rows: Vec<RowsOfView>,
+    /// That of all views.
+    pub bow: Option<Bow>,
+}
+
 impl Images<'_> {
     fn wide_reach(&self) -> f64 {
         (WIDE_REACH * self.reach).max(MIN_WIDE_REACH)
     }
 
-    /// Whether edgels beside a line bend away from it in the middle, as those of an arc.
-    /// `noise` is the standard deviation of an edgel, in pixels.
-    pub(super) fn is_curved(
-        &self,
-        line: &LineSegment3,
-        evidence: &LineEvidence,
-        noise: f64,
-    ) -> bool {
+    /// What edgels say of a bow over a line, in the views that show it.
+    pub(super) fn bend(&self, line: &LineSegment3, evidence: &LineEvidence) -> Bend {
         let rows: Vec<RowsOfView> = (evidence.views())
             .map(|view| (view, self.rows(line, view)))
             .collect();
-        let bow = |skip: usize, step: usize| {
-            let bow = self.bow(line, rows.iter().skip(skip).step_by(step))?;
-            bow.is_significant(noise).then_some(bow)
-        };
-        bow(0, 1).is_some()
-            && Option::zip(bow(0, 2), bow(1, 2)).is_some_and(|(one, other)| one.agrees(&other))
+        let bow = self.bow(line, rows.iter());
+        Bend { rows, bow }
     }
 
-    /// The bow that the edgels of all views that show a line draw over it.
-    pub(super) fn whole_bow(&self, line: &LineSegment3, evidence: &LineEvidence) -> Option<Bow> {
-        let rows: Vec<RowsOfView> = (evidence.views())
-            .map(|view| (view, self.rows(line, view)))
-            .collect();
-        self.bow(line, rows.iter())
+    /// Whether edgels beside a line bend away from it in the middle, as those of an arc.
+    /// `noise` is the standard deviation of an edgel, in pixels.
+    pub(super) fn is_curved(&self, line: &LineSegment3, bend: &Bend, noise: f64) -> bool {
+        let half = |skip: usize| {
+            let bow = self.bow(line, bend.rows.iter().skip(skip).step_by(2))?;
+            bow.is_significant(noise).then_some(bow)
+        };
+        (bend.bow.as_ref()).is_some_and(|bow| bow.is_significant(noise))
+            && Option::zip(half(0), half(1)).is_some_and(|(one, other)| one.agrees(&other))
     }
 
     /// A row for each edgel beside the inner part of a line in a view.
@@ -119,18 +121,10 @@ impl Images<'_> {
     ) -> Option<Bow> {
         let pixel = self.pixel_size(line, rows.clone().map(|(view, _)| *view));
         let rows: Vec<Row> = rows.flat_map(|(_, rows)| rows).copied().collect();
-        if rows.len() < MIN_OF_BOW {
-            return None;
-        }
-        let loss = Cauchy {
-            scale: 0.5 * self.wide_reach(),
-        };
-        // A direction that no view tells of stays where it is.
-        let ridge = 1e-6 * rows.len() as f64 / (pixel * pixel);
         let Reweighted {
             solution,
             covariance,
-        } = reweighted(&rows, loss, ridge)?;
+        } = change_by_edgels(&rows, MIN_OF_BOW, self.wide_reach(), RIDGE, pixel)?;
         let height = solution.fixed_rows::<2>(4) / pixel;
         let direction = height.try_normalize(0.0).unwrap_or(Vector2::x());
         let variance = direction.dot(&(covariance.fixed_view::<2, 2>(4, 4) * direction));

@@ -53,23 +53,7 @@ fn is_in_view(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SignedDistance;
-    use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
-    use nalgebra::Vector3;
-
-    /// A box of half side 0.5, in a unit of 3.
-    struct Cube;
-
-    impl SignedDistance for Cube {
-        fn sdf(&self, points: &[Vector3<f64>]) -> Vec<f64> {
-            points.iter().map(|p| p.amax() - 1.5).collect()
-        }
-
-        fn sdf_and_gradient(&self, points: &[Vector3<f64>]) -> Vec<(f64, Vector3<f64>)> {
-            let with_gradient = |sdf| (sdf, Vector3::zeros());
-            self.sdf(points).into_iter().map(with_gradient).collect()
-        }
-    }
+    use crate::test_scenes::{CubeSurface, cameras_on_sphere, cube, views_of_edges};
 
     #[test]
     fn images_lengths_and_the_surface_decide() {
@@ -88,7 +72,7 @@ mod tests {
         assert!(!unhidden.contains(&3) && !unhidden.contains(&4));
 
         let visible = expected(Some(&Occluder {
-            surface: &Cube,
+            surface: &CubeSurface(1.5),
             scene_radius: 3.0,
         }));
         // The edge y = z = -0.5 is seen from below or from one side.

@@ -90,8 +90,8 @@ pub struct EdgeConfidence {
     pub supports: Vec<EdgeSupport>,
     /// Number of views among them.
     pub views: usize,
-    /// Number of views whose segments cover most of the edge.
-    pub showing_views: usize,
+    /// The views whose segments cover most of the edge, ascending.
+    pub showing_views: Vec<usize>,
     /// Number of views that ought to show the edge, or do: most of it lies in the
     /// image, is long enough, and not hidden by the surface.
     pub expected_views: usize,
@@ -100,17 +100,6 @@ pub struct EdgeConfidence {
     pub residual_in_pixels: Option<f64>,
     /// Probability that the edge exists, in (0, 1).
     pub probability: f64,
-}
-
-/// For every edge the views that show it, ascending.
-pub(crate) fn showing_views(
-    wireframe: &Wireframe3d,
-    observations: &[ViewObservation],
-) -> Vec<Vec<usize>> {
-    let views: Vec<Option<IndexedView>> = observations.par_iter().map(IndexedView::new).collect();
-    let rules = ConfidenceConfig::default().provenance();
-    let found = provenance(&views, &wireframe.segments(), &rules);
-    found.into_iter().map(|edge| edge.showing_views).collect()
 }
 
 /// Asks the images, and the surface if there is one, about a wireframe.
@@ -231,7 +220,7 @@ fn edge_confidence(
         .sum();
     EdgeConfidence {
         views: supports.chunk_by(|a, b| a.view == b.view).count(),
-        showing_views: count.showing,
+        showing_views: found.showing_views,
         expected_views: count.expected,
         residual_in_pixels: (!supports.is_empty())
             .then(|| (squares / supports.len() as f64).sqrt()),

@@ -127,26 +127,10 @@ fn linspace(first: f64, last: f64, count: usize) -> impl Iterator<Item = f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_scenes::{Noise, camera_looking_at_origin, cube};
-
-    /// A box of half side 0.5.
-    struct Cube;
-
-    impl SignedDistance for Cube {
-        fn sdf(&self, points: &[Vector3<f64>]) -> Vec<f64> {
-            points.iter().map(|p| p.amax() - 0.5).collect()
-        }
-
-        fn sdf_and_gradient(&self, points: &[Vector3<f64>]) -> Vec<(f64, Vector3<f64>)> {
-            let gradient = |p: &Vector3<f64>| Vector3::ith(p.iamax(), p[p.iamax()].signum());
-            (points.iter().zip(self.sdf(points)))
-                .map(|(p, sdf)| (sdf, gradient(p)))
-                .collect()
-        }
-    }
+    use crate::test_scenes::{CubeSurface, Noise, camera_looking_at_origin, cube};
 
     const CUBE: Occluder = Occluder {
-        surface: &Cube,
+        surface: &CubeSurface(0.5),
         scene_radius: 1.0,
     };
 
@@ -193,7 +177,7 @@ mod tests {
                     .filter(|distance| *distance < to_camera.norm())
                     .map(|distance| point + to_camera.normalize() * distance)
                     .filter(|sample| sample.norm() < 1.0)
-                    .all(|sample| Cube.sdf(&[sample])[0] > min_sdf)
+                    .all(|sample| CubeSurface(0.5).sdf(&[sample])[0] > min_sdf)
         };
         let points = linspace(FIRST_POINT, LAST_POINT, POINTS).map(|t| edge.point_at(t));
         points.filter(is_visible).count() as f64 >= MIN_VISIBLE_SHARE * POINTS as f64

@@ -1,5 +1,6 @@
 //! The half-planes that are hinged at an edge, and the views that see them.
 
+use crate::statistics::upper_median;
 use nalgebra::Vector3;
 use neat_core::{Camera, LineSegment3};
 use std::f64::consts::PI;
@@ -70,13 +71,12 @@ impl EdgeFrame {
             .map(|(view, ray)| (*view, azimuth(ray)))
             .collect();
         views.sort_by(|a, b| a.1.total_cmp(&b.1));
-        pixels.sort_unstable_by(f64::total_cmp);
         Some(Self {
             segment,
             toward,
             left,
             views,
-            pixel: pixels[pixels.len() / 2],
+            pixel: upper_median(&mut pixels),
         })
     }
 

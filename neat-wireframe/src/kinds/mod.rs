@@ -28,8 +28,6 @@ pub use document::fill_kinds;
 pub use junctions::{JunctionType, junction_types};
 pub use model::{EdgeKind, EdgeKinds};
 
-use crate::ViewObservation;
-use crate::confidence::showing_views;
 use coplanarity::coplanarity;
 use edge_frame::EdgeFrame;
 use edge_samples::{ViewSamples, edge_samples, sampled_bytes};
@@ -48,7 +46,8 @@ const SAMPLED_AT_ONCE: usize = 256 << 20;
 ///
 /// - `wireframe`: valid, in the world of the cameras, with edges cut where others meet them.
 /// - `scene`: images and cameras; one image at a time is in memory.
-/// - `observations`: of the same views: their 2D segments say which of them show an edge.
+/// - `shown`: for each edge the views that show it, as
+///   [`showing_views`](crate::confidence::EdgeConfidence::showing_views) says.
 ///
 /// The result does not depend on the number of threads.
 ///
@@ -57,13 +56,12 @@ const SAMPLED_AT_ONCE: usize = 256 << 20;
 pub fn edge_kinds(
     wireframe: &Wireframe3d,
     scene: &Scene,
-    observations: &[ViewObservation],
+    shown: &[Vec<usize>],
 ) -> Result<Vec<EdgeKinds>, SceneError> {
     let _span = tracing::debug_span!("edge_kinds", edges = wireframe.edges.len()).entered();
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
-    let shown = showing_views(wireframe, observations);
     let segments = wireframe.segments();
-    let frames: Vec<Option<EdgeFrame>> = (segments.par_iter().zip(&shown))
+    let frames: Vec<Option<EdgeFrame>> = (segments.par_iter().zip(shown))
         .map(|(segment, views)| EdgeFrame::new(*segment, views, &cameras))
         .collect();
     let directions: Vec<Option<Vector3<f64>>> = (segments.iter())

@@ -1,7 +1,7 @@
 //! Rendered edges whose kinds are known.
 
 use super::*;
-use crate::test_scenes::{camera_looking_at_origin, views_of_edges};
+use crate::test_scenes::camera_looking_at_origin;
 use nalgebra::Vector2;
 use neat_core::synthetic::{Solid, render};
 use neat_core::{LineSegment3, Ray, Similarity, View, Wireframe2d};
@@ -74,8 +74,7 @@ fn kinds_of(scene: &Scene) -> EdgeKinds {
         junctions: vec![Vector3::new(-0.4, 0.0, 0.0), Vector3::new(0.4, 0.0, 0.0)],
         edges: vec![[0, 1]],
     };
-    let observations = views_of_edges(&cameras(), &wireframe.junctions, &wireframe.edges);
-    edge_kinds(&wireframe, scene, &observations).unwrap()[0]
+    edge_kinds(&wireframe, scene, &[(0..12).collect()]).unwrap()[0]
 }
 
 /// A step of brightness along the edge, and grain on both sides.
@@ -125,9 +124,9 @@ fn probabilities_add_up_and_anything_may_be_asked() {
         ],
         edges: vec![[0, 1], [1, 2], [2, 2]],
     };
-    let observations = views_of_edges(&cameras(), &wireframe.junctions, &wireframe.edges);
-    for observations in [observations.as_slice(), &[]] {
-        for kinds in edge_kinds(&wireframe, &scene, observations).unwrap() {
+    for views in [0..12, 0..0] {
+        let shown = vec![views.collect(); 3];
+        for kinds in edge_kinds(&wireframe, &scene, &shown).unwrap() {
             let rest = kinds.texture + kinds.shadow;
             assert!((kinds.structure() + rest - 1.0).abs() < 1e-12, "{kinds:?}");
             assert_eq!(kinds.most_likely().0, EdgeKind::Crease);

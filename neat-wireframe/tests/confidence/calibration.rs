@@ -47,7 +47,7 @@ fn the_surface_tells_which_views_ought_to_show_an_edge() {
             "{}",
             with.expected_views
         );
-        assert!(with.showing_views as f64 >= 0.6 * with.expected_views as f64);
+        assert!(with.showing_views.len() as f64 >= 0.6 * with.expected_views as f64);
         assert!(with.probability > 0.9);
     }
 }
