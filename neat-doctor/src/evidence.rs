@@ -6,7 +6,9 @@ use crate::corners::{corners, refined};
 use crate::descriptor::keypoints;
 use crate::examination::median;
 use crate::gray_image::GrayImage;
-use crate::tracks::{self, Track, ViewKeypoints, matching};
+use crate::image_checks::has_plain_border;
+use crate::silhouettes::Silhouette;
+use crate::tracks::{self, Matching, Track, ViewKeypoints, matching};
 use crate::working_copies::WorkingCopies;
 use nalgebra::Vector2;
 use neat_core::{Camera, Scene, SceneError, View};
@@ -20,7 +22,12 @@ const CANDIDATES: usize = 2 * MAX_CORNERS;
 /// What the images show that cameras have to explain.
 pub(crate) enum Evidence {
     /// Points of textured things, matched by their looks.
-    Tracks(Vec<Track>),
+    Tracks {
+        /// Through three views each.
+        tracks: Vec<Track>,
+        /// What they were found among, of each view that was looked at.
+        keypoints: Vec<ViewKeypoints>,
+    },
     /// Corners of things without texture, which all look alike.
     Corners(CornerEvidence),
 }
@@ -30,7 +37,7 @@ impl Evidence {
     /// `trusted` views show together.
     pub fn agreement(&self, cameras: &[Camera], trusted: &[bool]) -> Agreement {
         match self {
-            Self::Tracks(tracks) => tracks::agreement(tracks, cameras, trusted),
+            Self::Tracks { tracks, .. } => tracks::agreement(tracks, cameras, trusted),
             Self::Corners(corners) => corners.agreement(cameras, trusted),
         }
     }
@@ -38,7 +45,7 @@ impl Evidence {
     /// What is counted, in words.
     pub fn noun(&self) -> &'static str {
         match self {
-            Self::Tracks(_) => "points matched through three views",
+            Self::Tracks { .. } => "points matched through three views",
             Self::Corners(_) => "corners",
         }
     }
@@ -51,6 +58,8 @@ pub(crate) struct Gathered {
     pub evidence: Evidence,
     /// How alike the views i < j look, in the order (0, 1), (0, 2), …, (1, 2), ….
     pub likeness: Vec<f64>,
+    /// Of things without texture before a plain background.
+    pub silhouettes: Vec<Silhouette>,
 }
 
 /// At most `limit` of `count` views, evenly spread.
@@ -96,15 +105,12 @@ pub(crate) fn gather(
                 keypoints: keypoints(&image),
             })
         })?;
-        let matching = matching(&keypoints);
+        let Matching { common, tracks } = matching(&keypoints);
         return Ok(Gathered {
             views,
-            evidence: Evidence::Tracks(matching.tracks),
-            likeness: matching
-                .common
-                .iter()
-                .map(|&n| (1.0 + n as f64).ln())
-                .collect(),
+            evidence: Evidence::Tracks { tracks, keypoints },
+            likeness: common.iter().map(|&n| (1.0 + n as f64).ln()).collect(),
+            silhouettes: Vec::new(),
         });
     }
     let looked = working.look_at(&views, |view| {
@@ -120,9 +126,11 @@ pub(crate) fn gather(
             .map(|corner| Vector2::new(full(corner.x), full(corner.y)))
             .collect();
         let corners = ViewCorners::new(view, corners, larger_side(&scene.views[view]));
-        Ok((corners, Thumbnail::new(&image)))
+        let silhouette = has_plain_border(&image).then(|| Silhouette::new(view, &image));
+        Ok((corners, (Thumbnail::new(&image), silhouette)))
     })?;
-    let (corners, thumbnails): (Vec<_>, Vec<_>) = looked.into_iter().unzip();
+    let (corners, others): (Vec<_>, Vec<_>) = looked.into_iter().unzip();
+    let (thumbnails, silhouettes): (Vec<_>, Vec<_>) = others.into_iter().unzip();
     let likeness = (0..views.len())
         .flat_map(|i| (i + 1..views.len()).map(move |j| [i, j]))
         .map(|[i, j]| thumbnails[i].likeness(&thumbnails[j]))
@@ -131,6 +139,7 @@ pub(crate) fn gather(
         views,
         evidence: Evidence::Corners(CornerEvidence::new(corners)),
         likeness,
+        silhouettes: silhouettes.into_iter().flatten().collect(),
     })
 }
 

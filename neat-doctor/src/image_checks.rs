@@ -45,7 +45,8 @@ impl ImageStatistics {
     }
 }
 
-fn has_plain_border(image: &GrayImage) -> bool {
+/// Whether nine tenths of the border have one brightness, as around rendered objects.
+pub(crate) fn has_plain_border(image: &GrayImage) -> bool {
     let corner = image.at(0, 0);
     let (right, bottom) = (image.width - 1, image.height - 1);
     let horizontal = (0..image.width).flat_map(|x| [(x, 0), (x, bottom)]);

@@ -38,8 +38,10 @@ mod hypothesis;
 mod image_checks;
 mod likeness;
 mod load_failure;
+mod point_transfer;
 mod pose_diagnosis;
 mod pose_findings;
+mod silhouettes;
 mod tracks;
 mod working_copies;
 

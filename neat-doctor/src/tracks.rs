@@ -2,7 +2,7 @@
 //! photographs of textured things. Poses play no part in finding them.
 
 use crate::agreement::{Agreement, Tally};
-use crate::descriptor::{Keypoint, distance};
+use crate::descriptor::{Descriptor, Keypoint, distance};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::Camera;
 use rayon::prelude::*;
@@ -20,6 +20,8 @@ pub(crate) struct Sighting {
     pub pixel: Vector2<f64>,
     /// How far from its projection the point may be, in pixels.
     pub tolerance: f64,
+    /// What it looks like there.
+    pub descriptor: Descriptor,
 }
 
 /// The keypoints of one view.
@@ -39,7 +41,7 @@ const TOLERANCE: f64 = 2.0;
 /// Residuals of good cameras are about as large, in tolerances.
 const TYPICAL_RESIDUAL: f64 = 0.25;
 /// More than this many of 256 bits differ by chance already.
-const MAX_DISTANCE: u32 = 76;
+pub(crate) const MAX_DISTANCE: u32 = 76;
 /// The next best place differs by this many times as many bits, at least.
 const MAX_RATIO: f64 = 0.85;
 /// Keypoints of several levels nearer than this, in pixels, are the same place.
@@ -53,7 +55,7 @@ const MAX_TRACKS: usize = 6000;
 const NONE: u16 = u16::MAX;
 
 impl ViewKeypoints {
-    fn sighting(&self, index: usize) -> Sighting {
+    pub fn sighting(&self, index: usize) -> Sighting {
         let keypoint = &self.keypoints[index];
         // From the centres of working pixels to those of the photograph's.
         let full = |working: f32| (f64::from(working) + 0.5) * self.factor - 0.5;
@@ -61,6 +63,7 @@ impl ViewKeypoints {
             view: self.view,
             pixel: Vector2::new(full(keypoint.x), full(keypoint.y)).add_scalar(self.pixel_center),
             tolerance: TOLERANCE * self.factor * f64::from(keypoint.scale),
+            descriptor: keypoint.descriptor,
         }
     }
 }
@@ -219,8 +222,13 @@ impl Track {
         residuals.into_iter().fold(0.0, f64::max)
     }
 
+    /// Where its views see it.
+    pub fn sightings(&self) -> &[Sighting; 3] {
+        &self.0
+    }
+
     /// The point nearest to the three rays.
-    fn triangulated(&self, cameras: &[Camera]) -> Option<Vector3<f64>> {
+    pub fn triangulated(&self, cameras: &[Camera]) -> Option<Vector3<f64>> {
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
         for sighting in &self.0 {
             let ray = cameras[sighting.view].ray_through(&sighting.pixel);

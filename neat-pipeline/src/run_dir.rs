@@ -231,7 +231,6 @@ impl RunDir {
             Existing::Resume => dir.remove_temporaries(),
             Existing::Refuse => Ok(()),
         }
-        .and_then(|()| file::create_dir(&root.join(CHECKPOINTS)))
         .map_err(unwritable)?;
         Ok((dir, lock))
     }
@@ -429,10 +428,15 @@ impl RunDir {
         checkpoint: &Checkpoint,
         kept: usize,
     ) -> Result<PathBuf, RunDirError> {
-        let path = self
-            .root
-            .join(CHECKPOINTS)
-            .join(format!("step-{iteration:08}.safetensors"));
+        let dir = self.root.join(CHECKPOINTS);
+        match fs::create_dir(&dir) {
+            // Not those above it: a run folder that is lost in between is an error.
+            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+                return Err(write_error(&dir, error).into());
+            }
+            _ => {}
+        }
+        let path = dir.join(format!("step-{iteration:08}.safetensors"));
         checkpoint.write(&path)?;
         let mut old = self.checkpoints()?;
         old.truncate(old.len().saturating_sub(kept.max(1)));

@@ -11,7 +11,7 @@ use burn::tensor::{DType, Device, Tensor, TensorData};
 use neat_sdf::density::laplace_density;
 use neat_sdf::ray_sampler::{ErrorBoundConfig, ErrorBoundTrace, RayBundle, SamplingNoise};
 use neat_sdf::volume_rendering::{integrate, rendering_weights};
-use neat_tests::backends::{flex, on_each_cpu_backend};
+use neat_tests::backends::{flex, on_each_backend};
 use neat_tests::comparison::{assert_close, count_beyond};
 use neat_tests::golden::Golden;
 use neat_tests::tensors::{float64, numbers};
@@ -218,7 +218,7 @@ fn moved(z: &[f64], truth: &[f64]) -> usize {
 #[test]
 fn evaluation_follows_the_published_iterations() {
     let golden = Golden::open("05_error_bound_sampler");
-    on_each_cpu_backend(|device| {
+    on_each_backend(|device| {
         for (tag, positions) in [
             ("eval_b0.05", None),
             ("eval_b0.005", None),
@@ -238,7 +238,7 @@ fn evaluation_follows_the_published_iterations() {
 #[test]
 fn training_follows_the_published_random_decisions() {
     let golden = Golden::open("05_error_bound_sampler");
-    on_each_cpu_backend(|device| {
+    on_each_backend(|device| {
         let run = Run {
             tag: "train_b0.05",
             beta: 2e-3,
