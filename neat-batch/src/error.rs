@@ -87,6 +87,6 @@ impl BatchError {
     /// Whether the cause lies in what was asked for or in the input; otherwise the
     /// batch itself failed.
     pub fn is_bad_input(&self) -> bool {
-        !matches!(self, Self::File(SceneError::Write { .. }))
+        !matches!(self, Self::File(error) if !error.is_bad_input())
     }
 }

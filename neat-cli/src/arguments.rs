@@ -47,6 +47,13 @@ impl MethodArgs {
     pub fn apply(&self, base: &Config) -> Result<Config, CliError> {
         let mut config = apply_overrides(base, &self.set)?;
         if let Some(steps) = self.steps {
+            let set = self.set.iter().any(|set| set.starts_with("train.steps="));
+            if set && config.train.steps != steps {
+                let other = config.train.steps;
+                let text =
+                    format!("--steps {steps} and --set train.steps={other}: give one of them");
+                return Err(CliError::Usage(text));
+            }
             config.train.steps = steps;
         }
         Ok(config)

@@ -19,7 +19,11 @@ impl CacheArgs {
     /// if it is not wanted or the system has no such folder.
     pub fn open(self) -> Option<FileCache> {
         let dir = if self.no_cache { None } else { dir() };
-        dir.map(FileCache::new)
+        let cache = dir.map(FileCache::new);
+        if let Some(cache) = &cache {
+            cache.remove_abandoned();
+        }
+        cache
     }
 }
 

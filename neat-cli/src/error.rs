@@ -77,10 +77,12 @@ pub enum CliError {
     #[error("the scene is not ready: solve its problems first")]
     NotReady,
     /// The operating system gives no threads.
-    #[error("the threads asked for cannot be started: use fewer with --threads")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
+    #[error(
+        "the system starts no threads: raise its limit (ulimit -u), or use fewer with --threads"
+    )]
+    Threads(#[source] rayon::ThreadPoolBuildError),
     /// The operating system does not tell of Ctrl-C.
-    #[error("Ctrl-C cannot be caught")]
+    #[error("signals cannot be caught")]
     Interrupt(#[source] std::io::Error),
     /// A wireframe could not be exported.
     #[error(transparent)]
@@ -165,11 +167,9 @@ impl CliError {
             }
             Self::Pipeline(error) if error.is_bad_input() => BAD_INPUT,
             Self::Lab(error) if error.is_bad_input() => BAD_INPUT,
-            Self::Override(_)
-            | Self::UnknownView { .. }
-            | Self::Usage(_)
-            | Self::Threads(_)
-            | Self::NotReady => BAD_INPUT,
+            Self::Override(_) | Self::UnknownView { .. } | Self::Usage(_) | Self::NotReady => {
+                BAD_INPUT
+            }
             Self::Export(error) if error.is_bad_input() => BAD_INPUT,
             Self::Batch(error) if error.is_bad_input() => BAD_INPUT,
             // `neat info SCENE | head` is no failure.

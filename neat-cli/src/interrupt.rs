@@ -1,18 +1,20 @@
-//! Ctrl-C: the first one asks the run to end, the second one ends it.
+//! Ctrl-C: the first one asks the run to end, the second one ends it. Requests to terminate
+//! and terminals that are closed ask, too.
 
 use crate::error::{CliError, INTERRUPTED};
-use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+
+#[cfg(unix)]
+use signal_hook::consts::SIGHUP;
+use signal_hook::consts::{SIGINT, SIGTERM};
 
 /// A flag that every Ctrl-C, or request to terminate, sets, for a command that clears
 /// it and decides itself what the second one means.
 pub fn repeated_flag() -> Result<Arc<AtomicBool>, CliError> {
     let interrupted = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
-        flag::register(signal, Arc::clone(&interrupted)).map_err(CliError::Interrupt)?;
-    }
+    register(&interrupted)?;
     Ok(interrupted)
 }
 
@@ -23,8 +25,46 @@ pub fn flag() -> Result<Arc<AtomicBool>, CliError> {
     // Registered first, so that it acts on the second signal only.
     flag::register_conditional_shutdown(SIGINT, INTERRUPTED.into(), Arc::clone(&interrupted))
         .map_err(CliError::Interrupt)?;
-    for signal in [SIGINT, SIGTERM] {
-        flag::register(signal, Arc::clone(&interrupted)).map_err(CliError::Interrupt)?;
-    }
+    register(&interrupted)?;
     Ok(interrupted)
+}
+
+fn register(interrupted: &Arc<AtomicBool>) -> Result<(), CliError> {
+    let mut signals = vec![SIGINT, SIGTERM];
+    #[cfg(unix)]
+    if !is_ignored(SIGHUP) {
+        signals.push(SIGHUP);
+    }
+    for signal in signals {
+        flag::register(signal, Arc::clone(interrupted)).map_err(CliError::Interrupt)?;
+    }
+    Ok(())
+}
+
+/// Lets a file that grows beyond a limit (`ulimit -f`) fail like one on a full disk, where the
+/// system would end the process.
+pub fn survive_limits() -> Result<(), CliError> {
+    #[cfg(unix)]
+    flag::register(signal_hook::consts::SIGXFSZ, Arc::default()).map_err(CliError::Interrupt)?;
+    Ok(())
+}
+
+/// Whether whoever started the process asked it to ignore a signal, as `nohup` does. Where the
+/// system does not say, that is believed of programs that no terminal listens to.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    use std::io::{IsTerminal, stderr};
+
+    let mask = std::fs::read_to_string("/proc/self/status")
+        .ok()
+        .and_then(|status| {
+            let mask = status
+                .lines()
+                .find_map(|line| line.strip_prefix("SigIgn:"))?;
+            u64::from_str_radix(mask.trim(), 16).ok()
+        });
+    match mask {
+        Some(mask) => mask >> (signal - 1) & 1 == 1,
+        None => !stderr().is_terminal(),
+    }
 }

@@ -13,6 +13,7 @@ mod memory;
 mod output;
 mod progress;
 mod scene_arguments;
+mod threads;
 
 use clap::Parser;
 use commands::Cli;

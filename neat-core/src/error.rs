@@ -3,8 +3,17 @@
 use crate::camera::CameraError;
 use crate::wireframe2d::Wireframe2dError;
 use std::error::Error;
+use std::io::ErrorKind;
 use std::iter::successors;
 use std::path::{Path, PathBuf};
+
+/// What Unix says for an error of the device, and for too many open files of the system and of
+/// the process: EIO, ENFILE, EMFILE.
+#[cfg(unix)]
+const LACKING: [i32; 3] = [5, 23, 24];
+/// What Windows says for too many open files.
+#[cfg(not(unix))]
+const LACKING: [i32; 1] = [4];
 
 /// Why a file or a folder of a scene could not be read or written.
 ///
@@ -238,6 +247,22 @@ pub enum SceneError {
 }
 
 impl SceneError {
+    /// Whether the files are to blame; otherwise it is the system, which may do better at the
+    /// next try: it cannot write, or has no memory or file handles left.
+    pub fn is_bad_input(&self) -> bool {
+        let source = match self {
+            Self::Write { .. } | Self::ImageStore { .. } => return false,
+            Self::Read { source, .. } => source,
+            Self::Image {
+                source: image::ImageError::IoError(source),
+                ..
+            } => source,
+            _ => return true,
+        };
+        !(source.kind() == ErrorKind::OutOfMemory
+            || (source.raw_os_error()).is_some_and(|code| LACKING.contains(&code)))
+    }
+
     /// A file that breaks the rules of its format.
     pub fn malformed(path: &Path, reason: impl Into<String>) -> Self {
         Self::Malformed {

@@ -6,7 +6,9 @@
 
 use crate::{SceneError, file};
 use sha2::{Digest, Sha256};
+use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// A folder of results; it is created when the first one is stored.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,10 +42,18 @@ impl CacheKey {
             file_name: format!("{kind}-{hex}"),
         }
     }
+
+    /// What stands before a result: it tells damage, and files that changed their names.
+    fn digest_with(&self, result: &[u8]) -> [u8; DIGEST_BYTES] {
+        let digest = Sha256::new_with_prefix(&self.file_name);
+        digest.chain_update(result).finalize().into()
+    }
 }
 
 /// Bytes of the digest at the head of every file.
 const DIGEST_BYTES: usize = 32;
+/// No result takes so long to write.
+const ABANDONED: Duration = Duration::from_secs(3600);
 
 impl FileCache {
     /// The cache in the folder `dir`, which need not exist.
@@ -56,11 +66,26 @@ impl FileCache {
         &self.dir
     }
 
+    /// Removes what writers left that were killed. Those that may still write are spared.
+    pub fn remove_abandoned(&self) {
+        let entries = fs::read_dir(&self.dir).into_iter().flatten().flatten();
+        for path in entries
+            .map(|entry| entry.path())
+            .filter(|path| file::is_temporary(path))
+        {
+            let age = fs::metadata(&path).and_then(|about| about.modified()).ok();
+            if age.and_then(|age| age.elapsed().ok()) > Some(ABANDONED) {
+                // Someone else was faster, or the folder is not ours to tidy.
+                let _ = fs::remove_file(&path);
+            }
+        }
+    }
+
     /// The result stored under `key`, if it is there and undamaged.
     pub fn get(&self, key: &CacheKey) -> Option<Vec<u8>> {
         let mut stored = file::read(&self.path(key), "").ok()?;
         let digest = stored.get(..DIGEST_BYTES)?;
-        if digest != Sha256::digest(&stored[DIGEST_BYTES..]).as_slice() {
+        if digest != key.digest_with(&stored[DIGEST_BYTES..]) {
             return None;
         }
         stored.drain(..DIGEST_BYTES);
@@ -74,7 +99,7 @@ impl FileCache {
     /// result need not be stored, so that this is a warning to the user.
     pub fn put(&self, key: &CacheKey, result: &[u8]) -> Result<(), SceneError> {
         file::create_dir(&self.dir)?;
-        let stored = [Sha256::digest(result).as_slice(), result].concat();
+        let stored = [&key.digest_with(result), result].concat();
         file::write_atomically(&self.path(key), &stored)
     }
 
@@ -86,7 +111,37 @@ impl FileCache {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
+    use std::time::SystemTime;
+
+    #[test]
+    fn a_result_under_the_name_of_another_is_none() {
+        let dir = tempfile::tempdir().unwrap();
+        let cache = FileCache::new(dir.path());
+        let [one, other] = [b"1", b"2"].map(|input| CacheKey::new("test", 1, &[input]));
+        cache.put(&one, b"result").unwrap();
+        fs::copy(cache.path(&one), cache.path(&other)).unwrap();
+        assert_eq!(cache.get(&other), None);
+        assert!(cache.get(&one).is_some());
+    }
+
+    #[test]
+    fn what_killed_writers_left_goes_and_what_is_being_written_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let cache = FileCache::new(dir.path());
+        cache
+            .put(&CacheKey::new("test", 1, &[]), b"result")
+            .unwrap();
+        let [old, new] = [".test-1.77.0.tmp", ".test-2.78.0.tmp"].map(|name| dir.path().join(name));
+        for path in [&old, &new] {
+            fs::write(path, b"a part").unwrap();
+        }
+        let file = fs::File::options().write(true).open(&old).unwrap();
+        file.set_modified(SystemTime::now() - 2 * ABANDONED)
+            .unwrap();
+        cache.remove_abandoned();
+        assert!(!old.exists() && new.exists());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 2);
+    }
 
     #[test]
     fn results_come_back_until_they_are_damaged() {

@@ -244,7 +244,8 @@ pub(crate) fn check_names<'a>(
         };
         return Err(SceneError::ViewName {
             path: path.into(),
-            view: name.into(),
+            // A name with ends of lines would look like several messages.
+            view: name.replace('\n', r"\n"),
             reason,
         });
     }

@@ -5,7 +5,11 @@ mod mapping;
 use crate::LineSegment2;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 use thiserror::Error;
+
+/// A detector's confidence, with room for rounding.
+const SCORES: RangeInclusive<f64> = 0.0..=1.0 + 1e-6;
 
 /// Vertices lie within so many pixels of the image's corner, whatever the image.
 const MAX_COORDINATE: f64 = 1e6;
@@ -63,6 +67,18 @@ pub enum Wireframe2dError {
         /// Which one.
         index: usize,
     },
+    /// A score that is no confidence.
+    #[error(
+        "{kind} number {index} of its wireframe has the score {score:e}: scores are from 0 to 1"
+    )]
+    Score {
+        /// "vertex" or "edge".
+        kind: &'static str,
+        /// Which one.
+        index: usize,
+        /// What it is.
+        score: f64,
+    },
     /// A vertex farther out than any image is large.
     #[error(
         "vertex number {index} of its wireframe lies at ({x:e}, {y:e}) pixels, far outside of any image"
@@ -89,8 +105,15 @@ pub enum Wireframe2dError {
     },
 }
 
+fn check_score(kind: &'static str, index: usize, score: f64) -> Result<(), Wireframe2dError> {
+    if SCORES.contains(&score) {
+        return Ok(());
+    }
+    Err(Wireframe2dError::Score { kind, index, score })
+}
+
 impl Wireframe2d {
-    /// Checks that every element has a finite score, every vertex finite
+    /// Checks that every element has a score from 0 to 1, every vertex finite
     /// coordinates, and every edge two vertices.
     ///
     /// # Errors
@@ -117,6 +140,7 @@ impl Wireframe2d {
                 let kind = "vertex";
                 return Err(Wireframe2dError::NotFinite { kind, index });
             }
+            check_score("vertex", index, *score)?;
             if vertex.x.abs().max(vertex.y.abs()) > MAX_COORDINATE {
                 let (x, y) = (vertex.x, vertex.y);
                 return Err(Wireframe2dError::FarOutside { index, x, y });
@@ -127,6 +151,7 @@ impl Wireframe2d {
                 let kind = "edge";
                 return Err(Wireframe2dError::NotFinite { kind, index });
             }
+            check_score("edge", index, *score)?;
             if let Some(&vertex) = edge.iter().find(|&&v| v >= self.vertices.len()) {
                 return Err(Wireframe2dError::VertexOutOfRange {
                     edge: index,

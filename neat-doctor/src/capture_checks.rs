@@ -6,11 +6,10 @@ use crate::examination::{
 use nalgebra::Vector3;
 use neat_core::{Camera, Scene};
 
-/// What is found about cameras, sparse points and segments.
+/// What is found about cameras and sparse points.
 pub(crate) fn capture_findings(scene: &Scene) -> Vec<Finding> {
     let mut findings = vec![coverage(scene), scene_sphere(scene)];
     findings.extend(sparse_points(scene));
-    findings.extend(segments(scene));
     findings
 }
 
@@ -18,6 +17,12 @@ pub(crate) fn capture_findings(scene: &Scene) -> Vec<Finding> {
 const WIDE: f64 = 35.0;
 /// Views closer together than this, in degrees, hardly tell a depth.
 const NARROW: f64 = 5.0;
+
+/// A scene sphere that is smaller in the images, in pixels, has no room for an edge.
+const MIN_SIZE: f64 = 10.0;
+/// Cameras within a scene sphere that are all nearer to each other, in its radii, look from one
+/// place.
+const MIN_BASELINE: f64 = 1e-3;
 
 fn coverage(scene: &Scene) -> Finding {
     let count = scene.views.len();
@@ -100,19 +105,46 @@ fn scene_sphere(scene: &Scene) -> Finding {
     if !away.is_empty() {
         let message = of_cameras(&away, "do not look at");
         let mut finding = Finding::warning(Check::SceneSphere, message, remedy);
-        // What no camera looks at cannot be reconstructed.
-        if away.len() == scene.views.len() {
+        // What most cameras do not look at is not what they were made for.
+        if 2 * away.len() > scene.views.len() {
             finding.level = Level::Problem;
         }
         return finding.of_views(away);
     }
+    let size = median(sizes_in_pixels(scene));
+    if size < MIN_SIZE {
+        let message = format!("{ball} is {size:.2} pixels large in the images (median)");
+        return Finding::new(Check::SceneSphere, Level::Problem, message)
+            .because(Cause::Other)
+            .remedied_by(remedy);
+    }
     if !inside.is_empty() {
         let message = of_cameras(&inside, "stand inside");
-        return Finding::warning(Check::SceneSphere, message, remedy).of_views(inside);
+        let mut finding = Finding::warning(Check::SceneSphere, message, remedy);
+        let apart = (scene.views.iter())
+            .map(|view| (view.camera.center_in_world - camera(0).center_in_world).norm())
+            .fold(0.0, f64::max);
+        // From one place, as seen from what it holds.
+        if inside.len() == scene.views.len() && apart < MIN_BASELINE * scene.sphere_radius {
+            finding.level = Level::Problem;
+        }
+        return finding.of_views(inside);
     }
     let seen = median(shares.into_iter());
     let message = format!("cameras see {} of {ball} (median)", percent(seen));
     Finding::new(Check::SceneSphere, Level::Good, message)
+}
+
+/// Diameters of the scene sphere in the images of the cameras outside of it; infinite inside.
+fn sizes_in_pixels(scene: &Scene) -> impl Iterator<Item = f64> {
+    scene.views.iter().map(|view| {
+        let (camera, radius) = (&view.camera, scene.sphere_radius);
+        let distance = camera.center_in_world.norm();
+        if distance <= radius {
+            return f64::INFINITY;
+        }
+        2.0 * radius * camera.intrinsics.fx.max(camera.intrinsics.fy) / distance
+    })
 }
 
 /// The share of the scene sphere that a camera sees.
@@ -173,28 +205,4 @@ fn sparse_points(scene: &Scene) -> Option<Finding> {
         return Some(finding);
     }
     Some(Finding::new(Check::SparsePoints, Level::Good, message))
-}
-
-fn segments(scene: &Scene) -> Option<Finding> {
-    let count = |view: usize| scene.views[view].wireframe.edges.len();
-    let empty = views_where(scene, |view| count(view) == 0);
-    if empty.len() == scene.views.len() {
-        return None;
-    }
-    let usual = median((0..scene.views.len()).map(|view| count(view) as f64));
-    let message = format!("{usual} 2D segments per view (median)");
-    if empty.is_empty() {
-        return Some(Finding::new(Check::Segments, Level::Good, message));
-    }
-    let message = format!(
-        "{message}, none in {}: {}",
-        counted(empty.len(), "view"),
-        listed(&empty)
-    );
-    let level = if 4 * empty.len() > scene.views.len() {
-        Level::Warning
-    } else {
-        Level::Note
-    };
-    Some(Finding::new(Check::Segments, level, message).of_views(empty))
 }

@@ -83,6 +83,8 @@ pub enum Cause {
     BadPose,
     /// Images and poses that do not agree, for no reason found.
     PosesDisagree,
+    /// 2D wireframes that were made from other images.
+    SegmentsOfOtherImages,
     /// Too little can be seen to judge.
     TooLittleEvidence,
     /// A fault of another kind.

@@ -6,6 +6,7 @@ use crate::examination::{Check, Examination, Finding, Level, Repair};
 use crate::image_checks::image_findings;
 use crate::load_failure::{explain, size_factor};
 use crate::pose_diagnosis::Diagnosis;
+use crate::segment_checks::segment_findings;
 use crate::working_copies::WorkingCopies;
 use neat_core::{
     CameraError, LoadOptions, LoadedScene, MemoryLimit, Scene, SceneError, ViewError, load_scene,
@@ -82,6 +83,7 @@ fn findings(
     let mut findings = pose_findings(scene, &working, options, mirrored)?;
     findings.extend(image_findings(scene, &working)?);
     findings.extend(capture_findings(scene));
+    findings.extend(segment_findings(scene, &working)?);
     for Finding { level, message, .. } in &findings {
         debug!(%level, "{message}");
     }

@@ -41,6 +41,7 @@ mod load_failure;
 mod point_transfer;
 mod pose_diagnosis;
 mod pose_findings;
+mod segment_checks;
 mod silhouettes;
 mod tracks;
 mod working_copies;

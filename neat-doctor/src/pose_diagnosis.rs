@@ -53,7 +53,7 @@ pub(crate) struct Limits {
     /// Shares from here on are those of right cameras.
     pub good_share: f64,
     /// Shares below are those of wrong cameras.
-    bad_share: f64,
+    pub bad_share: f64,
 }
 
 impl Limits {
@@ -159,7 +159,7 @@ impl<'a> Diagnosis<'a> {
         if given.all.total < limits.min_total {
             return vec![self.too_little(&given)];
         }
-        if let Some(best) = self.better_explanation(&given, &trusted, limits.good_share) {
+        if let Some(best) = self.better_explanation(&given, &trusted, limits.bad_share) {
             return vec![self.explained_by(best, &given)];
         }
         if self.mirrored {

@@ -152,7 +152,7 @@ impl Diagnosis<'_> {
         );
         let finding = Finding::new(Check::Poses, Level::Problem, message);
         let finding = finding.because(Cause::MirroredPoses);
-        if given.share() < self.limits().good_share {
+        if given.share() < self.limits().bad_share {
             return finding.remedied_by("convert them to right-handed OpenCV axes");
         }
         Finding {

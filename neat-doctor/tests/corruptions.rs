@@ -147,6 +147,62 @@ fn real_scenes_pass_at_both_depths() {
     }
 }
 
+#[test]
+fn segments_of_other_images_are_named() {
+    type Spoil = fn(&mut Scene);
+    let faults: [(Spoil, &str); 3] = [
+        (
+            |scene| {
+                let all: Vec<_> = scene.views.iter().map(|v| v.wireframe.clone()).collect();
+                let count = all.len();
+                for (view, wireframe) in scene
+                    .views
+                    .iter_mut()
+                    .zip(all.into_iter().cycle().skip(count - 1))
+                {
+                    view.wireframe = wireframe;
+                }
+            },
+            "of the view behind",
+        ),
+        (
+            |scene| {
+                for view in &mut scene.views {
+                    let width = f64::from(view.wireframe.width);
+                    view.wireframe
+                        .vertices
+                        .iter_mut()
+                        .for_each(|v| v.x = width - v.x);
+                }
+            },
+            "mirrored",
+        ),
+        (
+            |scene| {
+                for view in &mut scene.views {
+                    view.wireframe
+                        .vertices
+                        .iter_mut()
+                        .for_each(|v| *v = v.add_scalar(25.0));
+                }
+            },
+            "lies on edges",
+        ),
+    ];
+    for (spoil, part) in faults {
+        let mut scene = synthetic(Solid::LPrism, 24);
+        spoil(&mut scene);
+        let examination = examine(&scene, &ExamineOptions::default());
+        let problem = examination.problems().next().unwrap();
+        assert_eq!(
+            problem.cause,
+            Some(Cause::SegmentsOfOtherImages),
+            "{examination}"
+        );
+        assert!(problem.message.contains(part), "{examination}");
+    }
+}
+
 /// A dome without any corner; its silhouettes tell.
 #[test]
 fn a_smooth_thing_in_another_order_is_not_passed() {

@@ -105,7 +105,7 @@ impl EditDistance {
         } else {
             predicted.junctions.clone()
         };
-        let pairs = junction_distances(&vertices, &truth.junctions)
+        let pairs = junction_distances(&vertices, &truth.junctions)?
             .assign()
             .map_err(MetricsError::from)?;
         let true_of: BTreeMap<usize, usize> = pairs.iter().map(|p| (p.row, p.column)).collect();

@@ -15,8 +15,8 @@ use crate::counts::WireframeCounts;
 use crate::table::Table;
 use neat_core::Wireframe3d;
 use neat_wireframe::metrics::{
-    Matching, MetricsError, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,
-    segment_distances,
+    DistanceMatrix, Matching, MetricsError, PrecisionRecall, SegmentDistance, junction_distances,
+    precision_recall, segment_distances,
 };
 use neat_wireframe::validity::check_wireframe;
 use serde::{Deserialize, Serialize};
@@ -153,12 +153,14 @@ impl NeatAbc {
         truth: &Wireframe3d,
     ) -> Result<GraphScores, MetricsError> {
         check_wireframe(&predicted.junctions, &predicted.edges).map_err(MetricsError::Predicted)?;
-        let score = |distances| precision_recall(&distances, &self.thresholds, self.matching);
+        let score = |distances: DistanceMatrix| {
+            precision_recall(&distances, &self.thresholds, self.matching)
+        };
         let (ours, true_ones) = (predicted.segments(), truth.segments());
-        let segments = |distance| score(segment_distances(&ours, &true_ones, distance));
+        let segments = |distance| score(segment_distances(&ours, &true_ones, distance)?);
         Ok(GraphScores {
             counts: WireframeCounts::of(predicted),
-            junctions: score(junction_distances(&predicted.junctions, &truth.junctions))?,
+            junctions: score(junction_distances(&predicted.junctions, &truth.junctions)?)?,
             segments_max: segments(SegmentDistance::Max)?,
             segments_mean: segments(SegmentDistance::Mean)?,
         })

@@ -83,7 +83,7 @@ impl StructureScore {
     ) -> Result<StructureScores, EvalError> {
         check_wireframe(&predicted.junctions, &predicted.edges).map_err(MetricsError::Predicted)?;
         check_wireframe(&truth.junctions, &truth.edges).map_err(MetricsError::Truth)?;
-        let distances = junction_distances(&predicted.junctions, &truth.junctions);
+        let distances = junction_distances(&predicted.junctions, &truth.junctions)?;
         let pairs = distances.assign().map_err(MetricsError::from)?;
         let is_right = |distance: f64| distance <= self.vertex_threshold;
         let matched = pairs.iter().filter(|pair| is_right(pair.distance)).count();

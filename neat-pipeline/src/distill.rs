@@ -83,6 +83,46 @@ pub enum BackEndReport {
     },
 }
 
+impl BackEndReport {
+    /// Why there is no edge, by what the steps found.
+    pub fn why_empty(&self) -> String {
+        let found = match self {
+            Self::Paper { .. } => {
+                return "the field shows none: train longer, or give --preset balanced".to_owned();
+            }
+            Self::Assembler { steps } => steps,
+        };
+        let segments = format!(
+            "of {} 2D segments in {} views",
+            found.usable_segments, found.usable_views
+        );
+        const LOOK: &str =
+            "look at `neat doctor SCENE` and at the pictures in detections/ or overlays/";
+        if found.usable_segments == 0 {
+            format!(
+                "there is no 2D segment in {} views: {LOOK}",
+                found.usable_views
+            )
+        } else if found.segments_with_hypotheses == 0 {
+            format!(
+                "{segments} none has a partner in another view within the scene sphere: the \
+                 sphere, the poses or the 2D wireframes are wrong; {LOOK}"
+            )
+        } else if found.lines + found.curved_lines + found.outlines == 0 {
+            format!(
+                "{segments} {} have positions in space, none of which enough images show: the \
+                 poses, or 2D wireframes of other images; {LOOK}",
+                found.segments_with_hypotheses
+            )
+        } else {
+            format!(
+                "the {} lines that the images show bend, or are outlines of round things",
+                found.curved_lines + found.outlines
+            )
+        }
+    }
+}
+
 impl Distilled {
     /// The wireframe in the frame of the user's files, with what is known about its
     /// parts; `scene` is the one that it is of.

@@ -117,13 +117,13 @@ impl PipelineError {
     /// again without a change is pointless; otherwise the run itself failed.
     pub fn is_bad_input(&self) -> bool {
         match self {
-            Self::Scene(error) => !is_write_error(error),
-            Self::RunDir(RunDirError::File(error)) => !is_write_error(error),
+            Self::Scene(error) => error.is_bad_input(),
+            Self::RunDir(RunDirError::File(error)) => error.is_bad_input(),
             Self::RunDir(RunDirError::Serialize(_) | RunDirError::InUse(_)) => false,
             // A folder that may not be written is a wrong choice, a full disk is not.
             Self::RunDir(RunDirError::Unwritable { source, .. }) => !is_full_disk(source),
             Self::RunDir(RunDirError::Checkpoint(CheckpointError::File(error))) => {
-                !is_write_error(error)
+                error.is_bad_input()
             }
             Self::RunDir(_)
             | Self::Backend(_)
@@ -156,11 +156,4 @@ fn is_full_disk(error: &SceneError) -> bool {
         ErrorKind::FileTooLarge,
     ];
     matches!(error, SceneError::Write { source, .. } if full.contains(&source.kind()))
-}
-
-fn is_write_error(error: &SceneError) -> bool {
-    matches!(
-        error,
-        SceneError::Write { .. } | SceneError::ImageStore { .. }
-    )
 }

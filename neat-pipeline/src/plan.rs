@@ -113,7 +113,7 @@ impl Plan {
 }
 
 /// Whether a field is trained: by default for a back end that asks it.
-fn settle_field_use(asked: &DistillConfig) -> Result<FieldUse, PlanError> {
+pub(crate) fn settle_field_use(asked: &DistillConfig) -> Result<FieldUse, PlanError> {
     match (asked.field, asked.back_end) {
         (Choice::Auto, BackEnd::Assembler) => Ok(FieldUse::None),
         (Choice::Auto, BackEnd::Paper) => Ok(FieldUse::Trained),

@@ -91,6 +91,14 @@ impl Backend {
     pub fn resolve(self) -> Self {
         match self {
             Self::Auto if has_gpu() => Self::Wgpu,
+            other => other.resolve_on_host(),
+        }
+    }
+
+    /// [`Self::resolve`] for what does not need a GPU: none is looked for, which takes a
+    /// while and drivers and threads of theirs.
+    pub fn resolve_on_host(self) -> Self {
+        match self {
             Self::Auto => Self::built()
                 .into_iter()
                 .find(|backend| *backend != Self::Wgpu)

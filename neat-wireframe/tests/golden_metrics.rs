@@ -69,7 +69,7 @@ fn junction_precision_and_recall() {
     let case = Case::read();
     for set in ["A", "B"] {
         let predicted = case.golden.points(&format!("{set}/junctions"));
-        let distances = junction_distances(&predicted, &case.truth.junctions);
+        let distances = junction_distances(&predicted, &case.truth.junctions).unwrap();
         case.assert_matching(&distances, &format!("{set}/junction_"));
         case.assert_scores(&distances, &format!("{set}/junctions_"));
     }
@@ -84,13 +84,13 @@ fn segment_precision_and_recall_by_mean_and_by_maximum() {
             (SegmentDistance::Mean, "lines_mean"),
             (SegmentDistance::Max, "lines_max"),
         ] {
-            let distances = segment_distances(&predicted, &case.truth.segments(), kind);
+            let distances = segment_distances(&predicted, &case.truth.segments(), kind).unwrap();
             case.assert_matching(&distances, &format!("{set}/{name}/"));
             case.assert_scores(&distances, &format!("{set}/{name}/"));
         }
         // What the script itself printed is the mean.
         let distances =
-            segment_distances(&predicted, &case.truth.segments(), SegmentDistance::Mean);
+            segment_distances(&predicted, &case.truth.segments(), SegmentDistance::Mean).unwrap();
         case.assert_scores(&distances, &format!("{set}/lines_"));
     }
 }
@@ -102,7 +102,7 @@ fn best_matching_per_threshold_finds_no_fewer_pairs() {
     for set in ["A", "B"] {
         let predicted = case.golden.segments(&format!("{set}/lines"));
         let truth = case.truth.segments();
-        let distances = segment_distances(&predicted, &truth, SegmentDistance::Max);
+        let distances = segment_distances(&predicted, &truth, SegmentDistance::Max).unwrap();
         let by_sum = precision_recall(&distances, &thresholds, Matching::MinimumSum).unwrap();
         let best = precision_recall(&distances, &thresholds, Matching::PerThreshold).unwrap();
         for (by_sum, best) in by_sum.iter().zip(&best) {

@@ -64,7 +64,7 @@ impl ConvertArgs {
         let options = (self.scene_args).load_options(self.cache.open().as_ref(), default_limit());
         let loaded = load_scene(&self.scene, &options)?;
         for warning in &loaded.warnings {
-            output::note(&format!("warning: {warning}"));
+            output::warning(&warning.to_string());
         }
         convert(&loaded.scene, self.to.into(), &self.out)?;
         let views = loaded.scene.views.len();

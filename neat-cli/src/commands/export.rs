@@ -197,7 +197,7 @@ impl ExportArgs {
         let document = read_json(&json).map_err(ExportError::from)?;
         let written = export(&document, &out, format, &options)?;
         for sentence in &written.left_out {
-            output::note(&format!("warning: {sentence}"));
+            output::warning(sentence);
         }
         let (junctions, edges) = (written.junctions, written.edges);
         output::print(&format!(

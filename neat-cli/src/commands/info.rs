@@ -48,7 +48,7 @@ impl InfoArgs {
         let loaded = load_scene(&self.scene, &options)?;
         output::print(&describe(&loaded, self.min_score))?;
         for warning in warnings(&loaded, self.min_score) {
-            output::note(&format!("warning: {warning}"));
+            output::warning(&warning.to_string());
         }
         Ok(())
     }

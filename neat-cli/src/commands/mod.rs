@@ -20,7 +20,7 @@ mod train;
 mod view;
 
 use crate::error::CliError;
-use crate::output;
+use crate::{interrupt, output, threads};
 use clap::{Parser, Subcommand};
 
 /// Turns posed photographs and their 2D wireframes into one 3D wireframe.
@@ -41,8 +41,9 @@ Exit codes:
   0    done
   1    the run failed
   2    the arguments or the input cannot be used
-  130  interrupted: Ctrl-C (or SIGTERM) ends a run after the current step and leaves a
-       checkpoint; the same command with --resume goes on; a second Ctrl-C ends at once"
+  130  interrupted: Ctrl-C (or SIGTERM, or a terminal that is closed) ends a run after the
+       current step and leaves a checkpoint; the same command with --resume goes on; a second
+       Ctrl-C ends at once"
 )]
 pub struct Cli {
     #[command(subcommand)]
@@ -50,7 +51,7 @@ pub struct Cli {
     /// Say nothing but results, warnings and errors
     #[arg(long, short, global = true)]
     quiet: bool,
-    /// Use so many CPU threads instead of all; results do not depend on it
+    /// Use so many CPU threads instead of all, four per core at most; results do not depend on it
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
 }
@@ -59,11 +60,8 @@ impl Cli {
     /// Does what was asked for.
     pub fn run(self) -> Result<(), CliError> {
         output::init_log();
-        if let Some(threads) = self.threads {
-            rayon::ThreadPoolBuilder::new()
-                .num_threads(threads.into())
-                .build_global()?;
-        }
+        interrupt::survive_limits()?;
+        threads::start(self.threads)?;
         self.command.run(self.quiet)
     }
 }

@@ -74,6 +74,11 @@ fn options_of_runs() {
                 &["'0'", "--steps"],
             ),
             option(
+                "two numbers of steps",
+                "train scene --out run --steps 50 --set train.steps=100",
+                &["--steps 50", "train.steps=100", "give one of them"],
+            ),
+            option(
                 "a time that is none",
                 "train scene --out run --time-budget soon",
                 &["'soon'", "10m"],

@@ -61,6 +61,14 @@ fn views() {
                 names: &["image_0001", "vertex number 0", "1e30"],
             },
             Case {
+                kind: "a score that is no confidence",
+                spoil: |scene| {
+                    change_wireframe(scene, 1, |json| json["edges-weights"][2] = json!(1e308));
+                },
+                command: TRAIN,
+                names: &["image_0001", "edge number 2", "1e308", "from 0 to 1"],
+            },
+            Case {
                 kind: "a 2D junction that is no number",
                 spoil: |scene| {
                     change_wireframe(scene, 1, |json| json["vertices"][0] = json!(["x", 1]));

@@ -114,7 +114,7 @@ mod tests {
                 .collect(),
             edges: edges.to_vec(),
             edge_scores: (1..)
-                .map(|i| 0.25 * f64::from(i))
+                .map(|i| 0.125 * f64::from(i))
                 .take(edges.len())
                 .collect(),
             width: 10,
@@ -132,7 +132,7 @@ mod tests {
         );
         assert_eq!(after.vertex_scores, [0.125, 0.375]);
         assert_eq!(after.edges, [[1, 0]]);
-        assert_eq!(after.edge_scores, [0.5]);
+        assert_eq!(after.edge_scores, [0.25]);
         assert_eq!((after.width, after.height), (20, 16));
         after.validate().unwrap();
     }
@@ -172,7 +172,7 @@ mod tests {
             );
             let edges = [[2, 0], [0, 3], [4, 5], [0, 1], [6, 0], [0, 0]];
             assert_eq!(after.edges, edges);
-            assert_eq!(after.edge_scores, [0.25, 0.5, 0.75, 1.25, 1.5, 1.75]);
+            assert_eq!(after.edge_scores, [0.125, 0.25, 0.375, 0.625, 0.75, 0.875]);
         }
     }
 

@@ -132,9 +132,9 @@ fn main() -> Result<(), AnyError> {
     let in_files = wireframe.map(|junction| scene.original_from_world.apply(junction));
     if let Some(path) = &arguments.truth {
         let truth = read_wireframe(path)?;
-        let junctions = junction_distances(&in_files.junctions, &truth.junctions);
+        let junctions = junction_distances(&in_files.junctions, &truth.junctions)?;
         let (ours, true_ones) = (in_files.segments(), truth.segments());
-        let segments = segment_distances(&ours, &true_ones, SegmentDistance::Max);
+        let segments = segment_distances(&ours, &true_ones, SegmentDistance::Max)?;
         for (name, distances) in [("junctions", junctions), ("segments", segments)] {
             for score in precision_recall(&distances, &[0.01, 0.02, 0.05], Matching::MinimumSum)? {
                 println!(

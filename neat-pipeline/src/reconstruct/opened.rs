@@ -92,7 +92,11 @@ fn read_run(
     resources: Resources<'_>,
     on_event: OnEvent<'_>,
 ) -> Result<OpenedRun, PipelineError> {
-    let backend = backend.resolve();
+    let usable = dir.usable_checkpoint()?;
+    let backend = match usable {
+        Some(_) => backend.resolve(),
+        None => backend.resolve_on_host(),
+    };
     let device = backend.device()?;
     if let Some(warning) = software_warning(&device) {
         on_event(Event::Warning(warning));
@@ -107,7 +111,6 @@ fn read_run(
         memory_limit: resources.memory_limit,
     };
     let (plan, _) = settle(&asked, &prepared.scene, machine, Some(&planned))?;
-    let usable = dir.usable_checkpoint()?;
     let changes = differences(then, &asked);
     let given = Given {
         sparse_points: !prepared.scene.sparse_points.is_empty(),

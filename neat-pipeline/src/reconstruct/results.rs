@@ -29,9 +29,6 @@ const OVERLAYS_AT_ONCE: usize = 2;
 const REPORT: &str = "report";
 const AGREEMENT: &str = "agreement";
 
-const NO_EDGES: &str =
-    "the wireframe has no edges: train longer, or look at the 2D wireframes of the scene";
-
 impl Session<'_> {
     /// Warnings about an earlier result, which a new one replaces.
     pub fn forget_distillation_warnings(&mut self) {
@@ -75,7 +72,11 @@ impl Session<'_> {
             Ok(distill(scene, field, plan, &mut progress)?)
         })?;
         if distilled.wireframe.edges.is_empty() {
-            self.warn(WarningKind::NoEdges, NO_EDGES);
+            let why = distilled.report.why_empty();
+            self.warn(
+                WarningKind::NoEdges,
+                format!("the wireframe has no edges: {why}"),
+            );
         }
         let agreement = agreement(&self.scene, self.plan.config(), &distilled.wireframe);
         let (wireframe, document) = self.stage(Stage::Export, |session| {

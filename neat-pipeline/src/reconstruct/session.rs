@@ -3,12 +3,13 @@
 use super::RunOptions;
 use super::opened::software_warning;
 use crate::changes::Belonging;
-use crate::config::Config;
+use crate::config::{Config, FieldUse};
 use crate::error::PipelineError;
 use crate::event::{Decision, Event, OnEvent, Stage, Warning, WarningKind, timed};
 use crate::manifest::{Manifest, Status, hash_inputs, utc_now};
 use crate::plan::{
     Given, Machine, NO_FIELD, Plan, changes_of_presets, settings_without_effect, settle,
+    settle_field_use,
 };
 use crate::resources::Resources;
 use crate::run_dir::{Existing, RunDir, RunLock};
@@ -55,8 +56,12 @@ impl<'a> Session<'a> {
         on_event: OnEvent<'a>,
     ) -> Result<Self, PipelineError> {
         RunDir::check(&options.out, options.existing)?;
+        let trains = settle_field_use(&options.config.distill)? == FieldUse::Trained;
         // Once: looking for GPUs takes a while.
-        let backend = options.backend.resolve();
+        let backend = match trains {
+            true => options.backend.resolve(),
+            false => options.backend.resolve_on_host(),
+        };
         let device = backend.device()?;
         let earlier = match options.existing {
             Existing::Resume => earlier(&options.out, on_event)?,
@@ -67,7 +72,9 @@ impl<'a> Session<'a> {
             manifest.record(&event);
             on_event(event);
         };
-        tell_of_device(options.backend, backend, &device, &mut tell);
+        if trains {
+            tell_of_device(options.backend, backend, &device, &mut tell);
+        }
         let (prepared, plan) = prepare(options, backend, earlier.as_ref(), cancelled, &mut tell)?;
         manifest.sphere = Some(prepared.sphere);
         manifest.inputs = hash_inputs(&manifest.scene, &prepared.files)?;

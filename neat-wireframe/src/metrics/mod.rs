@@ -23,6 +23,9 @@ pub use surface_distance::{PointCloud, mean_nearest_distance, sample_segments};
 use crate::validity::WireframeFlaw;
 use neat_core::assignment::AssignmentError;
 
+/// More pairs of predicted and true ones are not matched: minutes, and 200 MB of distances.
+pub(crate) const MAX_PAIRS: usize = 25_000_000;
+
 /// Why a wireframe could not be measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MetricsError {
@@ -43,6 +46,16 @@ pub enum MetricsError {
     TooManyPoints {
         /// How many there are.
         points: usize,
+    },
+    /// So many things on both sides that no matching of all of them ends.
+    #[error(
+        "{predicted} predicted and {truth} true ones make more than {MAX_PAIRS} pairs, too many to match: measure parts, or choose a protocol of points, such as emap"
+    )]
+    TooManyPairs {
+        /// Predicted junctions or segments.
+        predicted: usize,
+        /// True ones.
+        truth: usize,
     },
     /// Distances that cannot be matched.
     #[error("the distances cannot be matched")]

@@ -1,8 +1,8 @@
 //! Precision and recall of junctions and segments under distance thresholds
 //! (supplement E, Table 6; `evaluation/eval-abc.py`).
 
-use super::MetricsError;
 use super::distance_matrix::DistanceMatrix;
+use super::{MAX_PAIRS, MetricsError};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};
@@ -46,18 +46,38 @@ pub struct PrecisionRecall {
 }
 
 /// Distances of all predicted from all true junctions, `[predicted, truth]`.
-pub fn junction_distances(predicted: &[Vector3<f64>], truth: &[Vector3<f64>]) -> DistanceMatrix {
-    DistanceMatrix::between(predicted, truth, |a, b| (a - b).norm())
+///
+/// # Errors
+/// If there are too many pairs.
+pub fn junction_distances(
+    predicted: &[Vector3<f64>],
+    truth: &[Vector3<f64>],
+) -> Result<DistanceMatrix, MetricsError> {
+    check_pairs(predicted.len(), truth.len())?;
+    Ok(DistanceMatrix::between(predicted, truth, |a, b| {
+        (a - b).norm()
+    }))
+}
+
+fn check_pairs(predicted: usize, truth: usize) -> Result<(), MetricsError> {
+    match predicted.saturating_mul(truth) {
+        ..=MAX_PAIRS => Ok(()),
+        _ => Err(MetricsError::TooManyPairs { predicted, truth }),
+    }
 }
 
 /// Distances of all predicted from all true segments, `[predicted, truth]`; ends
 /// must be finite.
+///
+/// # Errors
+/// If there are too many pairs.
 pub fn segment_distances(
     predicted: &[LineSegment3],
     truth: &[LineSegment3],
     distance: SegmentDistance,
-) -> DistanceMatrix {
-    DistanceMatrix::between(predicted, truth, |a, b| {
+) -> Result<DistanceMatrix, MetricsError> {
+    check_pairs(predicted.len(), truth.len())?;
+    Ok(DistanceMatrix::between(predicted, truth, |a, b| {
         let in_order = |b: &LineSegment3| {
             let [start, end] = a.end_distances(b);
             match distance {
@@ -66,7 +86,7 @@ pub fn segment_distances(
             }
         };
         in_order(b).min(in_order(&b.reversed()))
-    })
+    }))
 }
 
 /// Precision and recall at each threshold, from the distances `[predicted, truth]`.
@@ -125,7 +145,7 @@ mod tests {
         let truth = LineSegment3::new(Vector3::zeros(), Vector3::new(1.0, 0.0, 0.0));
         let other = LineSegment3::new(Vector3::new(1.0, 0.3, 0.0), Vector3::new(0.0, 0.1, 0.0));
         let distance = |kind| {
-            let distances = segment_distances(&[other], &[truth], kind);
+            let distances = segment_distances(&[other], &[truth], kind).unwrap();
             distances.assign().unwrap()[0].distance
         };
         assert!((distance(SegmentDistance::Mean) - 0.2).abs() < 1e-15);
@@ -134,7 +154,7 @@ mod tests {
 
     #[test]
     fn threshold_is_strict_and_shares_have_their_own_denominators() {
-        let distances = junction_distances(&on_x(&[0.0, 5.5, 9.0]), &on_x(&[0.0, 5.0]));
+        let distances = junction_distances(&on_x(&[0.0, 5.5, 9.0]), &on_x(&[0.0, 5.0])).unwrap();
         let scores = precision_recall(&distances, &[0.0, 0.5, 0.6], Matching::MinimumSum).unwrap();
         assert_eq!(
             scores.iter().map(|s| s.matched).collect::<Vec<_>>(),
@@ -159,7 +179,7 @@ mod tests {
     fn nothing_predicted_or_nothing_true_scores_zero() {
         for matching in [Matching::MinimumSum, Matching::PerThreshold] {
             for (predicted, truth) in [(&[][..], &[1.0][..]), (&[1.0], &[]), (&[], &[])] {
-                let distances = junction_distances(&on_x(predicted), &on_x(truth));
+                let distances = junction_distances(&on_x(predicted), &on_x(truth)).unwrap();
                 let scores = precision_recall(&distances, &[0.01], matching).unwrap();
                 assert_eq!((scores[0].precision, scores[0].recall), (0.0, 0.0));
             }
@@ -168,7 +188,18 @@ mod tests {
 
     #[test]
     fn nan_is_an_error() {
-        let distances = junction_distances(&on_x(&[f64::NAN]), &on_x(&[0.0]));
+        let distances = junction_distances(&on_x(&[f64::NAN]), &on_x(&[0.0])).unwrap();
         assert!(precision_recall(&distances, &[0.01], Matching::MinimumSum).is_err());
+    }
+
+    #[test]
+    fn what_cannot_be_matched_is_refused_before_memory_is_taken() {
+        let many = vec![Vector3::zeros(); 5001];
+        let error = junction_distances(&many, &many[1..]).unwrap_err();
+        assert!(
+            error.to_string().starts_with("5001 predicted and 5000"),
+            "{error}"
+        );
+        assert!(junction_distances(&many, &many[..1]).is_ok());
     }
 }

@@ -18,11 +18,7 @@ pub fn scores_within(
     };
     let (segments, true_ones) = (found.segments(), truth.segments());
     (
-        score(junction_distances(&found.junctions, &truth.junctions)),
-        score(segment_distances(
-            &segments,
-            &true_ones,
-            SegmentDistance::Max,
-        )),
+        score(junction_distances(&found.junctions, &truth.junctions).unwrap()),
+        score(segment_distances(&segments, &true_ones, SegmentDistance::Max).unwrap()),
     )
 }
