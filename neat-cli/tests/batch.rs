@@ -254,6 +254,14 @@ fn mistakes_are_found_before_anything_is_run() {
             "[[job]]\nscene = \"a\"\nargs = [\"--sped\"]\n",
             ["job `a`", "--sped"],
         ),
+        (
+            "[[job]]\nscene = \"a\"\nset = [\"train.stepz=3\"]\n",
+            ["job `a`", "`train.steps`"],
+        ),
+        (
+            "[[job]]\nscene = \"a\"\nconfig = \"no.toml\"\n",
+            ["job `a`", "no.toml"],
+        ),
         ("# nothing\n", ["jobs.toml", "[[job]]"]),
     ] {
         fs::write(&manifest, text).unwrap();

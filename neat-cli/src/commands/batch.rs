@@ -9,6 +9,7 @@ use neat_batch::{
     Batch, BatchOptions, JobFolder, Plan, Retry, Shard, ShardSource, Stop, StopSwitch, Summary,
     to_markdown,
 };
+use neat_core::with_causes;
 use std::env;
 use std::fmt::Write;
 use std::num::NonZeroUsize;
@@ -215,19 +216,21 @@ impl BatchArgs {
     }
 }
 
-/// Finds mistakes in the arguments of jobs now, and not in the middle of the night.
+/// Finds mistakes in the arguments and configurations of jobs now, and not in the middle of
+/// the night.
 fn check_arguments(batch: &Batch) -> Result<(), CliError> {
     for job in batch.jobs() {
+        let usage = |what: String| CliError::Usage(format!("job `{}`: {what}", job.name));
         let arguments = job.command_line(Path::new("RUN"));
         let program = ["neat".to_owned()].into_iter();
-        if let Err(error) = Cli::try_parse_from(program.chain(arguments)) {
-            let text = error.to_string();
-            let line = text.lines().next().unwrap_or_default();
-            return Err(CliError::Usage(format!(
-                "job `{}`: {}; see `neat reconstruct --help`",
-                job.name,
-                line.trim_start_matches("error: ")
-            )));
+        match Cli::try_parse_from(program.chain(arguments)) {
+            Ok(cli) => (cli.check_configuration()).map_err(|error| usage(with_causes(&error)))?,
+            Err(error) => {
+                let text = error.to_string();
+                let line = text.lines().next().unwrap_or_default();
+                let line = line.trim_start_matches("error: ");
+                return Err(usage(format!("{line}; see `neat reconstruct --help`")));
+            }
         }
     }
     Ok(())

@@ -66,6 +66,16 @@ impl Cli {
     }
 }
 
+impl Cli {
+    /// Finds mistakes in the configuration of a reconstruction.
+    pub fn check_configuration(&self) -> Result<(), CliError> {
+        match &self.command {
+            Command::Reconstruct(args) => args.check_configuration(),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// What neat can do.
 #[derive(Debug, Subcommand)]
 pub enum Command {

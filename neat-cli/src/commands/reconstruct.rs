@@ -38,6 +38,11 @@ pub struct ReconstructArgs {
 }
 
 impl ReconstructArgs {
+    /// Finds mistakes in the configuration.
+    pub fn check_configuration(&self) -> Result<(), CliError> {
+        self.run.check_configuration()
+    }
+
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         let mut options = self.run.options()?;
         if self.train {

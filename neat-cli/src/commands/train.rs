@@ -63,6 +63,11 @@ pub struct RunArgs {
 }
 
 impl RunArgs {
+    /// Finds mistakes in the configuration.
+    pub fn check_configuration(&self) -> Result<(), CliError> {
+        self.method.config().map(|_| ())
+    }
+
     /// Shows how far the run is.
     pub fn progress(&self, quiet: bool) -> Progress {
         Progress::with_format(quiet, self.progress)
