@@ -24,6 +24,7 @@ mod edge_completion;
 mod edge_cutting;
 mod edge_samples;
 mod epipolar_matching;
+mod free_ends;
 mod graph_fitting;
 mod graph_segmentation;
 mod hypothesis_scoring;
@@ -56,6 +57,7 @@ use corners::find_corners;
 use edge_completion::complete_edges;
 use edge_cutting::cut_edges;
 use edge_samples::Images;
+use free_ends::move_free_ends;
 use graph_fitting::fit_graph;
 use hypothesis_scoring::{Scoring, score_hypotheses};
 use line_continuation::continue_lines;
@@ -165,19 +167,15 @@ pub fn assemble_with_progress(
     cut_tangent_ends(&images, &mut selection.lines, selection.noise);
     progress(ENDED)?;
     let mut lines = merge_pieces(&images, selection.lines);
-    continue_lines(
-        &images,
-        &mut lines,
-        &mut selection.taken,
-        config.min_evidence,
-    );
+    let (taken, least) = (&mut selection.taken, config.min_evidence);
+    continue_lines(&images, &mut lines, taken, least);
     lines = merge_pieces(&images, lines);
     progress(CONTINUED)?;
     report.merged_pieces = report.lines - lines.len();
     let mut corners = find_corners(&images, &lines);
     report.ends = corners.junctions.len();
     fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
-    let (taken, least) = (&mut selection.taken, config.min_evidence);
+    move_free_ends(&images, &lines, &mut corners);
     report.completed_edges = complete_edges(&images, &mut corners, taken, least);
     let wireframe = cut_edges(&images, corners).map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
