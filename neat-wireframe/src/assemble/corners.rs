@@ -43,6 +43,19 @@ impl Corners {
         LineSegment3::new(start, end)
     }
 
+    /// The junctions of each line, ascending.
+    pub(super) fn pairs(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
+        self.ends.iter().map(|[a, b]| [*a.min(b), *a.max(b)])
+    }
+
+    /// Adds edges between junctions, with the sizes of a pixel. Their ends are corners already:
+    /// they are not sought any more.
+    pub(super) fn add(&mut self, edges: &[([usize; 2], f64)]) {
+        self.ends.extend(edges.iter().map(|(pair, _)| *pair));
+        self.windows.extend(edges.iter().map(|_| 0.0));
+        self.pixels.extend(edges.iter().map(|(_, pixel)| *pixel));
+    }
+
     /// Takes away the other lines. Their junctions stay, though none may run there.
     pub(super) fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
         let mut new_index = vec![None; self.ends.len()];

@@ -22,41 +22,45 @@ pub(super) fn complete_edges(
     taken: &mut [Vec<bool>],
     min_evidence: f64,
 ) -> usize {
-    let junctions = &corners.junctions;
-    let line = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
-    let known: BTreeSet<[usize; 2]> = (corners.ends.iter())
-        .map(|[a, b]| [*a.min(b), *a.max(b)])
-        .collect();
-    let mut drawn: Vec<(f64, [usize; 2])> = drawn_pairs(images, corners)
-        .into_par_iter()
-        .filter(|pair| !known.contains(pair))
-        .map(|pair| {
-            let evidence = images.evidence(&line(pair), Some(taken), min_evidence);
-            (evidence.gain, pair)
-        })
-        .filter(|(gain, _)| *gain > min_evidence)
-        .collect();
-    drawn.sort_by(|(a, i), (b, j)| b.total_cmp(a).then(i.cmp(j)));
-    let (mut found, mut pixels) = (Vec::new(), Vec::new());
-    for (_, pair) in drawn {
-        let evidence = images.evidence(&line(pair), Some(taken), min_evidence);
-        if evidence.gain > min_evidence {
-            claim_edgels(images, &line(pair), taken);
-            found.push(pair);
-            pixels.push(images.pixel_size(&line(pair), evidence.views()));
-        }
-    }
+    let known: BTreeSet<[usize; 2]> = corners.pairs().collect();
+    let mut pairs = drawn_pairs(images, corners);
+    pairs.retain(|pair| !known.contains(pair));
+    let found = supported(images, corners, pairs, taken, min_evidence);
     drop_pieces(images, corners, &found);
-    corners.ends.extend(&found);
-    // Their ends are corners already: they are not sought any more.
-    corners.windows.extend(found.iter().map(|_| 0.0));
-    corners.pixels.extend(pixels);
+    corners.add(&found);
     found.len()
 }
 
-/// Takes away the lines that are pieces of the edges between `pairs`: from a corner of theirs to
+/// The pairs of junctions between which edgels that no line has speak for an edge, by more than
+/// `least`, and the size of a pixel there. The one with the most evidence takes its edgels first.
+pub(super) fn supported(
+    images: &Images,
+    corners: &Corners,
+    pairs: Vec<[usize; 2]>,
+    taken: &mut [Vec<bool>],
+    least: f64,
+) -> Vec<([usize; 2], f64)> {
+    let junctions = &corners.junctions;
+    let line = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
+    let mut weighed: Vec<(f64, [usize; 2])> = (pairs.into_par_iter())
+        .map(|pair| (images.evidence(&line(pair), Some(taken), least).gain, pair))
+        .filter(|(gain, _)| *gain > least)
+        .collect();
+    weighed.sort_by(|(a, i), (b, j)| b.total_cmp(a).then(i.cmp(j)));
+    let mut found = Vec::new();
+    for (_, pair) in weighed {
+        let evidence = images.evidence(&line(pair), Some(taken), least);
+        if evidence.gain > least {
+            claim_edgels(images, &line(pair), taken);
+            found.push((pair, images.pixel_size(&line(pair), evidence.views())));
+        }
+    }
+    found
+}
+
+/// Takes away the lines that are pieces of new `edges`: from a corner of theirs to
 /// an end of their own that lies on the edge.
-fn drop_pieces(images: &Images, corners: &mut Corners, pairs: &[[usize; 2]]) {
+fn drop_pieces(images: &Images, corners: &mut Corners, edges: &[([usize; 2], f64)]) {
     let junctions = &corners.junctions;
     let mut degrees = vec![0; junctions.len()];
     let mut lines_at: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
@@ -67,7 +71,7 @@ fn drop_pieces(images: &Images, corners: &mut Corners, pairs: &[[usize; 2]]) {
         }
     }
     let mut dropped = vec![false; corners.ends.len()];
-    for pair in pairs {
+    for (pair, _) in edges {
         let edge = LineSegment3::new(junctions[pair[0]], junctions[pair[1]]);
         for line in pair.iter().filter_map(|end| lines_at.get(end)).flatten() {
             let [a, b] = corners.ends[*line];
@@ -166,7 +170,8 @@ mod tests {
         corners.ends.push([pair[0], free]);
         corners.pixels.push(corners.pixels[0]);
         corners.windows.push(corners.windows[0]);
-        drop_pieces(&images, &mut corners, &[pair]);
+        let pixel = corners.pixels[0];
+        drop_pieces(&images, &mut corners, &[(pair, pixel)]);
         assert_eq!(corners.ends.len(), 11);
         assert!(corners.ends.iter().flatten().all(|end| *end != free));
     }

@@ -31,6 +31,9 @@ pub(super) struct Images<'a> {
     pub maps: &'a [EdgelMap],
     /// Farther beside a line no edgel is its own, in pixels.
     pub reach: f64,
+    /// Nearer to the ends of a line nothing is asked of it, in pixels: where corners are known,
+    /// smoothing has rounded them.
+    pub rounding: f64,
 }
 
 /// Places along the projection of a 3D line.
@@ -59,7 +62,8 @@ impl Images<'_> {
     ) -> Option<EdgeSamples> {
         let camera = &self.views[view].camera;
         let part = LineSegment3::new(line.point_at(low), line.point_at(high));
-        let (length, normal) = across(&project_segment(&self.views[view], &part)?)?;
+        let least = MIN_PROJECTED_LENGTH - 2.0 * self.rounding;
+        let (length, normal) = across_of(&project_segment(&self.views[view], &part)?, least)?;
         let count =
             count.unwrap_or_else(|| ((length / SPACING) as usize).clamp(COUNTS[0], COUNTS[1]));
         let mut points = Vec::with_capacity(count);
@@ -192,9 +196,13 @@ pub(super) fn project_segment(view: &PreparedView, line: &LineSegment3) -> Optio
 
 /// Length and unit normal of a 2D segment of a useful length.
 pub(super) fn across(segment: &LineSegment2) -> Option<(f64, Vector2<f64>)> {
+    across_of(segment, MIN_PROJECTED_LENGTH)
+}
+
+fn across_of(segment: &LineSegment2, least: f64) -> Option<(f64, Vector2<f64>)> {
     let offset = segment.end - segment.start;
     let length = offset.norm();
-    (MIN_PROJECTED_LENGTH..MAX_PROJECTED_LENGTH)
+    (least..MAX_PROJECTED_LENGTH)
         .contains(&length)
         .then(|| (length, Vector2::new(-offset.y, offset.x) / length))
 }

@@ -7,7 +7,7 @@
 //! wherever they want, since any two planes meet in one: the two that say most do not
 //! count. What is another line in each view is weighed in the same way.
 
-use super::edge_samples::{EdgeSamples, Images};
+use super::edge_samples::{EdgeSamples, Images, project_segment};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -185,7 +185,10 @@ impl Images<'_> {
             .with_min_len(MIN_VIEWS_OF_TASK)
             .filter(|view| !self.maps[*view].is_empty())
             .filter_map(|view| {
-                let samples = self.samples(view, &in_view(view)?, [ENDS, 1.0 - ENDS], None)?;
+                let line = in_view(view)?;
+                let length = project_segment(&self.views[view], &line)?.length();
+                let end = ENDS.max(self.rounding / length).min(0.5);
+                let samples = self.samples(view, &line, [end, 1.0 - end], None)?;
                 let state = self.state(view, &samples, taken);
                 Some(ViewOfLine {
                     view,
@@ -251,7 +254,10 @@ impl Images<'_> {
 
 #[cfg(test)]
 mod tests {
+    use crate::assemble::edge_samples::Images;
     use crate::assemble::test_views::{TestViews, cube_edge};
+    use crate::assemble::view_segments::PreparedView;
+    use crate::test_scenes::{cameras_on_sphere, views_of_edges};
     use nalgebra::Vector3;
     use neat_core::LineSegment3;
 
@@ -286,5 +292,23 @@ mod tests {
                 .showing
                 .is_empty()
         );
+    }
+
+    #[test]
+    fn rounded_corners_are_not_asked() {
+        let edge = LineSegment3::new(Vector3::zeros(), Vector3::new(0.02, 0.03, 0.01));
+        let seen = [edge.point_at(0.25), edge.point_at(0.75)];
+        let views = views_of_edges(&cameras_on_sphere(20), &seen, &[[0, 1]]);
+        let views = (views.iter()).map(|view| PreparedView::new(view, 1.0, 1.0));
+        let views = TestViews::of(views.collect());
+        let showing = |rounding: f64| {
+            let images = Images {
+                rounding,
+                ..views.images()
+            };
+            images.evidence(&edge, None, 0.0).showing.len()
+        };
+        assert!(showing(0.0) < 10, "{}", showing(0.0));
+        assert!(showing(1.5) > 15, "{}", showing(1.5));
     }
 }

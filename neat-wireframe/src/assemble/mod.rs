@@ -39,6 +39,7 @@ mod outlines;
 mod progress;
 mod projected_line;
 mod report;
+mod slab_ends;
 mod straightness;
 mod tangent_ends;
 mod view_segments;
@@ -65,6 +66,7 @@ use line_selection::select_lines;
 use neat_core::{EdgelMap, LineSegment2};
 use progress::part;
 use rayon::prelude::*;
+use slab_ends::close_slabs;
 use std::ops::ControlFlow;
 use tangent_ends::cut_tangent_ends;
 use view_segments::PreparedView;
@@ -152,6 +154,7 @@ pub fn assemble_with_progress(
         views: &views,
         maps,
         reach: 0.0,
+        rounding: 0.0,
     };
     let mut selection = {
         let progress = &mut part(progress, [PROPOSED, SELECTED]);
@@ -177,6 +180,7 @@ pub fn assemble_with_progress(
     fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
     move_free_ends(&images, &lines, &mut corners);
     report.completed_edges = complete_edges(&images, &mut corners, taken, least);
+    report.completed_edges += close_slabs(&images, &mut corners, taken, least);
     let wireframe = cut_edges(&images, corners).map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
     report.edges = wireframe.edges.len();

@@ -36,6 +36,7 @@ impl TestViews {
             views: &self.views,
             maps: &self.maps,
             reach: 0.5,
+            rounding: 0.0,
         }
     }
 }
