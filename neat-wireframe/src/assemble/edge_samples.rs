@@ -44,6 +44,18 @@ pub(super) struct EdgeSamples {
     pub normal: Vector2<f64>,
 }
 
+impl<'a> Images<'a> {
+    /// Before it is known how far off edgels may be.
+    pub(super) fn new(views: &'a [PreparedView], maps: &'a [EdgelMap]) -> Self {
+        Self {
+            views,
+            maps,
+            reach: 0.0,
+            rounding: 0.0,
+        }
+    }
+}
+
 impl Images<'_> {
     /// For each edgel of each view, that no line has it.
     pub(super) fn nothing_taken(&self) -> Vec<Vec<bool>> {

@@ -150,12 +150,7 @@ pub fn assemble_with_progress(
         ..AssembleReport::default()
     };
 
-    let images = Images {
-        views: &views,
-        maps,
-        reach: 0.0,
-        rounding: 0.0,
-    };
+    let images = Images::new(&views, maps);
     let mut selection = {
         let progress = &mut part(progress, [PROPOSED, SELECTED]);
         select_lines(images, &alternatives, config, progress)?
