@@ -637,7 +637,7 @@ mod tests {
         let entries = fs::read_dir(&root).unwrap();
         let mut left: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
         left.sort();
-        assert_eq!(left, [LOCK, CHECKPOINTS, "notes.txt"]);
+        assert_eq!(left, [LOCK, "notes.txt"]);
         assert_eq!(fs::read(root.join("notes.txt")).unwrap(), b"mine");
 
         assert!(matches!(
