@@ -70,6 +70,7 @@ mod neat_abc;
 mod neat_dtu;
 mod observation_mask;
 mod protocol;
+mod reliability;
 mod report;
 mod structure_score;
 mod surface_and_creases;
@@ -92,11 +93,12 @@ pub use observation_mask::{GroundPlane, ObservationMask};
 pub use protocol::{
     EvaluationInput, EvaluationOptions, Protocol, Scores, TruthKind, UnknownProtocol,
 };
+pub use reliability::{Binning, Judged, ReliabilityBin, expected_calibration_error, reliability};
 pub use report::EvaluationReport;
 pub use structure_score::{StructureScore, StructureScores};
 pub use surface_and_creases::{
     CreaseCounts, CreaseScores, CreaseShares, MeanAndMedian, RecallBin, SceneTruth,
-    SurfaceAndCreases,
+    SurfaceAndCreases, existing_edges,
 };
 pub use triangle_mesh::TriangleMesh;
 

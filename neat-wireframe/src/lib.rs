@@ -22,7 +22,7 @@
 //! let views = ViewObservation::from_scene(&generate(&scene)?.scene, 0.05);
 //! let built = assemble(&views, &[], 1.0, &AssembleConfig::default());
 //! let confidence = assess(&built.wireframe, &views, None, 1.0, &ConfidenceConfig::default())?;
-//! assert!(confidence.edges.iter().any(|edge| edge.probability > 0.9));
+//! assert!(confidence.edges.iter().any(|edge| edge.probability > 0.7));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -15,6 +15,7 @@
 //! of the scene: 0.05 for things on a desk.
 
 mod edge_views;
+mod existing_edges;
 mod line_samples;
 mod recall_bins;
 mod scene_truth;
@@ -23,6 +24,7 @@ mod scores;
 #[cfg(test)]
 mod tests;
 
+pub use existing_edges::existing_edges;
 pub use recall_bins::RecallBin;
 pub use scene_truth::SceneTruth;
 pub use scores::{CreaseCounts, CreaseScores, CreaseShares, MeanAndMedian};

@@ -1,4 +1,4 @@
-//! Probability that an edge exists.
+//! Probability that an edge is more than chance.
 //!
 //! Of the n views that ought to show an edge, k do. Views of a true edge show it
 //! with probability p₁, the detection rate of the scene; views of no edge show
@@ -135,7 +135,7 @@ impl ExistenceModel {
 }
 
 /// Neither 0 nor 1.
-fn possible(probability: f64) -> f64 {
+pub(super) fn possible(probability: f64) -> f64 {
     within(probability, MIN_PROBABILITY, 1.0 - MIN_PROBABILITY)
 }
 

@@ -6,9 +6,11 @@
 //!
 //! - which segments lie on each projected edge ([`EdgeSupport`]);
 //! - in which views the edge ought to be seen, and how often chance would support
-//!   a random line: hence the probability that it exists;
+//!   a random line: hence the probability that it is more than chance;
 //! - where the detected ends put the junctions, and how precisely: hence their
-//!   covariances, with the noise of the detector estimated from the scene itself.
+//!   covariances, with the noise of the detector estimated from the scene itself;
+//! - whether the views agree on an edge, and show edges whole: hence the probability
+//!   that it exists.
 //!
 //! ```
 //! use neat_core::synthetic::{SyntheticScene, generate};
@@ -25,6 +27,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod calibration;
 mod config;
 mod covariance;
 mod decoys;
@@ -44,6 +47,7 @@ pub use provenance::EdgeSupport;
 
 use crate::validity::{WireframeFlaw, check_wireframe};
 use crate::{SignedDistance, ViewObservation, Wireframe3d};
+use calibration::calibrate;
 use config::ProvenanceConfig;
 use decoys::decoys;
 use detected_ends::detected_ends;
@@ -170,6 +174,13 @@ pub fn assess(
         radius,
         &covariances,
     );
+    let mut probabilities: Vec<f64> = (counts.iter())
+        .map(|count| model.probability(*count))
+        .collect();
+    if let Some(radius) = radius {
+        let (edges, covariances) = (&wireframe.edges, &estimate.covariances);
+        probabilities = calibrate(&probabilities, edges, &found, covariances, radius);
+    }
     debug!(
         views = usable_views,
         edges = segments.len(),
@@ -183,8 +194,8 @@ pub fn assess(
         junctions: (estimate.covariances.into_iter().zip(views_of_junctions))
             .map(|(covariance, views)| JunctionConfidence { covariance, views })
             .collect(),
-        edges: (found.into_iter().zip(counts))
-            .map(|(found, count)| edge_confidence(found, count, &model))
+        edges: (found.into_iter().zip(counts).zip(probabilities))
+            .map(|((found, count), probability)| edge_confidence(found, count, probability))
             .collect(),
         noise: estimate.noise,
         scene_radius,
@@ -209,11 +220,7 @@ fn view_count(
     }
 }
 
-fn edge_confidence(
-    found: EdgeProvenance,
-    count: ViewCount,
-    model: &ExistenceModel,
-) -> EdgeConfidence {
+fn edge_confidence(found: EdgeProvenance, count: ViewCount, probability: f64) -> EdgeConfidence {
     let supports = found.supports;
     let squares: f64 = (supports.iter())
         .map(|support| support.residual_in_pixels.powi(2))
@@ -224,7 +231,7 @@ fn edge_confidence(
         expected_views: count.expected,
         residual_in_pixels: (!supports.is_empty())
             .then(|| (squares / supports.len() as f64).sqrt()),
-        probability: model.probability(count),
+        probability,
         supports,
     }
 }

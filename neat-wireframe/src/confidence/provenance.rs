@@ -33,8 +33,10 @@ pub struct EdgeSupport {
 pub(super) struct EdgeProvenance {
     /// By ascending view and segment.
     pub supports: Vec<EdgeSupport>,
-    /// The views whose supports cover enough of the edge, ascending.
+    /// The views whose supports cover enough of the edge, ascending …
     pub showing_views: Vec<usize>,
+    /// … and the number of those in which they cover all of it.
+    pub whole_views: usize,
 }
 
 /// A view with a valid camera, and where its finite segments lie.
@@ -102,6 +104,7 @@ pub(super) fn provenance(
     for (edge, found) in of_views.into_iter().flatten() {
         of_edges[edge].supports.extend(found.supports);
         of_edges[edge].showing_views.extend(found.showing_views);
+        of_edges[edge].whole_views += found.whole_views;
     }
     of_edges
 }
@@ -156,10 +159,12 @@ fn view_provenance(
                 }
             });
             let covered: Vec<[f64; 2]> = claims.iter().map(|claim| claim.fit.on_edge).collect();
-            let shows = covered_share(camera, &edges[edge], &covered) >= config.min_covered_share;
+            let share = covered_share(camera, &edges[edge], &covered);
+            let shows = share >= config.min_covered_share;
             let found = EdgeProvenance {
                 supports: supports.collect(),
                 showing_views: shows.then_some(view_index).into_iter().collect(),
+                whole_views: usize::from(shows && share >= 1.0),
             };
             (edge, found)
         })
@@ -280,6 +285,7 @@ mod tests {
         *detection = detection.reversed();
         for (edge, found) in of_cube(&observations).iter().enumerate() {
             assert_eq!(found.showing_views, [0, 1, 2, 3, 4, 5]);
+            assert_eq!(found.whole_views, 6);
             assert_eq!(found.supports.len(), 6);
             for (view, support) in found.supports.iter().enumerate() {
                 assert_eq!((support.view, support.segment_in_view), (view, edge));
@@ -311,6 +317,7 @@ mod tests {
         let names: Vec<_> = found.supports.iter().map(|s| s.segment_in_view).collect();
         assert_eq!(names, [11, 12]);
         assert_eq!(found.showing_views, [0]);
+        assert_eq!(found.whole_views, 0);
 
         let config = ProvenanceConfig::default();
         let long = segment(0.0, 0.2, 100.0, 0.0);

@@ -1,18 +1,21 @@
 //! What the assembler makes of scenes, measured against the truth that each folder holds.
 //!
 //! ```text
-//! cargo run --release -p neat-eval --example measure_assembler -- [--structure] [--out DIR] SCENE…
+//! cargo run --release -p neat-eval --example measure_assembler -- [--structure] [--reliability] [--out DIR] SCENE…
 //! ```
 //!
-//! No field, no run folder and no confidence: the quickest way from a changed line of the
-//! assembler to its scores. A scene with `gt_wireframe.json` is measured as
+//! No field, no run folder and, unless it is asked for, no confidence: the quickest way from a
+//! changed line of the assembler to its scores. A scene with `gt_wireframe.json` is measured as
 //! `scripts/measure_objects.py` does (neat-abc at 0.01, one to one), one with `truth/` as
 //! `scripts/measure_photographs.py` does (surface-and-creases), one without truth by how much
 //! of the 2D segments it explains. With `--out` the wireframes are kept, and so are the 2D
 //! segments, which the next call takes from there. With `--structure` only edges are measured
-//! that are rather creases or boundaries than texture or shadows.
+//! that are rather creases or boundaries than texture or shadows. With `--reliability` the
+//! probabilities of the edges are held to the truth, too: scenes of one folder are a class.
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
+
+mod probabilities;
 
 use neat_core::{Camera, LoadOptions, Scene, View, hawp_json, load_scene};
 use neat_detect::{DetectorConfig, detect_views, edgel_maps};
@@ -24,6 +27,7 @@ use neat_wireframe::export::{WireframeDocument, write_json};
 use neat_wireframe::kinds::edge_kinds;
 use neat_wireframe::metrics::{ImageEvidenceConfig, Matching, PrecisionRecall, image_evidence};
 use neat_wireframe::{ViewObservation, Wireframe3d};
+use probabilities::Probabilities;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -36,11 +40,13 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 fn main() -> Result<()> {
     let (mut scenes, mut out, mut structure) = (Vec::new(), None, false);
+    let mut probabilities = None;
     let mut arguments = env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--out" => out = arguments.next().map(PathBuf::from),
             "--structure" => structure = true,
+            "--reliability" => probabilities = Some(Probabilities::default()),
             _ => scenes.push(PathBuf::from(argument)),
         }
     }
@@ -58,8 +64,12 @@ fn main() -> Result<()> {
         let original = |p: &_| scene.original_from_world.apply(p);
         let wireframe = built.wireframe.map(original);
         let (text, score) = measured(dir, &scene, &built.wireframe, &wireframe)?;
+        let of_edges = match &mut probabilities {
+            Some(probabilities) => probabilities.add(dir, &scene, &built.wireframe)?,
+            None => String::new(),
+        };
         println!(
-            "{name:18} {text} {} edges {seconds:.1} s",
+            "{name:18} {text} {} edges{of_edges} {seconds:.1} s",
             wireframe.edges.len()
         );
         scores.extend(score);
@@ -79,6 +89,9 @@ fn main() -> Result<()> {
             mean(0),
             mean(1)
         );
+    }
+    if let Some(probabilities) = probabilities {
+        print!("{}", probabilities.table());
     }
     Ok(())
 }
