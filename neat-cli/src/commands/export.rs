@@ -45,7 +45,7 @@ const OF_WIREFRAMES: [&str; 7] = [
 #[command(after_help = "\
 Examples:
   neat export RUN --out house.dxf
-  neat export RUN --out house.step --unit m --min-probability 0.9
+  neat export RUN --out house.step --unit m --min-probability 0.7
   neat export RUN --out house.dxf --only structure
   neat export RUN --out house.svg --view top
   neat export RUN --format colmap --out colmap
