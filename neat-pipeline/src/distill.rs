@@ -96,8 +96,7 @@ impl BackEndReport {
             "of {} 2D segments in {} views",
             found.usable_segments, found.usable_views
         );
-        const LOOK: &str =
-            "look at `neat doctor SCENE` and at the pictures in detections/ or overlays/";
+        const LOOK: &str = "look at `neat doctor SCENE` and at the pictures in overlays/";
         if found.usable_segments == 0 {
             format!(
                 "there is no 2D segment in {} views: {LOOK}",

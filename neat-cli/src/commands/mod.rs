@@ -64,9 +64,7 @@ impl Cli {
         threads::start(self.threads)?;
         self.command.run(self.quiet)
     }
-}
 
-impl Cli {
     /// Finds mistakes in the configuration of a reconstruction.
     pub fn check_configuration(&self) -> Result<(), CliError> {
         match &self.command {
