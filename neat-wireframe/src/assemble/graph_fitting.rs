@@ -6,7 +6,7 @@ use crate::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, bundle_adjus
 use crate::projection::project_in_front;
 use crate::solve::{Cauchy, reweighted};
 use nalgebra::{Vector2, Vector3};
-use neat_core::{LineSegment2, LineSegment3};
+use neat_core::{LineSegment2, LineSegment3, Wireframe3d};
 use rayon::prelude::*;
 
 /// Edgels are sought again after the first adjustment.
@@ -42,6 +42,21 @@ pub(super) fn fit_graph(
             .collect();
         *junctions = bundle_adjust(&observed, junctions, loss).junctions;
     }
+}
+
+/// Moves the junctions of a wireframe, each of whose edges is seen where it is itself: not where
+/// the line is that it has been cut from.
+pub(super) fn fit_edges(images: &Images, wireframe: &mut Wireframe3d) {
+    let Wireframe3d { junctions, edges } = wireframe;
+    let lines: Vec<ChosenLine> = (edges.par_iter())
+        .map(|edge| {
+            let [start, end] = edge.map(|end| junctions[end]);
+            let line = LineSegment3::new(start, end);
+            let evidence = images.evidence(&line, None, f64::NEG_INFINITY);
+            ChosenLine { line, evidence }
+        })
+        .collect();
+    fit_graph(images, &lines, edges, junctions);
 }
 
 fn observations(
@@ -102,6 +117,8 @@ fn segment_through(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assemble::test_views::TestViews;
+    use crate::test_scenes::cube;
 
     #[test]
     fn a_segment_runs_through_most_points() {
@@ -115,5 +132,19 @@ mod tests {
         assert!((found.end - Vector2::new(41.0, 10.59)).norm() < 0.02);
         assert!(segment_through(&points[..3], &beside, 0.5).is_none());
         assert!(segment_through(&[points[0]; 5], &beside, 0.5).is_none());
+    }
+
+    #[test]
+    fn edges_come_to_lie_where_the_images_show_them() {
+        let (truth, edges) = cube();
+        let mut wireframe = Wireframe3d {
+            junctions: truth.to_vec(),
+            edges: edges.to_vec(),
+        };
+        wireframe.junctions[6] += Vector3::new(0.002, -0.001, 0.001);
+        fit_edges(&TestViews::of_cube(12).images(), &mut wireframe);
+        for (fitted, truth) in wireframe.junctions.iter().zip(&truth) {
+            assert!((fitted - truth).norm() < 2e-4, "{fitted} {truth}");
+        }
     }
 }

@@ -7,7 +7,8 @@
 //! edgels of all views at once, takes them, and the next one is chosen by those that are
 //! left. Lines that bend are curves, and those that move aside from view to view are outlines
 //! of round things. Ends that meet become corners, all corners are fitted to the edgels
-//! together, and edges are cut where others end on them or cross them.
+//! together, and edges are cut where others end on them or cross them; the pieces, each by
+//! what shows it, are fitted once more.
 //!
 //! Edgels are so noisy as the scene's poses and images make them, which the first lines tell;
 //! how near to a line is near are multiples of that. Along edges, ends have windows in
@@ -56,10 +57,10 @@ use crate::ViewObservation;
 use collinear_pieces::merge_pieces;
 use corners::find_corners;
 use edge_completion::complete_edges;
-use edge_cutting::cut_edges;
+use edge_cutting::{cut_edges, in_order};
 use edge_samples::Images;
 use free_ends::move_free_ends;
-use graph_fitting::fit_graph;
+use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Scoring, score_hypotheses};
 use line_continuation::continue_lines;
 use line_selection::select_lines;
@@ -176,7 +177,9 @@ pub fn assemble_with_progress(
     move_free_ends(&images, &lines, &mut corners);
     report.completed_edges = complete_edges(&images, &mut corners, taken, least);
     report.completed_edges += close_slabs(&images, &mut corners, taken, least);
-    let wireframe = cut_edges(&images, corners).map(|junction| junction * scene_radius);
+    let mut wireframe = cut_edges(&images, corners);
+    fit_edges(&images, &mut wireframe);
+    let wireframe = in_order(&wireframe).map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
     report.edges = wireframe.edges.len();
     tracing::debug!(?report, "assembled");
