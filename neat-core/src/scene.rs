@@ -200,6 +200,14 @@ impl Scene {
         self
     }
 
+    /// The same scene, seen by these cameras, one per view.
+    pub fn with_cameras(mut self, cameras: &[Camera]) -> Self {
+        for (view, camera) in self.views.iter_mut().zip(cameras) {
+            view.camera = *camera;
+        }
+        self
+    }
+
     /// Radius of the ball around the world origin that all cameras see: 1.2 times
     /// the largest that each of them sees whole. Infinite for a scene without
     /// views.

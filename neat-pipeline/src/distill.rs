@@ -3,6 +3,7 @@
 mod thin_regions;
 
 use crate::config::{BackEnd, Config};
+use crate::event::{Decision, POSES};
 use crate::plan::Plan;
 use nalgebra::Vector3;
 use neat_core::{EdgelMap, LineSegment3, Scene, SceneError, Wireframe3d};
@@ -10,7 +11,7 @@ use neat_detect::{DetectorConfig, edgel_maps};
 use neat_sdf::RayBundle;
 use neat_tensor::host::host_vec;
 use neat_train::TrainedField;
-use neat_wireframe::assemble::{AssembleReport, assemble_with_progress};
+use neat_wireframe::assemble::{AssembleReport, Assembled, assemble_with_progress};
 use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::kinds::{EdgeKinds, curved_chains, edge_kinds, fill_kinds, junction_types};
@@ -84,6 +85,21 @@ pub enum BackEndReport {
 }
 
 impl BackEndReport {
+    /// How far the poses were moved, if they were.
+    pub fn moved_poses(&self) -> Option<Decision> {
+        let Self::Assembler { steps } = self else {
+            return None;
+        };
+        (steps.poses_moved_in_pixels > 0.0).then(|| Decision {
+            setting: POSES.to_owned(),
+            value: format!("moved by {:.2} pixels", steps.poses_moved_in_pixels),
+            reason: format!(
+                "as {:.0} % of what lines in space ask for is found by each half of them",
+                100.0 * steps.pose_reliability
+            ),
+        })
+    }
+
     /// Why there is no edge, by what the steps found.
     pub fn why_empty(&self) -> String {
         let found = match self {
@@ -161,6 +177,7 @@ pub fn distill(
     let views = ViewObservation::from_scene(scene, min_score);
     let scene_radius = config.data.scene_radius.unwrap_or(scene.sphere_radius);
     let back_end = plan.back_end();
+    let mut refined = None;
     let (wireframe, report, surface) = match back_end {
         BackEnd::Paper => {
             let field = field.ok_or(DistillError::NoField(back_end))?;
@@ -169,10 +186,15 @@ pub fn distill(
         }
         // A learned surface is too coarse to hide edges behind.
         BackEnd::Assembler => {
-            let (wireframe, report) = assembled(scene, config, &views, scene_radius, progress)?;
-            (wireframe, report, None)
+            let built = assembled(scene, config, &views, scene_radius, progress)?;
+            let steps = built.report;
+            refined = (built.refined_cameras).map(|cameras| scene.clone().with_cameras(&cameras));
+            (built.wireframe, BackEndReport::Assembler { steps }, None)
         }
     };
+    // The rest asks the images from where they show the wireframe.
+    let scene = refined.as_ref().unwrap_or(scene);
+    let views = ViewObservation::from_scene(scene, min_score);
     let hiding = surface.as_ref().map(|grid| grid as &dyn SignedDistance);
     let assessing = &config.distill.confidence;
     let confidence = assess(&wireframe, &views, hiding, scene_radius, assessing)?;
@@ -194,7 +216,7 @@ fn assembled(
     views: &[ViewObservation],
     scene_radius: f64,
     progress: OnProgress<'_>,
-) -> Result<(Wireframe3d, BackEndReport), DistillError> {
+) -> Result<Assembled, DistillError> {
     let edgels = edgels(scene, &config.detect, &mut |share| progress(0.3 * share))?;
     let on_progress = &mut |share| match progress(0.3 + 0.6 * share) {
         Ok(()) => ControlFlow::Continue(()),
@@ -202,13 +224,10 @@ fn assembled(
     };
     let config = &config.distill.assembler;
     let built = assemble_with_progress(views, &edgels, scene_radius, config, on_progress);
-    let ControlFlow::Continue(built) = built else {
-        return Err(Cancelled.into());
-    };
-    let report = BackEndReport::Assembler {
-        steps: built.report,
-    };
-    Ok((built.wireframe, report))
+    match built {
+        ControlFlow::Continue(built) => Ok(built),
+        ControlFlow::Break(()) => Err(Cancelled.into()),
+    }
 }
 
 /// The edgels of all images.

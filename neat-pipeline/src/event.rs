@@ -61,6 +61,9 @@ impl fmt::Display for Decision {
     }
 }
 
+/// The setting of the decision about poses.
+pub(crate) const POSES: &str = "poses";
+
 /// What a warning is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -54,9 +54,12 @@ fn main() -> Result<()> {
     for dir in &scenes {
         let name = dir.file_name().unwrap_or_default().to_string_lossy();
         let kept = out.as_ref().map(|out| out.join(&*name));
-        let scene = prepared(dir, kept.as_deref())?;
+        let mut scene = prepared(dir, kept.as_deref())?;
         let start = Instant::now();
         let mut built = assembled(&scene)?;
+        if let Some(cameras) = &built.refined_cameras {
+            scene = scene.with_cameras(cameras);
+        }
         if structure {
             built.wireframe = structure_of(&built.wireframe, &scene)?;
         }

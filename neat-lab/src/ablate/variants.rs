@@ -160,7 +160,12 @@ const PAPER_STEPS: [Variant; 3] = [
 ];
 
 /// The assembler with more and less of what a line needs.
-const ASSEMBLER_STEPS: [Variant; 4] = [
+const ASSEMBLER_STEPS: [Variant; 5] = [
+    step_off(
+        "poses as they are given",
+        "assembler-given-poses",
+        &["distill.assembler.refine_poses=false"],
+    ),
     step_off(
         "half the evidence of a line",
         "assembler-half-evidence",

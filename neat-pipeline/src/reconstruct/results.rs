@@ -5,7 +5,8 @@ use super::session::Session;
 use crate::config::OverlayGround;
 use crate::distill::{Cancelled, Distilled, agreement, distill};
 use crate::error::PipelineError;
-use crate::event::{Event, Stage, WarningKind};
+use crate::event::{Event, POSES, Stage, WarningKind};
+use crate::manifest::Manifest;
 use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe};
 use crate::scene::spread_views;
 use neat_core::file::write_png;
@@ -30,11 +31,16 @@ const REPORT: &str = "report";
 const AGREEMENT: &str = "agreement";
 
 impl Session<'_> {
-    /// Warnings about an earlier result, which a new one replaces.
+    /// Warnings and decisions about an earlier result, which a new one replaces.
     pub fn forget_distillation_warnings(&mut self) {
         let gone = [WarningKind::NoEdges, WarningKind::NoReport];
-        let warnings = &mut self.manifest.warnings;
+        let Manifest {
+            warnings,
+            decisions,
+            ..
+        } = &mut self.manifest;
         warnings.retain(|warning| !gone.contains(&warning.kind));
+        decisions.retain(|decision| decision.setting != POSES);
     }
 
     /// The result that is on disk, where there is one that can be read.
@@ -71,6 +77,9 @@ impl Session<'_> {
             let (scene, plan) = (&session.scene, &session.plan);
             Ok(distill(scene, field, plan, &mut progress)?)
         })?;
+        if let Some(moved) = distilled.report.moved_poses() {
+            self.tell(Event::Decided(moved));
+        }
         if distilled.wireframe.edges.is_empty() {
             let why = distilled.report.why_empty();
             self.warn(

@@ -191,7 +191,7 @@ impl<'a> Session<'a> {
     }
 
     /// Tells an event, and keeps what of it has to last.
-    fn tell(&mut self, event: Event<'_>) {
+    pub fn tell(&mut self, event: Event<'_>) {
         self.manifest.record(&event);
         (self.on_event)(event);
     }

@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AssembleConfig {
+    /// Whether lines move the poses, where two halves of them agree that the poses are off.
+    pub refine_poses: bool,
     /// Evidence that a line needs beyond what its own position takes, in nats: the
     /// logarithm of how much likelier the images are with the line than without it.
     pub min_evidence: f64,
@@ -21,6 +23,7 @@ pub struct AssembleConfig {
 impl Default for AssembleConfig {
     fn default() -> Self {
         Self {
+            refine_poses: true,
             min_evidence: 3.0,
             min_segment_length_in_pixels: 8.0,
             ball_margin: 1.5,

@@ -23,6 +23,9 @@ const BORDER: f64 = 3.0;
 /// A view counts if it holds at least this share of the samples.
 const MIN_INSIDE: f64 = 1.0 / 3.0;
 
+/// The reach before the noise is known, in pixels.
+const FIRST_REACH: f64 = 1.0;
+
 /// All that the assembler knows of the images.
 #[derive(Clone, Copy)]
 pub(super) struct Images<'a> {
@@ -50,7 +53,7 @@ impl<'a> Images<'a> {
         Self {
             views,
             maps,
-            reach: 0.0,
+            reach: FIRST_REACH,
             rounding: 0.0,
         }
     }

@@ -6,7 +6,7 @@ use super::config::AssembleConfig;
 use super::edge_samples::{Images, project_segment};
 use super::hypothesis_scoring::Alternatives;
 use super::line_evidence::LineEvidence;
-use super::progress::{OnProgress, part};
+use super::progress::OnProgress;
 use super::projected_line::ProjectedLine;
 use super::view_segments::SegmentId;
 use crate::statistics::{SIGMA_BY_MEDIAN, upper_median};
@@ -18,19 +18,15 @@ use std::ops::ControlFlow;
 const REACH_NOISES: f64 = 3.0;
 /// Bounds of the reach in pixels: rounding and rendering, and edges side by side.
 const REACH_BOUNDS: [f64; 2] = [0.25, 1.5];
-/// The reach before the noise is known, in pixels.
-const FIRST_REACH: f64 = 1.0;
-/// So many lines tell of the noise.
-const LINES_FOR_NOISE: usize = 100;
-/// Of so many 2D segments one proposes lines for the noise.
-const SEGMENTS_FOR_NOISE: usize = 4;
+/// So many lines tell of the noise and the poses; with 400 scores of photographs are the same.
+const SURE_LINES: usize = 100;
+/// Of so many 2D segments one proposes them.
+const SEGMENTS_FOR_SURE_LINES: usize = 4;
 /// Edgels within so many pixels of a line tell of the noise.
 const NOISE_REACH: f64 = 2.0;
 /// Fewer do not.
 const MIN_EDGELS_FOR_NOISE: usize = 20;
-/// Shares of the time after which the noise is known, and after which all lines are found, whose
-/// kinds are asked then.
-const TOLD_NOISE: f64 = 0.2;
+/// Share of the time after which all lines are found, whose kinds are asked then.
 const FOUND: f64 = 0.7;
 /// So many lines are asked for their kind between two words about progress.
 const LINES_AT_ONCE: usize = 64;
@@ -80,40 +76,35 @@ struct Candidate {
     line: LineSegment3,
 }
 
-/// Chooses the lines that the images show, of all positions of all 2D segments.
-pub(super) fn select_lines<'a>(
-    images: Images<'a>,
+/// The lines of which the images are surest, of some 2D segments.
+pub(super) fn sure_lines(
+    images: Images,
     alternatives: &Alternatives,
     config: &AssembleConfig,
     progress: OnProgress<'_>,
+) -> ControlFlow<(), Vec<ChosenLine>> {
+    let some = candidates(&images, alternatives, SEGMENTS_FOR_SURE_LINES);
+    let (least, most) = (config.min_evidence, SURE_LINES);
+    let sure = choose(images, &some, least, most, LEAST_NOISE, progress)?;
+    ControlFlow::Continue(sure.lines)
+}
+
+/// Chooses the lines that the images show, of all positions of all 2D segments, as near to
+/// edgels as these are to the `sure` ones.
+pub(super) fn select_lines<'a>(
+    images: Images<'a>,
+    alternatives: &Alternatives,
+    sure: &[ChosenLine],
+    config: &AssembleConfig,
+    progress: OnProgress<'_>,
 ) -> ControlFlow<(), Selection<'a>> {
-    let first = Images {
-        reach: FIRST_REACH,
-        ..images
-    };
-    let some = candidates(&first, alternatives, SEGMENTS_FOR_NOISE);
-    let sure = choose(
-        first,
-        &some,
-        config.min_evidence,
-        LINES_FOR_NOISE,
-        LEAST_NOISE,
-        &mut part(progress, [0.0, TOLD_NOISE]),
-    )?;
-    let noise = noise_of_edgels(&first, &sure.lines);
+    let noise = noise_of_edgels(&images, sure);
     let reach = (REACH_NOISES * noise).clamp(REACH_BOUNDS[0], REACH_BOUNDS[1]);
     let images = Images { reach, ..images };
     let all = candidates(&images, alternatives, 1);
     tracing::debug!(noise, candidates = all.len(), "lines are proposed");
-    let progress = &mut part(progress, [TOLD_NOISE, 1.0]);
-    choose(
-        images,
-        &all,
-        config.min_evidence,
-        usize::MAX,
-        noise,
-        progress,
-    )
+    let (least, most) = (config.min_evidence, usize::MAX);
+    choose(images, &all, least, most, noise, progress)
 }
 
 /// The candidates of one of `step` segments of each view.

@@ -37,6 +37,7 @@ mod line_fitting;
 mod line_selection;
 mod neighbours;
 mod outlines;
+mod pose_fitting;
 mod progress;
 mod projected_line;
 mod report;
@@ -63,8 +64,9 @@ use free_ends::move_free_ends;
 use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Scoring, score_hypotheses};
 use line_continuation::continue_lines;
-use line_selection::select_lines;
-use neat_core::{EdgelMap, LineSegment2};
+use line_selection::{select_lines, sure_lines};
+use neat_core::{Camera, EdgelMap, LineSegment2};
+use pose_fitting::fit_poses;
 use progress::part;
 use rayon::prelude::*;
 use slab_ends::close_slabs;
@@ -75,9 +77,10 @@ use view_segments::PreparedView;
 /// Views that must agree on a position for it to be proposed; the images decide.
 const MIN_VIEWS: usize = 2;
 
-/// Shares of the time after which lines are proposed, selected, cut where arcs begin, and
-/// continued: about those of a house.
+/// Shares of the time after which lines are proposed, the sure ones known, all selected, cut where
+/// arcs begin, and continued: about those of a house.
 const PROPOSED: f64 = 0.05;
+const SURE: f64 = 0.2;
 const SELECTED: f64 = 0.8;
 const ENDED: f64 = 0.85;
 const CONTINUED: f64 = 0.95;
@@ -151,10 +154,22 @@ pub fn assemble_with_progress(
         ..AssembleReport::default()
     };
 
-    let images = Images::new(&views, maps);
+    let mut images = Images::new(&views, maps);
+    let mut sure = {
+        let progress = &mut part(progress, [PROPOSED, SURE]);
+        sure_lines(images, &alternatives, config, progress)?
+    };
+    let poses = (config.refine_poses)
+        .then(|| fit_poses(&images, &mut sure))
+        .flatten();
+    if let Some(poses) = &poses {
+        images.views = &poses.views;
+        report.poses_moved_in_pixels = poses.pixels;
+        report.pose_reliability = poses.reliability;
+    }
     let mut selection = {
-        let progress = &mut part(progress, [PROPOSED, SELECTED]);
-        select_lines(images, &alternatives, config, progress)?
+        let progress = &mut part(progress, [SURE, SELECTED]);
+        select_lines(images, &alternatives, &sure, config, progress)?
     };
     drop(alternatives);
     let images = selection.images;
@@ -183,7 +198,18 @@ pub fn assemble_with_progress(
     report.junctions = wireframe.junctions.len();
     report.edges = wireframe.edges.len();
     tracing::debug!(?report, "assembled");
-    ControlFlow::Continue(Assembled { wireframe, report })
+    let refined_cameras = poses.map(|poses| {
+        let camera = |view: &PreparedView| Camera {
+            center_in_world: view.camera.center_in_world * scene_radius,
+            ..view.camera
+        };
+        poses.views.iter().map(camera).collect()
+    });
+    ControlFlow::Continue(Assembled {
+        wireframe,
+        report,
+        refined_cameras,
+    })
 }
 
 /// The edgels of a view that is known by its segments only.

@@ -1,6 +1,7 @@
 //! What the assembler returns.
 
 use crate::Wireframe3d;
+use neat_core::Camera;
 use serde::{Deserialize, Serialize};
 
 /// A wireframe, and how it came about.
@@ -10,6 +11,9 @@ pub struct Assembled {
     pub wireframe: Wireframe3d,
     /// What each step found.
     pub report: AssembleReport,
+    /// The cameras of all views, from where the images show the wireframe; `None` where they
+    /// stand as given.
+    pub refined_cameras: Option<Vec<Camera>>,
 }
 
 /// What each step of [`super::assemble`] found, in the order of the steps.
@@ -23,6 +27,10 @@ pub struct AssembleReport {
     pub edgels: usize,
     /// 2D segments with a position in space.
     pub segments_with_hypotheses: usize,
+    /// How far refined poses move lines in the images, in pixels, if poses were refined …
+    pub poses_moved_in_pixels: f64,
+    /// … and the share of that which two halves of the lines agree on.
+    pub pose_reliability: f64,
     /// Standard deviation of edgels from the lines, in pixels.
     pub noise_in_pixels: f64,
     /// Straight lines that the images show …

@@ -84,6 +84,23 @@ impl PreparedView {
         }
     }
 
+    /// The same segments, seen by another camera of the same image.
+    pub(super) fn moved_to(&self, camera: Camera) -> Self {
+        let mut moved = Self {
+            camera,
+            ..self.clone()
+        };
+        for segment in &mut moved.segments {
+            let rays = segment
+                .segment
+                .ends()
+                .map(|end| camera.ray_through(&end).direction);
+            segment.rays = rays;
+            segment.plane_normal = rays[0].cross(&rays[1]).normalize();
+        }
+        moved
+    }
+
     /// The 3D segment whose ends lie at these distances on the rays of a 2D
     /// segment's ends.
     pub(super) fn back_project(&self, segment: usize, depths: [f64; 2]) -> LineSegment3 {

@@ -105,8 +105,11 @@ fn edgels() -> impl Strategy<Value = Vec<Edgel>> {
 /// Mostly what a person may choose, sometimes not.
 fn config() -> impl Strategy<Value = AssembleConfig> {
     let numbers = (number(-1.0..8.0), number(0.0..30.0), number(0.5..3.0));
-    (numbers, 0..12_usize).prop_map(|((min_evidence, min_length, ball_margin), neighbours)| {
+    let rest = (any::<bool>(), 0..12_usize);
+    (numbers, rest).prop_map(|(numbers, (refine_poses, neighbours))| {
+        let (min_evidence, min_length, ball_margin) = numbers;
         AssembleConfig {
+            refine_poses,
             min_evidence,
             min_segment_length_in_pixels: min_length,
             ball_margin,
