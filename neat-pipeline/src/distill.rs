@@ -66,6 +66,8 @@ pub struct Distilled {
     pub kinds: Vec<EdgeKinds>,
     /// What each step kept and removed.
     pub report: BackEndReport,
+    /// The scene with its poses where the images show the wireframe, if they were moved.
+    pub refined_scene: Option<Scene>,
 }
 
 /// What each step of a back end kept and removed.
@@ -177,7 +179,7 @@ pub fn distill(
     let views = ViewObservation::from_scene(scene, min_score);
     let scene_radius = config.data.scene_radius.unwrap_or(scene.sphere_radius);
     let back_end = plan.back_end();
-    let mut refined = None;
+    let mut refined_scene = None;
     let (wireframe, report, surface) = match back_end {
         BackEnd::Paper => {
             let field = field.ok_or(DistillError::NoField(back_end))?;
@@ -188,12 +190,13 @@ pub fn distill(
         BackEnd::Assembler => {
             let built = assembled(scene, config, &views, scene_radius, progress)?;
             let steps = built.report;
-            refined = (built.refined_cameras).map(|cameras| scene.clone().with_cameras(&cameras));
+            refined_scene =
+                (built.refined_cameras).map(|cameras| scene.clone().with_cameras(&cameras));
             (built.wireframe, BackEndReport::Assembler { steps }, None)
         }
     };
     // The rest asks the images from where they show the wireframe.
-    let scene = refined.as_ref().unwrap_or(scene);
+    let scene = refined_scene.as_ref().unwrap_or(scene);
     let views = ViewObservation::from_scene(scene, min_score);
     let hiding = surface.as_ref().map(|grid| grid as &dyn SignedDistance);
     let assessing = &config.distill.confidence;
@@ -206,6 +209,7 @@ pub fn distill(
         confidence,
         kinds,
         report,
+        refined_scene,
     })
 }
 

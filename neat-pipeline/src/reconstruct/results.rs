@@ -10,7 +10,7 @@ use crate::manifest::Manifest;
 use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe};
 use crate::scene::spread_views;
 use neat_core::file::write_png;
-use neat_core::{View, Wireframe3d, file};
+use neat_core::{Camera, Scene, View, Wireframe3d, file};
 use neat_report::ReportError;
 use neat_train::TrainedField;
 use neat_wireframe::export::{WireframeDocument, read_json, write_json, write_obj, write_ply};
@@ -29,6 +29,7 @@ const OVERLAYS_AT_ONCE: usize = 2;
 /// Keys of the metadata of `wireframe.json`.
 const REPORT: &str = "report";
 const AGREEMENT: &str = "agreement";
+const REFINED_POSES: &str = "refined_poses";
 
 impl Session<'_> {
     /// Warnings and decisions about an earlier result, which a new one replaces.
@@ -87,7 +88,8 @@ impl Session<'_> {
                 format!("the wireframe has no edges: {why}"),
             );
         }
-        let agreement = agreement(&self.scene, self.plan.config(), &distilled.wireframe);
+        let scene = distilled.refined_scene.as_ref().unwrap_or(&self.scene);
+        let agreement = agreement(scene, self.plan.config(), &distilled.wireframe);
         let (wireframe, document) = self.stage(Stage::Export, |session| {
             session.export(&distilled, agreement)
         })?;
@@ -131,7 +133,8 @@ impl Session<'_> {
         write_png(&png, &draw_wireframe(in_world, &self.scene))?;
         let mut written = vec![json, obj, ply, png];
 
-        let views = &self.scene.views;
+        let scene = distilled.refined_scene.as_ref().unwrap_or(&self.scene);
+        let views = &scene.views;
         let overlays: Vec<_> = spread_views(views, OVERLAYS)
             .into_iter()
             .map(|index| (&views[index], self.dir.overlay(&views[index].name)))
@@ -166,7 +169,9 @@ impl Session<'_> {
         distilled: &Distilled,
         agreement: Option<ImageEvidence>,
     ) -> BTreeMap<String, serde_json::Value> {
-        [
+        let refined = distilled.refined_scene.as_ref().map(poses_in_original);
+        let refined = refined.map(|poses| (REFINED_POSES, json!(poses)));
+        let facts = [
             ("neat", json!(self.manifest.neat)),
             ("scene", json!(self.scene.name)),
             ("preset", json!(self.manifest.preset)),
@@ -177,8 +182,22 @@ impl Session<'_> {
             ("distill", json!(self.plan.config().distill)),
             (REPORT, json!(distilled.report)),
             (AGREEMENT, json!(agreement)),
-        ]
-        .map(|(key, value)| (key.to_owned(), value))
-        .into()
+        ];
+        (facts.into_iter().chain(refined))
+            .map(|(key, value)| (key.to_owned(), value))
+            .collect()
     }
+}
+
+/// For each view the rows of its camera-to-world matrix, in the frame of the user's files.
+fn poses_in_original(scene: &Scene) -> BTreeMap<&str, [[f64; 4]; 3]> {
+    let pose = |camera: &Camera| {
+        let center = scene.original_from_world.apply(&camera.center_in_world);
+        let turn = &camera.world_from_camera;
+        [0, 1, 2].map(|row| [turn[(row, 0)], turn[(row, 1)], turn[(row, 2)], center[row]])
+    };
+    let views = scene.views.iter();
+    views
+        .map(|view| (view.name.as_str(), pose(&view.camera)))
+        .collect()
 }
