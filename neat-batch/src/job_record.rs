@@ -61,10 +61,15 @@ pub enum Outcome {
 }
 
 impl Outcome {
+    /// Whether the program came to its end; with exit code 3 it found nothing.
+    pub fn is_done(&self) -> bool {
+        matches!(self, Self::Exited(0 | 3))
+    }
+
     /// Whether another attempt may end better. Exit code 2 stands for input or
     /// arguments that cannot be used.
     pub fn may_pass(&self) -> bool {
-        !matches!(self, Self::Exited(0 | 2))
+        !(self.is_done() || *self == Self::Exited(2))
     }
 }
 
@@ -152,8 +157,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_bad_input_and_success_are_final() {
-        assert!(!Outcome::Exited(0).may_pass() && !Outcome::Exited(2).may_pass());
+    fn only_bad_input_and_what_is_done_are_final() {
+        assert!(
+            [0, 2, 3]
+                .iter()
+                .all(|code| !Outcome::Exited(*code).may_pass())
+        );
         let worth_it = [Outcome::Exited(1), Outcome::Exited(130), Outcome::Killed(9)];
         assert!(worth_it.iter().all(Outcome::may_pass));
     }

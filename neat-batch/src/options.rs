@@ -9,7 +9,8 @@ use std::time::Duration;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BatchOptions {
     /// The program, `neat`. It is given the arguments of [`Job::command_line`](crate::Job::command_line) and
-    /// `--threads N`. Exit codes: 0 done, 2 bad input, 130 interrupted, others failed.
+    /// `--threads N`. Exit codes: 0 done, 2 bad input, 3 done without an edge,
+    /// 130 interrupted, others failed.
     pub program: PathBuf,
     /// So many jobs run at a time.
     pub workers: NonZeroUsize,

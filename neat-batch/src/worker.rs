@@ -173,10 +173,9 @@ impl Worker<'_> {
         let outcome = attempt.run(self.stop, &mut |line| {
             self.tell(position, JobEvent::Progress { line });
         });
-        let error = match outcome {
-            Outcome::Exited(0) => None,
-            _ => log.last_error(log_start),
-        };
+        let error = (!outcome.is_done())
+            .then(|| log.last_error(log_start))
+            .flatten();
         record.error = error;
         if let Some(attempt) = record.attempts.last_mut() {
             attempt.seconds = began.elapsed().as_secs_f64();
@@ -190,8 +189,8 @@ impl Worker<'_> {
         let last = record.attempts.last();
         let outcome = last.map_or(Outcome::Unknown, |attempt| attempt.outcome.clone());
         let said = record.error.take();
-        let no_result = outcome == Outcome::Exited(0) && !folder.wireframe().is_file();
-        if outcome == Outcome::Exited(0) && !no_result {
+        let no_result = outcome.is_done() && !folder.wireframe().is_file();
+        if outcome.is_done() && !no_result {
             record.state = JobState::Finished;
             let seconds = record.seconds();
             return JobEvent::Finished { seconds };

@@ -16,6 +16,8 @@ use neat_train::TrainError;
 const FAILED: u8 = 1;
 /// Exit code of arguments or input that cannot be used; clap uses it too.
 const BAD_INPUT: u8 = 2;
+/// Exit code of a run that is done, with a wireframe that is empty.
+const EMPTY: u8 = 3;
 /// Exit code after Ctrl-C, by the convention of shells: 128 + SIGINT.
 pub const INTERRUPTED: u8 = 130;
 
@@ -28,6 +30,12 @@ pub enum CliError {
     /// A person stopped a run that `--resume` continues.
     #[error("{0}")]
     Resumable(PipelineError),
+    /// A run that came to its end, and found nothing.
+    #[error("the wireframe is empty; all results are written: look at {report}")]
+    NoEdges {
+        /// The report.
+        report: String,
+    },
     /// Variants of an ablation that could not be measured.
     #[error("{failed} of {all} variants failed: the column `note` of the table says why")]
     VariantsFailed {
@@ -170,6 +178,7 @@ impl CliError {
             Self::Override(_) | Self::UnknownView { .. } | Self::Usage(_) | Self::NotReady => {
                 BAD_INPUT
             }
+            Self::NoEdges { .. } => EMPTY,
             Self::Export(error) if error.is_bad_input() => BAD_INPUT,
             Self::Batch(error) if error.is_bad_input() => BAD_INPUT,
             // `neat info SCENE | head` is no failure.

@@ -23,7 +23,7 @@ impl Scenes {
         let scenes = Self { dir };
         for solid in solids {
             neat(&["synth", "--out", &scenes.text(&format!("scenes/{solid}"))])
-                .args(["--solid", solid, "--views", "4", "--image-size", "48"])
+                .args(["--solid", solid, "--views", "8", "--image-size", "48"])
                 .args(["--detection-rate", "1"])
                 .assert()
                 .success();

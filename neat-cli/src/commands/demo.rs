@@ -1,6 +1,6 @@
 //! `neat demo`.
 
-use super::reconstruct::summary;
+use super::reconstruct::{not_empty, summary};
 use super::synth::SceneArgs;
 use super::train::{command_line, existing};
 use crate::arguments::{ComputeArgs, MethodArgs};
@@ -75,6 +75,7 @@ impl DemoArgs {
             summary(&demo.reconstruction),
             demo.evaluation.to_text(),
             demo.evaluation_file.display(),
-        ))
+        ))?;
+        not_empty(&demo.reconstruction)
     }
 }

@@ -1,6 +1,6 @@
 //! `neat distill`.
 
-use super::reconstruct::summary;
+use super::reconstruct::{not_empty, summary};
 use crate::arguments::BackendArg;
 use crate::cache::CacheArgs;
 use crate::error::CliError;
@@ -57,6 +57,7 @@ impl DistillArgs {
         )?;
         let reconstruction = distill_run(opened, &mut |event| progress.show(event))?;
         drop(progress);
-        output::print(&summary(&reconstruction))
+        output::print(&summary(&reconstruction))?;
+        not_empty(&reconstruction)
     }
 }

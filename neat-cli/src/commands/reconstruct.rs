@@ -17,7 +17,8 @@ use neat_wireframe::metrics::ImageEvidence;
 /// and config.toml and manifest.json; after training also metrics.jsonl, junctions.jsonl and
 /// checkpoints/.
 ///
-/// Ctrl-C ends training after the current step and leaves a checkpoint (exit code 130).
+/// Ctrl-C ends training after the current step and leaves a checkpoint (exit code 130). A wireframe
+/// without edges ends with exit code 3 and says why it is empty.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
@@ -53,8 +54,18 @@ impl ReconstructArgs {
         let reconstruction = reconstruct(&options, &interrupted, &mut |event| progress.show(event))
             .map_err(CliError::of_resumable)?;
         drop(progress);
-        output::print(&summary(&reconstruction))
+        output::print(&summary(&reconstruction))?;
+        not_empty(&reconstruction)
     }
+}
+
+/// Errs if there is nothing in the result: scripts have to know.
+pub fn not_empty(reconstruction: &Reconstruction) -> Result<(), CliError> {
+    if reconstruction.wireframe.edges.is_empty() {
+        let report = reconstruction.run.report().display().to_string();
+        return Err(CliError::NoEdges { report });
+    }
+    Ok(())
 }
 
 /// One line about the result.

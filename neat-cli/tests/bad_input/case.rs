@@ -34,7 +34,7 @@ pub fn check(name: &str, cases: &[Case]) {
 /// it was. Returns its row of the table.
 fn row(case: &Case) -> String {
     let kind = case.kind;
-    let scene = TestScene::new();
+    let scene = TestScene::without_edges();
     (case.spoil)(&scene);
     let before = contents(&scene.file(""));
     let assert = neat(&[])

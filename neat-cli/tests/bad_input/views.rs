@@ -104,7 +104,7 @@ fn views() {
 
 #[test]
 fn a_view_without_segments_is_skipped_with_a_warning() {
-    let scene = TestScene::new();
+    let scene = TestScene::without_edges();
     remove_segments(&scene, 1);
     let assert = scene.run("train", "1").arg("--quiet").assert().success();
     let message = stderr(&assert);

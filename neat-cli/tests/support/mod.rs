@@ -36,18 +36,19 @@ pub struct TestScene {
 }
 
 impl TestScene {
-    /// Four views of a box, 48 × 48 pixels, everything detected.
+    /// Eight views of a box, 48 × 48 pixels, everything detected.
     pub fn new() -> Self {
-        Self::with(&[
-            "--solid",
-            "box",
-            "--views",
-            "4",
-            "--image-size",
-            "48",
-            "--detection-rate",
-            "1",
-        ])
+        Self::of_views("8")
+    }
+
+    /// Half as many: too few for an edge, and enough for what never comes so far.
+    pub fn without_edges() -> Self {
+        Self::of_views("4")
+    }
+
+    fn of_views(views: &str) -> Self {
+        let size = ["--image-size", "48", "--detection-rate", "1"];
+        Self::with(&[["--solid", "box", "--views", views].as_slice(), &size].concat())
     }
 
     /// What `neat synth` makes with these arguments.
