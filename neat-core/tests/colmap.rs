@@ -259,6 +259,18 @@ fn files_are_preferred_in_a_fixed_order() {
 }
 
 #[test]
+fn long_lists_of_images_that_are_not_there_are_refused_at_once() {
+    let dir = scene_dir();
+    let mut images = String::new();
+    for image in 0..300_000 {
+        images += &format!("{image} 1 0 0 0 0 0 0 7 image-{image}.png\n\n");
+    }
+    write_text(dir.path(), CAMERAS, &images, "");
+    let error = load(&dir).unwrap_err().to_string();
+    assert!(error.contains("image-0.png does not exist"), "{error}");
+}
+
+#[test]
 fn points_may_be_missing() {
     let dir = text_scene(CAMERAS, IMAGES, "");
     let empty = load(&dir).unwrap().scene;

@@ -392,6 +392,22 @@ mod links {
     }
 
     #[test]
+    fn links_that_lead_nowhere_are_told_from_files_that_are_not_there() {
+        let (_parent, scene) = scene_of(Path::new("a.png"));
+        let warnings = load(&scene, Layout::CamerasJson).unwrap().warnings;
+        let text = format!("{warnings:?}");
+        let left_out: Vec<_> = warnings.iter().map(ToString::to_string).collect();
+        let told = |text: &String| text.contains("a.png, a link that leads to no file");
+        assert!(left_out.iter().any(told), "{text}");
+        for name in ["b.png", "c.png"] {
+            fs::remove_file(scene.join("images").join(name)).unwrap();
+            symlink("nowhere", scene.join("images").join(name)).unwrap();
+        }
+        let error = load(&scene, Layout::CamerasJson).unwrap_err().to_string();
+        assert!(error.contains("link that leads to no file"), "{error}");
+    }
+
+    #[test]
     fn devices_pipes_and_folders_are_no_files() {
         let (_parent, scene) = scene_of(Path::new("/dev/zero"));
         let image = scene.join("images/a.png");

@@ -156,24 +156,31 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         return Err(SceneError::missing(&usual, REMEDY));
     };
     let read = |name| file::read(&model.file(name), REMEDY);
-    let (cameras, images) = (read("cameras")?, read("images")?);
+    let cameras = read("cameras")?;
+    let path = model.file("images");
+    let images = model.format.images(&path, &read("images")?)?;
+    if let Some(first) = images.first()
+        && images::most_are_missing(&model.images_dir, images.len())
+    {
+        let relative = relative_path(&path, &first.name)?;
+        return Err(images::missing(&model.images_dir.join(relative)));
+    }
     // Models of known poses have no file of points, or an empty one.
     let points = match read("points3D") {
         Err(SceneError::Missing { .. } | SceneError::Empty { .. }) => None,
         points => Some(points?),
     };
-    parse(&model, &cameras, &images, points.as_deref())
+    parse(&model, &cameras, images, points.as_deref())
 }
 
 fn parse(
     model: &Model,
     cameras: &[u8],
-    images: &[u8],
+    images: Vec<ColmapImage>,
     points: Option<&[u8]>,
 ) -> Result<Poses, SceneError> {
     let (cameras_path, path) = (model.file("cameras"), model.file("images"));
     let cameras = by_id(model.format.cameras(&cameras_path, cameras)?, &cameras_path)?;
-    let images = model.format.images(&path, images)?;
     let points = points.map_or(Ok(Vec::new()), |bytes| {
         let path = model.file("points3D");
         sparse_points(&path, model.format.points(&path, bytes)?, &images)
@@ -347,7 +354,8 @@ mod tests {
 
     #[test]
     fn lenses_and_observations_are_those_of_the_files() {
-        let poses = parse(&model(Format::Text), CAMERAS, IMAGES, Some(POINTS)).unwrap();
+        let images = text::images(Path::new("images.txt"), IMAGES).unwrap();
+        let poses = parse(&model(Format::Text), CAMERAS, images, Some(POINTS)).unwrap();
         let [a, b] = poses.views.as_slice() else {
             panic!("two views");
         };
@@ -396,7 +404,10 @@ mod tests {
                 3 => files = damaged,
                 kind => files[kind] = damaged[kind],
             }
-            if let Ok(poses) = parse(&model(Format::Text), files[0], files[1], Some(files[2])) {
+            let images = text::images(Path::new("images.txt"), files[1]);
+            let poses = images
+                .and_then(|images| parse(&model(Format::Text), files[0], images, Some(files[2])));
+            if let Ok(poses) = poses {
                 prop_assert!(poses.views.iter().all(|view| view.intrinsics.validate().is_ok()));
             }
         }

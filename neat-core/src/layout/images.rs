@@ -77,7 +77,34 @@ pub(super) type ReadSize = fn(&Path) -> Result<(u32, u32), SceneError>;
 
 /// The error about an image that is not there.
 pub(super) fn missing(path: &Path) -> SceneError {
+    if path.is_symlink() {
+        return SceneError::missing(
+            path,
+            "it is a link that leads to no file: replace it by the image or remove its pose",
+        );
+    }
     SceneError::missing(path, REMEDY)
+}
+
+/// Whether a folder, with all below it, has less than half as many files as a list names images:
+/// known before each of millions is looked for.
+pub(super) fn most_are_missing(dir: &Path, images: usize) -> bool {
+    let mut files = 0;
+    let mut folders = vec![dir.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            match entry.file_type() {
+                Ok(kind) if kind.is_dir() => folders.push(entry.path()),
+                Ok(kind) if kind.is_file() => files += 1,
+                // A link may lead to a folder with any number of files.
+                _ => return false,
+            }
+            if 2 * files >= images {
+                return false;
+            }
+        }
+    }
+    images > 0
 }
 
 /// Width and height, from the first bytes of an image.

@@ -209,6 +209,7 @@ fn drop_missing_images(poses: &mut Poses) -> Result<Option<SceneWarning>, SceneE
     }
     let warning = SceneWarning::ImagesMissing {
         first: first.image.clone(),
+        first_is_link: first.image.is_symlink(),
         views: missing.len(),
     };
     poses.retain_views(&is_there);

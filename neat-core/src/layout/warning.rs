@@ -16,6 +16,8 @@ pub enum SceneWarning {
     ImagesMissing {
         /// The first of the images.
         first: PathBuf,
+        /// Whether that is a link, to what is not there or to itself.
+        first_is_link: bool,
         /// How many views.
         views: usize,
     },
@@ -67,10 +69,19 @@ impl fmt::Display for SceneWarning {
                 f,
                 "the intrinsics do not tell where pixel centres are: {pixel_center} is assumed"
             ),
-            Self::ImagesMissing { first, views } => write!(
+            Self::ImagesMissing {
+                first,
+                first_is_link,
+                views,
+            } => write!(
                 f,
-                "{views} views are left out because their images are not there, such as {}",
-                first.display()
+                "{views} views are left out because their images are not there, such as {}{}",
+                first.display(),
+                if *first_is_link {
+                    ", a link that leads to no file"
+                } else {
+                    ""
+                }
             ),
             Self::LinksOutside { first, files } => write!(
                 f,
