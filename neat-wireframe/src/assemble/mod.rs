@@ -54,7 +54,7 @@ pub use line3d::{Line3dConfig, Line3dSegment, SegmentSupport, line3d, wireframe_
 pub use progress::OnProgress;
 pub use report::{AssembleReport, Assembled};
 
-use crate::ViewObservation;
+use crate::{ViewObservation, Wireframe3d};
 use collinear_pieces::merge_pieces;
 use corners::find_corners;
 use edge_completion::complete_edges;
@@ -64,8 +64,8 @@ use free_ends::move_free_ends;
 use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Scoring, score_hypotheses};
 use line_continuation::continue_lines;
-use line_selection::{select_lines, sure_lines};
-use neat_core::{Camera, EdgelMap, LineSegment2};
+use line_selection::{Selection, select_lines, sure_lines};
+use neat_core::{EdgelMap, LineSegment2};
 use pose_fitting::fit_poses;
 use progress::part;
 use rayon::prelude::*;
@@ -77,13 +77,14 @@ use view_segments::PreparedView;
 /// Views that must agree on a position for it to be proposed; the images decide.
 const MIN_VIEWS: usize = 2;
 
-/// Shares of the time after which lines are proposed, the sure ones known, all selected, cut where
-/// arcs begin, and continued: about those of a house.
+/// Shares of the time after which lines are proposed, the sure ones known and all selected: about
+/// those of a house.
 const PROPOSED: f64 = 0.05;
 const SURE: f64 = 0.2;
 const SELECTED: f64 = 0.8;
-const ENDED: f64 = 0.85;
-const CONTINUED: f64 = 0.95;
+/// Likewise, of the time for the graph, after which lines are cut where arcs begin, and continued.
+const ENDED: f64 = 0.25;
+const CONTINUED: f64 = 0.75;
 
 /// Builds the wireframe.
 ///
@@ -167,17 +168,37 @@ pub fn assemble_with_progress(
         report.poses_moved_in_pixels = poses.pixels;
         report.pose_reliability = poses.reliability;
     }
-    let mut selection = {
+    let selection = {
         let progress = &mut part(progress, [SURE, SELECTED]);
         select_lines(images, &alternatives, &sure, config, progress)?
     };
     drop(alternatives);
-    let images = selection.images;
     report.noise_in_pixels = selection.noise;
     report.lines = selection.lines.len();
     report.curved_lines = selection.curved;
     report.outlines = selection.outlines;
+    let progress = &mut part(progress, [SELECTED, 1.0]);
+    let wireframe = graph_of(selection, config, &mut report, progress)?;
+    let wireframe = wireframe.map(|junction| junction * scene_radius);
+    report.junctions = wireframe.junctions.len();
+    report.edges = wireframe.edges.len();
+    tracing::debug!(?report, "assembled");
+    let refined_cameras = poses.map(|poses| poses.cameras(scene_radius));
+    ControlFlow::Continue(Assembled {
+        wireframe,
+        report,
+        refined_cameras,
+    })
+}
 
+/// From lines to a graph: merged, continued, joined at corners, completed, cut and fitted.
+fn graph_of(
+    mut selection: Selection<'_>,
+    config: &AssembleConfig,
+    report: &mut AssembleReport,
+    progress: OnProgress<'_>,
+) -> ControlFlow<(), Wireframe3d> {
+    let images = selection.images;
     cut_tangent_ends(&images, &mut selection.lines, selection.noise);
     progress(ENDED)?;
     let mut lines = merge_pieces(&images, selection.lines);
@@ -194,22 +215,7 @@ pub fn assemble_with_progress(
     report.completed_edges += close_slabs(&images, &mut corners, taken, least);
     let mut wireframe = cut_edges(&images, corners);
     fit_edges(&images, &mut wireframe);
-    let wireframe = in_order(&wireframe).map(|junction| junction * scene_radius);
-    report.junctions = wireframe.junctions.len();
-    report.edges = wireframe.edges.len();
-    tracing::debug!(?report, "assembled");
-    let refined_cameras = poses.map(|poses| {
-        let camera = |view: &PreparedView| Camera {
-            center_in_world: view.camera.center_in_world * scene_radius,
-            ..view.camera
-        };
-        poses.views.iter().map(camera).collect()
-    });
-    ControlFlow::Continue(Assembled {
-        wireframe,
-        report,
-        refined_cameras,
-    })
+    ControlFlow::Continue(in_order(&wireframe))
 }
 
 /// The edgels of a view that is known by its segments only.

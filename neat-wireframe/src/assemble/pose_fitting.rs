@@ -41,6 +41,17 @@ pub(super) struct PoseFit {
     pub pixels: f64,
 }
 
+impl PoseFit {
+    /// The cameras, in a world whose scene ball has that radius.
+    pub fn cameras(&self, scene_radius: f64) -> Vec<Camera> {
+        let camera = |view: &PreparedView| Camera {
+            center_in_world: view.camera.center_in_world * scene_radius,
+            ..view.camera
+        };
+        self.views.iter().map(camera).collect()
+    }
+}
+
 /// How the distance of an edgel from a line changes with the pose of its view, and the distance.
 type Row = (Vector6<f64>, f64);
 
