@@ -156,7 +156,8 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
         return Err(SceneError::missing(&usual, REMEDY));
     };
     let read = |name| file::read(&model.file(name), REMEDY);
-    let cameras = read("cameras")?;
+    let path = model.file("cameras");
+    let cameras = by_id(model.format.cameras(&path, &read("cameras")?)?, &path)?;
     let path = model.file("images");
     let images = model.format.images(&path, &read("images")?)?;
     if let Some(first) = images.first()
@@ -175,12 +176,11 @@ pub(super) fn read_poses(dir: &Path) -> Result<Poses, SceneError> {
 
 fn parse(
     model: &Model,
-    cameras: &[u8],
+    cameras: &BTreeMap<u32, ColmapCamera>,
     images: Vec<ColmapImage>,
     points: Option<&[u8]>,
 ) -> Result<Poses, SceneError> {
     let (cameras_path, path) = (model.file("cameras"), model.file("images"));
-    let cameras = by_id(model.format.cameras(&cameras_path, cameras)?, &cameras_path)?;
     let points = points.map_or(Ok(Vec::new()), |bytes| {
         let path = model.file("points3D");
         sparse_points(&path, model.format.points(&path, bytes)?, &images)
@@ -352,10 +352,16 @@ mod tests {
         }
     }
 
+    fn parsed([cameras, images, points]: [&[u8]; 3]) -> Result<Poses, SceneError> {
+        let path = Path::new("model");
+        let cameras = by_id(text::cameras(path, cameras)?, path)?;
+        let images = text::images(path, images)?;
+        parse(&model(Format::Text), &cameras, images, Some(points))
+    }
+
     #[test]
     fn lenses_and_observations_are_those_of_the_files() {
-        let images = text::images(Path::new("images.txt"), IMAGES).unwrap();
-        let poses = parse(&model(Format::Text), CAMERAS, images, Some(POINTS)).unwrap();
+        let poses = parsed([CAMERAS, IMAGES, POINTS]).unwrap();
         let [a, b] = poses.views.as_slice() else {
             panic!("two views");
         };
@@ -404,10 +410,7 @@ mod tests {
                 3 => files = damaged,
                 kind => files[kind] = damaged[kind],
             }
-            let images = text::images(Path::new("images.txt"), files[1]);
-            let poses = images
-                .and_then(|images| parse(&model(Format::Text), files[0], images, Some(files[2])));
-            if let Ok(poses) = poses {
+            if let Ok(poses) = parsed(files) {
                 prop_assert!(poses.views.iter().all(|view| view.intrinsics.validate().is_ok()));
             }
         }
