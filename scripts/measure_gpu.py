@@ -8,7 +8,8 @@ One after the other, each into a file of OUT: training steps of the presets besi
 the machine's matrix product (bench.json), a whole `fast` reconstruction
 with its accuracy where the scene has a truth (run/, reconstruct.txt, eval.txt), how far
 the GPU is from the CPU (comparison/), and what a step launches (kernels-PRESET.txt).
-A part that fails is named at the end; the others are measured.
+A part that fails is named at the end; the others are measured. The program must have been
+built with `--features wgpu`.
 """
 
 import argparse

@@ -10,7 +10,7 @@ counts and poor times.
     scripts/profile_kernels.py SCENE [--neat target/release/neat] [--steps N]
         [-- OPTION...]              options of `neat train`, such as --preset fast
 
-Needs the wgpu backend: a GPU, or a software Vulkan driver, which is slow.
+Needs a program built with `--features wgpu` and a GPU, or a software Vulkan driver, which is slow.
 """
 
 import argparse

@@ -78,9 +78,9 @@ impl DoctorArgs {
             memory_limit,
             ..ExamineOptions::default()
         };
-        // Before the work: a backend that cannot be used is an error at once. What
-        // training reaches of a GPU's speed is not known.
-        let speed = match self.backend.backend.resolve() {
+        // Before the work: a backend that cannot be used is an error at once. No GPU is
+        // looked for, and what training reaches of its speed is not known.
+        let speed = match self.backend.backend.resolve_on_host() {
             Backend::Wgpu => None,
             cpu => Some(speed(&cpu.device()?)),
         };
@@ -109,7 +109,7 @@ impl DoctorArgs {
             text.push('\n');
         }
         if !costs.is_empty() {
-            text.push_str("\ntraining, where it is asked for, on this machine if it is idle, within a factor of two:\n");
+            text.push_str("\ntraining, where it is asked for, on the CPU of this machine if it is idle, within a factor of two:\n");
         }
         for Cost { preset, estimate } in costs {
             let time = duration::display(estimate.seconds);
