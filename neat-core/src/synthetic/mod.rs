@@ -6,11 +6,7 @@
 //! around it, ray traces the images, cuts every edge into its visible parts and
 //! imitates a wireframe detector (noise, misses, false segments). The same
 //! configuration gives the same scene, for any number of threads.
-//! [`BlockScene`] makes scenes of thousands of junctions, without images.
 
-mod block_scene;
-mod block_visibility;
-mod blocks;
 mod detection;
 mod frustum;
 mod planar_face;
@@ -22,8 +18,6 @@ mod solid;
 mod viewpoints;
 mod visible_edges;
 
-pub use block_scene::{BlockData, BlockScene, BlockSource, BlockView};
-pub use blocks::Blocks;
 pub use frustum::Frustum;
 pub use planar_face::PlanarFace;
 pub use rendering::render;
@@ -31,4 +25,5 @@ pub use scene::{
     SyntheticData, SyntheticError, SyntheticScene, ViewTruth, generate, generate_on_demand,
 };
 pub use solid::Solid;
+pub use viewpoints::viewpoints;
 pub use visible_edges::{VisiblePart, visible_parts};

@@ -17,8 +17,6 @@ pub(super) enum Purpose {
     Score,
     /// False segments and their scores.
     FalseSegment,
-    /// Places, sizes and turns of boxes.
-    Blocks,
 }
 
 /// The stream keyed by `(seed, view, purpose)`.

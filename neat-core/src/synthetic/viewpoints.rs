@@ -16,12 +16,7 @@ pub(super) fn min_distance(radius: f64, aspect: f64) -> f64 {
 
 /// `count` cameras at `distance` from the origin, looking at it, spread evenly:
 /// a Fibonacci lattice in a random orientation.
-pub(super) fn viewpoints(
-    count: usize,
-    distance: f64,
-    image_size: (u32, u32),
-    seed: u64,
-) -> Vec<Camera> {
+pub fn viewpoints(count: usize, distance: f64, image_size: (u32, u32), seed: u64) -> Vec<Camera> {
     let mut rng = stream(seed, 0, Purpose::Viewpoints);
     let (a, b) = (gaussian_pair(&mut rng), gaussian_pair(&mut rng));
     let orientation = UnitQuaternion::new_normalize(Quaternion::new(a.x, a.y, b.x, b.y));

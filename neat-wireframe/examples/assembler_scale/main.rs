@@ -11,10 +11,13 @@
 
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
+mod block_scene;
+mod block_visibility;
+mod blocks;
 mod score;
 
+use block_scene::{BlockData, BlockScene};
 use neat_core::Wireframe3d;
-use neat_core::synthetic::{BlockData, BlockScene};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::assemble::{AssembleConfig, assemble};
 use neat_wireframe::metrics::required_views;
@@ -46,7 +49,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             views,
             ..BlockScene::default()
         };
-        let data = scene.generate()?;
+        let data = scene.generate();
         let observations = observations(&data);
         let segments: usize = observations.iter().map(|view| view.segments.len()).sum();
         let start = Instant::now();

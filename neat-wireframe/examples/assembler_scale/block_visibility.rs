@@ -1,8 +1,8 @@
 //! Exact hidden-line removal among boxes.
 
-use super::blocks::Block;
-use crate::LineSegment3;
+use crate::blocks::Block;
 use nalgebra::{Vector2, Vector3};
+use neat_core::LineSegment3;
 
 /// Boxes are this much smaller when they hide something, so that an edge is not
 /// hidden by the faces that carry it.
@@ -11,7 +11,7 @@ const SHRINKAGE: f64 = 1e-7;
 const END: f64 = 1e-5;
 
 /// A stretch of an edge that can be seen.
-pub(super) struct VisibleStretch {
+pub struct VisibleStretch {
     /// The edge's index, twelve per box.
     pub edge: usize,
     /// The whole edge.
@@ -22,7 +22,7 @@ pub(super) struct VisibleStretch {
 
 /// The stretches of all edges that can be seen from `center`, which lies outside
 /// all boxes, edge by edge.
-pub(super) fn visible_stretches(boxes: &[Block], center: &Vector3<f64>) -> Vec<VisibleStretch> {
+pub fn visible_stretches(boxes: &[Block], center: &Vector3<f64>) -> Vec<VisibleStretch> {
     let cones: Vec<Cone> = boxes.iter().map(|block| Cone::new(block, center)).collect();
     let mut visible = Vec::new();
     let mut edge = 0;
