@@ -38,13 +38,13 @@ pub fn decode(bytes: &[u8], path: &Path, max_side: u32) -> Result<DynamicImage, 
 pub(crate) fn header<T>(
     path: &Path,
     remedy: &str,
-    describe: impl FnOnce(&dyn ImageDecoder) -> T,
+    describe: impl FnOnce(&mut dyn ImageDecoder) -> T,
 ) -> Result<T, SceneError> {
     let (opened, length) = file::open(path, remedy)?;
     let reader = ImageReader::new(BufReader::new(opened)).with_guessed_format();
     reader
         .map_err(ImageError::IoError)
-        .and_then(|reader| Ok(describe(&decoder(reader, length, u32::MAX)?)))
+        .and_then(|reader| Ok(describe(&mut decoder(reader, length, u32::MAX)?)))
         .map_err(|source| SceneError::image(path, source))
 }
 

@@ -1,6 +1,7 @@
 //! Images on disk.
 
 use crate::{SceneError, file, hawp_json::file_stem, image_file};
+use image::metadata::Orientation;
 use image::{DynamicImage, ImageError, ImageFormat, RgbImage};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -113,6 +114,20 @@ pub(super) fn most_are_missing(dir: &Path, images: usize) -> bool {
 /// If it is missing or no image.
 pub fn read_size(path: &Path) -> Result<(u32, u32), SceneError> {
     image_file::header(path, REMEDY, |image| image.dimensions())
+}
+
+/// Width and height of an image as it is stored, and how it says that it is to be turned.
+/// An orientation that cannot be read turns nothing.
+///
+/// # Errors
+/// As [`read_size`].
+pub(super) fn read_size_and_orientation(
+    path: &Path,
+) -> Result<((u32, u32), Orientation), SceneError> {
+    image_file::header(path, REMEDY, |image| {
+        let orientation = image.orientation().unwrap_or(Orientation::NoTransforms);
+        (image.dimensions(), orientation)
+    })
 }
 
 /// Whether an image has transparency, from its first bytes.

@@ -8,6 +8,7 @@ use super::sphere::Evidence;
 use super::view_reader::{self, ViewReader};
 use super::{
     HAWP_DIR, Layout, LoadOptions, SceneWarning, images, input_files, pixel_center, point_files,
+    turn,
 };
 use crate::scene_sphere::SphereSource;
 use crate::{Camera, Observation, Scene, SceneError, SceneSphere, SparsePoint, View, hawp_json};
@@ -82,9 +83,10 @@ pub(super) fn load_posed(
 ) -> Result<LoadedScene, SceneError> {
     let mut warnings = Vec::new();
     choose_images(dir, &mut poses, options, &mut warnings)?;
-    let cameras = view_reader::cameras(&poses)?;
+    let (cameras, turns) = view_reader::cameras(&poses)?;
+    warnings.extend(turn::warnings(&poses.views, &turns));
     let pixel_center = pixel_center::choose(options.pixel_center, &poses, &cameras, &mut warnings);
-    let reader = ViewReader::new(dir, options, &poses, cameras, pixel_center)?;
+    let reader = ViewReader::new(dir, options, &poses, (cameras, turns), pixel_center)?;
     let mut views = reader.read(&mut warnings)?;
     let room = Room {
         limit: options.memory_limit,

@@ -29,6 +29,7 @@ mod sphere;
 mod strecha;
 mod text_lines;
 mod transforms_json;
+mod turn;
 mod view_reader;
 mod warning;
 

@@ -7,7 +7,8 @@ use crate::downscaling::Downscaling;
 use crate::scene::check_image_size;
 use crate::undistortion::Undistortion;
 use crate::{Camera, Distortion, Intrinsics, ViewError, Wireframe2d};
-use image::RgbImage;
+use image::metadata::Orientation;
+use image::{DynamicImage, RgbImage};
 use nalgebra::Vector2;
 use serde::Serialize;
 
@@ -18,6 +19,8 @@ pub(super) struct Rectification {
     undistortion: Option<Undistortion>,
     downscaling: Option<Downscaling>,
     pixel_center: f64,
+    /// How the stored pixels are turned first.
+    turn: Orientation,
 }
 
 impl Rectification {
@@ -43,7 +46,13 @@ impl Rectification {
             undistortion,
             downscaling: max_image_size.and_then(|max| Downscaling::new(size, max, pixel_center)),
             pixel_center,
+            turn: Orientation::NoTransforms,
         })
+    }
+
+    /// The same for a photograph that is stored so that it has to be turned first.
+    pub fn of_turned(self, turn: Orientation) -> Self {
+        Self { turn, ..self }
     }
 
     /// The model of the lens, where the photograph is undistorted.
@@ -83,11 +92,14 @@ impl Rectification {
         }
     }
 
-    /// The view's image.
+    /// The view's image, of the pixels as they are stored.
     ///
     /// # Errors
-    /// If `photograph` has another size than its file said first.
-    pub fn image(&self, photograph: RgbImage) -> Result<RgbImage, ViewError> {
+    /// If it has another size than its file said first.
+    pub fn image(&self, stored: RgbImage) -> Result<RgbImage, ViewError> {
+        let mut photograph = DynamicImage::from(stored);
+        photograph.apply_orientation(self.turn);
+        let photograph = photograph.into_rgb8();
         check_image_size("camera", self.photograph_size(), photograph.dimensions())?;
         let undistorted = match &self.undistortion {
             Some(undistortion) => undistortion.resample(&photograph),
@@ -136,12 +148,16 @@ impl Rectification {
             distortion: &'a Distortion,
             pixel_center: f64,
             size: (u32, u32),
+            #[serde(skip_serializing_if = "Option::is_none")]
+            turn: Option<u8>,
         }
+        let turn = (self.turn != Orientation::NoTransforms).then_some(self.turn.to_exif());
         let key = Key {
             intrinsics: &self.photograph.intrinsics,
             distortion: &self.distortion,
             pixel_center: self.pixel_center,
             size: self.size(),
+            turn,
         };
         serde_json::to_vec(&key).expect("Rectification::key: numbers are serialised without error")
     }

@@ -4,11 +4,13 @@
 use super::photograph::{self, Photograph};
 use super::poses::{PosedImage, Poses};
 use super::rectify::Rectification;
+use super::turn::Turn;
 use super::{HAWP_DIR, LoadOptions, SceneWarning, images};
 use crate::file_cache::FileCache;
 use crate::scene::check_image_size;
 use crate::{Camera, ImageStore, SceneError, View, ViewError, ViewImage, Wireframe2d, hawp_json};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use tracing::debug;
@@ -24,19 +26,53 @@ pub(super) struct ViewReader<'a> {
     pub bytes_each: u64,
 }
 
-/// The camera of every photograph.
+/// The camera of every photograph, and how it is turned.
 ///
 /// # Errors
-/// If an image cannot be read, differs in size from what its pose says, or its
-/// intrinsics or pose cannot be used.
-pub(super) fn cameras(poses: &Poses) -> Result<Vec<Camera>, SceneError> {
-    try_par_map(&poses.views, |posed| {
-        camera_of(posed, images::read_size(&posed.image)?, &poses.path)
-    })
+/// If an image cannot be read, differs in size from what its pose says or from others of
+/// the same intrinsics, or its intrinsics or pose cannot be used.
+pub(super) fn cameras(poses: &Poses) -> Result<(Vec<Camera>, Vec<Turn>), SceneError> {
+    let read = try_par_map(&poses.views, |posed| {
+        let (stored, said) = images::read_size_and_orientation(&posed.image)?;
+        let turn = Turn::new(posed, stored, said);
+        Ok((camera_of(posed, turn.size(stored), &poses.path)?, turn))
+    })?;
+    let (cameras, turns): (Vec<Camera>, Vec<Turn>) = read.into_iter().unzip();
+    check_shared_intrinsics(poses, &cameras)?;
+    Ok((cameras, turns))
+}
+
+/// Errs where the same intrinsics are those of photographs of several sizes, of which the
+/// file of the poses says none: they can suit one size only, and the rarer ones are refused.
+fn check_shared_intrinsics(poses: &Poses, cameras: &[Camera]) -> Result<(), SceneError> {
+    let size = |camera: &Camera| (camera.width, camera.height);
+    let key = |camera: &Camera| {
+        let k = &camera.intrinsics;
+        [k.fx, k.fy, k.cx, k.cy, k.skew].map(f64::to_bits)
+    };
+    let views = poses.views.iter().zip(cameras);
+    let views = views.filter(|(posed, _)| posed.size.is_none());
+    let mut sizes: BTreeMap<[u64; 5], BTreeMap<(u32, u32), usize>> = BTreeMap::new();
+    for (_, camera) in views.clone() {
+        *sizes
+            .entry(key(camera))
+            .or_default()
+            .entry(size(camera))
+            .or_default() += 1;
+    }
+    for (posed, camera) in views {
+        let of_shared = sizes[&key(camera)].iter();
+        if let Some((usual, _)) = of_shared.max_by_key(|(_, views)| **views) {
+            check_image_size("camera", *usual, size(camera))
+                .map_err(|problem| SceneError::view(&poses.path, &posed.name, problem))?;
+        }
+    }
+    Ok(())
 }
 
 impl<'a> ViewReader<'a> {
-    /// For the images of the scene in `dir`, whose photographs have `cameras`.
+    /// For the images of the scene in `dir`, whose photographs have these cameras and are
+    /// turned so.
     ///
     /// # Errors
     /// If a lens cannot be undistorted, or one photograph alone takes more memory than
@@ -45,12 +81,13 @@ impl<'a> ViewReader<'a> {
         dir: &Path,
         options: &'a LoadOptions,
         poses: &'a Poses,
-        cameras: Vec<Camera>,
+        (cameras, turns): (Vec<Camera>, Vec<Turn>),
         pixel_center: f64,
     ) -> Result<Self, SceneError> {
-        let posed: Vec<_> = poses.views.iter().zip(cameras).collect();
-        let images = try_par_map(&posed, |&(posed, camera)| {
+        let posed: Vec<_> = poses.views.iter().zip(cameras).zip(turns).collect();
+        let images = try_par_map(&posed, |&((posed, camera), turn)| {
             Rectification::new(posed, camera, pixel_center, options.max_image_size)
+                .map(|rectification| rectification.of_turned(turn.to_apply()))
                 .map(|rectification| (posed, rectification))
                 .map_err(|problem| SceneError::view(&poses.path, &posed.name, problem))
         })?;

@@ -36,6 +36,15 @@ pub enum SceneWarning {
         /// How many views.
         views: usize,
     },
+    /// Photographs say that they are to be turned (EXIF orientation).
+    Turned {
+        /// Name of the first view.
+        first: String,
+        /// How many.
+        views: usize,
+        /// Whether they were: the sizes of their cameras ask for it.
+        is_applied: bool,
+    },
     /// Photographs were scaled down.
     ScaledDown {
         /// The longest side asked for, in pixels.
@@ -94,6 +103,18 @@ impl fmt::Display for SceneWarning {
                 "{views} views were undistorted to pinhole images (lens model: {})",
                 lenses.join(", ")
             ),
+            Self::Turned {
+                first,
+                views,
+                is_applied,
+            } => {
+                write!(f, "{views} photographs, such as `{first}`, ")?;
+                f.write_str(if *is_applied {
+                    "were turned by their EXIF orientation, because their cameras have the size of the turned image"
+                } else {
+                    "have an EXIF orientation, which is left alone: poses are taken for those of the pixels as they are stored"
+                })
+            }
             Self::ScaledDown {
                 max_image_size,
                 views,
