@@ -28,13 +28,24 @@ fn views() {
         "views",
         &[
             Case {
-                kind: "an image of another size than its 2D wireframe",
+                kind: "an image of another size than those that share its intrinsics",
                 spoil: |scene| {
                     let path = scene.file("scene/images/image_0001.png");
-                    image::RgbImage::new(40, 48).save(path).unwrap();
+                    image::RgbImage::new(4800, 4800).save(path).unwrap();
+                },
+                command: "train scene --out run --max-image-size 48",
+                names: &["view `image_0001`", "48×48", "4800×4800", "camera"],
+            },
+            Case {
+                kind: "images of another size than their 2D wireframes",
+                spoil: |scene| {
+                    for view in 0..4 {
+                        let path = scene.file(&format!("scene/images/image_000{view}.png"));
+                        image::RgbImage::new(40, 48).save(path).unwrap();
+                    }
                 },
                 command: TRAIN,
-                names: &["view `image_0001`", "48×48", "40×48", "wireframe"],
+                names: &["view `image_0000`", "48×48", "40×48", "wireframe"],
             },
             Case {
                 kind: "fewer scores than 2D segments",
