@@ -3,7 +3,7 @@
 
 use image::{Rgb, RgbImage};
 use nalgebra::{Vector2, Vector3};
-use neat_core::layout::Layout;
+use neat_core::layout::{Layout, SceneWarning};
 use neat_core::{
     LoadOptions, LoadedScene, Observation, Scene, SceneError, Similarity, SphereChoice,
     Wireframe2d, hawp_json, load_scene,
@@ -268,6 +268,23 @@ fn long_lists_of_images_that_are_not_there_are_refused_at_once() {
     write_text(dir.path(), CAMERAS, &images, "");
     let error = load(&dir).unwrap_err().to_string();
     assert!(error.contains("image-0.png does not exist"), "{error}");
+}
+
+#[test]
+fn images_without_a_pose_are_told() {
+    let dir = text_scene(CAMERAS, IMAGES, POINTS);
+    assert_eq!(load(&dir).unwrap().warnings, []);
+    // A copy in another format, and two images that the model has lost.
+    for name in ["view_0.jpg", "view_7.png", "right/view_8.png"] {
+        let path = dir.path().join("images").join(name);
+        RgbImage::new(WIDTH, HEIGHT).save(path).unwrap();
+    }
+    let warnings = load(&dir).unwrap().warnings;
+    let told = SceneWarning::ImagesWithoutPose {
+        first: dir.path().join("images/view_7.png"),
+        images: 2,
+    };
+    assert_eq!(warnings, [told]);
 }
 
 #[test]

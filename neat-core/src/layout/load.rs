@@ -13,6 +13,7 @@ use super::{
 use crate::scene_sphere::SphereSource;
 use crate::{Camera, Observation, Scene, SceneError, SceneSphere, SparsePoint, View, hawp_json};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use tracing::{debug, info_span};
 
@@ -82,6 +83,9 @@ pub(super) fn load_posed(
     options: &LoadOptions,
 ) -> Result<LoadedScene, SceneError> {
     let mut warnings = Vec::new();
+    if layout.poses_some_images() {
+        warnings.extend(images_without_pose(&poses));
+    }
     choose_images(dir, &mut poses, options, &mut warnings)?;
     let (cameras, turns) = view_reader::cameras(&poses)?;
     warnings.extend(turn::warnings(&poses.views, &turns));
@@ -159,6 +163,22 @@ fn choose_images(
         return Err(SceneError::missing(&hawp_dir, hawp_json::REMEDY));
     }
     Ok(())
+}
+
+/// Tells of images beside those of the views: reconstructions leave some out, and files of
+/// poses that end early too many.
+fn images_without_pose(poses: &Poses) -> Option<SceneWarning> {
+    let images = || poses.views.iter().map(|view| view.image.as_path());
+    // Endings play no role: data sets hold copies of their images in other formats.
+    let posed: BTreeSet<PathBuf> = images().map(|image| image.with_extension("")).collect();
+    let folders: BTreeSet<&Path> = images().filter_map(Path::parent).collect();
+    let beside = folders.into_iter().flat_map(images::list).flatten();
+    let mut without = beside.filter(|image| !posed.contains(&image.with_extension("")));
+    let first = without.next()?;
+    Some(SceneWarning::ImagesWithoutPose {
+        first,
+        images: 1 + without.count(),
+    })
 }
 
 /// Leaves out the views in which nothing was detected, where that is needed.

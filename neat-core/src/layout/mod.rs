@@ -101,6 +101,13 @@ impl fmt::Display for Layout {
 }
 
 impl Layout {
+    /// Whether the images of a scene are those of its folders, of which some may have found no
+    /// pose; elsewhere other pictures, as of depths, lie beside them.
+    fn poses_some_images(self) -> bool {
+        use Layout::{Bundler, Colmap, OpenMvg, OpenMvs, VisualSfm};
+        matches!(self, Colmap | OpenMvg | OpenMvs | VisualSfm | Bundler)
+    }
+
     /// Tells the layout of the folder `dir` by its files, looked for in the order
     /// `cameras_sphere.npz`, `cameras.npz`, `cameras.json`, `transforms.json`, a
     /// COLMAP model, `meta_data.json`, `sfm_data.json`, `.mvs`, `.nvm`,

@@ -21,6 +21,13 @@ pub enum SceneWarning {
         /// How many views.
         views: usize,
     },
+    /// Images beside those of the views have no pose.
+    ImagesWithoutPose {
+        /// The first of them.
+        first: PathBuf,
+        /// How many.
+        images: usize,
+    },
     /// Files of the scene are links to files outside of its folder.
     LinksOutside {
         /// The first of them.
@@ -91,6 +98,11 @@ impl fmt::Display for SceneWarning {
                 } else {
                     ""
                 }
+            ),
+            Self::ImagesWithoutPose { first, images } => write!(
+                f,
+                "{images} images have no pose and are not used, such as {}",
+                first.display()
             ),
             Self::LinksOutside { first, files } => write!(
                 f,
