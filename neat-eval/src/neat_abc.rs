@@ -15,7 +15,7 @@ use crate::counts::WireframeCounts;
 use crate::table::Table;
 use neat_core::Wireframe3d;
 use neat_wireframe::metrics::{
-    DistanceMatrix, Matching, MetricsError, PrecisionRecall, SegmentDistance, junction_distances,
+    Matching, MetricsError, NearPairs, PrecisionRecall, SegmentDistance, junction_distances,
     precision_recall, segment_distances,
 };
 use neat_wireframe::validity::check_wireframe;
@@ -153,14 +153,26 @@ impl NeatAbc {
         truth: &Wireframe3d,
     ) -> Result<GraphScores, MetricsError> {
         check_wireframe(&predicted.junctions, &predicted.edges).map_err(MetricsError::Predicted)?;
-        let score = |distances: DistanceMatrix| {
-            precision_recall(&distances, &self.thresholds, self.matching)
-        };
+        let at = &self.thresholds;
         let (ours, true_ones) = (predicted.segments(), truth.segments());
-        let segments = |distance| score(segment_distances(&ours, &true_ones, distance)?);
+        let segments = |kind| match self.matching {
+            Matching::MinimumSum => {
+                precision_recall(&segment_distances(&ours, &true_ones, kind)?, at)
+            }
+            Matching::PerThreshold => {
+                Ok(NearPairs::of_segments(&ours, &true_ones, kind, at)?.precision_recall())
+            }
+        };
+        let (ours, true_ones) = (&predicted.junctions, &truth.junctions);
+        let junctions = match self.matching {
+            Matching::MinimumSum => precision_recall(&junction_distances(ours, true_ones)?, at)?,
+            Matching::PerThreshold => {
+                NearPairs::of_junctions(ours, true_ones, at)?.precision_recall()
+            }
+        };
         Ok(GraphScores {
             counts: WireframeCounts::of(predicted),
-            junctions: score(junction_distances(&predicted.junctions, &truth.junctions)?)?,
+            junctions,
             segments_max: segments(SegmentDistance::Max)?,
             segments_mean: segments(SegmentDistance::Mean)?,
         })

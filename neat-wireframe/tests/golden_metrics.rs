@@ -7,7 +7,7 @@ use neat_core::LineSegment3;
 use neat_wireframe::Wireframe3d;
 use neat_wireframe::metrics::DistanceMatrix;
 use neat_wireframe::metrics::{
-    Matching, PointCloud, SegmentDistance, junction_distances, mean_nearest_distance,
+    NearPairs, PointCloud, SegmentDistance, junction_distances, mean_nearest_distance,
     precision_recall, sample_segments, segment_distances,
 };
 
@@ -41,7 +41,7 @@ impl Case {
 
     fn assert_scores(&self, distances: &DistanceMatrix, prefix: &str) {
         let thresholds = self.golden.numbers("thresholds");
-        let scores = precision_recall(distances, &thresholds, Matching::MinimumSum).unwrap();
+        let scores = precision_recall(distances, &thresholds).unwrap();
         let precision: Vec<f64> = scores.iter().map(|s| s.precision).collect();
         let recall: Vec<f64> = scores.iter().map(|s| s.recall).collect();
         let expected = |name| self.golden.numbers(&format!("{prefix}{name}"));
@@ -102,9 +102,11 @@ fn best_matching_per_threshold_finds_no_fewer_pairs() {
     for set in ["A", "B"] {
         let predicted = case.golden.segments(&format!("{set}/lines"));
         let truth = case.truth.segments();
-        let distances = segment_distances(&predicted, &truth, SegmentDistance::Max).unwrap();
-        let by_sum = precision_recall(&distances, &thresholds, Matching::MinimumSum).unwrap();
-        let best = precision_recall(&distances, &thresholds, Matching::PerThreshold).unwrap();
+        let kind = SegmentDistance::Max;
+        let distances = segment_distances(&predicted, &truth, kind).unwrap();
+        let by_sum = precision_recall(&distances, &thresholds).unwrap();
+        let near = NearPairs::of_segments(&predicted, &truth, kind, &thresholds).unwrap();
+        let best = near.precision_recall();
         for (by_sum, best) in by_sum.iter().zip(&best) {
             assert!(best.matched >= by_sum.matched);
         }

@@ -31,7 +31,7 @@ use neat_wireframe::assemble::{
 use neat_wireframe::confidence::{ConfidenceConfig, assess};
 use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
 use neat_wireframe::metrics::{
-    ImageEvidenceConfig, Matching, PointCloud, SegmentDistance, image_evidence, junction_distances,
+    ImageEvidenceConfig, PointCloud, SegmentDistance, image_evidence, junction_distances,
     precision_recall, segment_distances,
 };
 use serde::de::DeserializeOwned;
@@ -136,7 +136,7 @@ fn main() -> Result<(), AnyError> {
         let (ours, true_ones) = (in_files.segments(), truth.segments());
         let segments = segment_distances(&ours, &true_ones, SegmentDistance::Max)?;
         for (name, distances) in [("junctions", junctions), ("segments", segments)] {
-            for score in precision_recall(&distances, &[0.01, 0.02, 0.05], Matching::MinimumSum)? {
+            for score in precision_recall(&distances, &[0.01, 0.02, 0.05])? {
                 println!(
                     "{name:>12} within {}: precision {:.3}, recall {:.3}",
                     score.threshold, score.precision, score.recall

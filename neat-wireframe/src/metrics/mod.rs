@@ -4,6 +4,7 @@
 
 mod distance_matrix;
 mod image_evidence;
+mod near_pairs;
 mod precision_recall;
 mod supported_truth;
 mod surface_distance;
@@ -11,6 +12,7 @@ mod surface_distance;
 pub use distance_matrix::{DistanceMatrix, MatchedPair};
 pub(crate) use image_evidence::visible_projection;
 pub use image_evidence::{ImageEvidence, ImageEvidenceConfig, image_evidence};
+pub use near_pairs::NearPairs;
 pub use precision_recall::{
     Matching, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,
     segment_distances,
@@ -49,7 +51,7 @@ pub enum MetricsError {
     },
     /// So many things on both sides that no matching of all of them ends.
     #[error(
-        "{predicted} predicted and {truth} true ones make more than {MAX_PAIRS} pairs, too many to match: measure parts, or choose a protocol of points, such as emap"
+        "{predicted} predicted and {truth} true ones make more than {MAX_PAIRS} pairs, too many to match: measure parts, take `--matching per-threshold` with thresholds that are small beside the scene, or choose a protocol of points, such as emap"
     )]
     TooManyPairs {
         /// Predicted junctions or segments.

@@ -78,47 +78,50 @@ pub fn segment_distances(
 ) -> Result<DistanceMatrix, MetricsError> {
     check_pairs(predicted.len(), truth.len())?;
     Ok(DistanceMatrix::between(predicted, truth, |a, b| {
-        let in_order = |b: &LineSegment3| {
-            let [start, end] = a.end_distances(b);
-            match distance {
-                SegmentDistance::Mean => (start + end) / 2.0,
-                SegmentDistance::Max => start.max(end),
-            }
-        };
-        in_order(b).min(in_order(&b.reversed()))
+        segment_distance(a, b, distance)
     }))
 }
 
-/// Precision and recall at each threshold, from the distances `[predicted, truth]`.
+/// The distance of two segments.
+pub(super) fn segment_distance(a: &LineSegment3, b: &LineSegment3, kind: SegmentDistance) -> f64 {
+    let in_order = |b: &LineSegment3| {
+        let [start, end] = a.end_distances(b);
+        match kind {
+            SegmentDistance::Mean => (start + end) / 2.0,
+            SegmentDistance::Max => start.max(end),
+        }
+    };
+    in_order(b).min(in_order(&b.reversed()))
+}
+
+/// Precision and recall at each threshold, from the distances `[predicted, truth]`: one
+/// assignment with the smallest sum serves all. [`NearPairs`](super::NearPairs) is the other
+/// [`Matching`].
 ///
 /// # Errors
 /// If a distance is not finite.
 pub fn precision_recall(
     distances: &DistanceMatrix,
     thresholds: &[f64],
-    matching: Matching,
 ) -> Result<Vec<PrecisionRecall>, MetricsError> {
-    let by_sum = distances.assign()?;
-    thresholds
-        .iter()
-        .map(|&threshold| {
-            let matched = match matching {
-                Matching::MinimumSum => by_sum.iter().filter(|p| p.distance < threshold).count(),
-                Matching::PerThreshold => {
-                    // With cost 0 below the threshold and 1 elsewhere the
-                    // smallest sum is the largest number of pairs below it.
-                    let costs = distances.map(|d| if d < threshold { 0.0 } else { 1.0 });
-                    costs.assign()?.iter().filter(|p| p.distance == 0.0).count()
-                }
-            };
-            Ok(PrecisionRecall {
-                threshold,
-                matched,
-                precision: share(matched, distances.rows()),
-                recall: share(matched, distances.columns()),
-            })
-        })
-        .collect()
+    let pairs = distances.assign()?;
+    let score = |threshold: &f64| {
+        let matched = pairs.iter().filter(|p| p.distance < *threshold).count();
+        PrecisionRecall::new(*threshold, matched, [distances.rows(), distances.columns()])
+    };
+    Ok(thresholds.iter().map(score).collect())
+}
+
+impl PrecisionRecall {
+    /// Of so many pairs at a threshold, of so many predictions and true ones.
+    pub(super) fn new(threshold: f64, matched: usize, [predicted, truth]: [usize; 2]) -> Self {
+        Self {
+            threshold,
+            matched,
+            precision: share(matched, predicted),
+            recall: share(matched, truth),
+        }
+    }
 }
 
 fn share(part: usize, whole: usize) -> f64 {
@@ -132,6 +135,7 @@ fn share(part: usize, whole: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metrics::NearPairs;
 
     fn on_x(positions: &[f64]) -> Vec<Vector3<f64>> {
         positions
@@ -155,7 +159,7 @@ mod tests {
     #[test]
     fn threshold_is_strict_and_shares_have_their_own_denominators() {
         let distances = junction_distances(&on_x(&[0.0, 5.5, 9.0]), &on_x(&[0.0, 5.0])).unwrap();
-        let scores = precision_recall(&distances, &[0.0, 0.5, 0.6], Matching::MinimumSum).unwrap();
+        let scores = precision_recall(&distances, &[0.0, 0.5, 0.6]).unwrap();
         assert_eq!(
             scores.iter().map(|s| s.matched).collect::<Vec<_>>(),
             [0, 1, 2]
@@ -163,24 +167,16 @@ mod tests {
         assert_eq!((scores[1].precision, scores[1].recall), (1.0 / 3.0, 0.5));
     }
 
-    /// The first prediction is exact for the first truth, but handing it to the
-    /// second truth makes the sum smaller.
-    #[test]
-    fn matching_per_threshold_is_not_disturbed_by_far_predictions() {
-        let table = [[0.005, 0.05], [0.05, 0.2]];
-        let distances = DistanceMatrix::between(&[0, 1], &[0, 1], |i, j| table[*i][*j]);
-        let matched =
-            |matching| precision_recall(&distances, &[0.01], matching).unwrap()[0].matched;
-        assert_eq!(matched(Matching::MinimumSum), 0);
-        assert_eq!(matched(Matching::PerThreshold), 1);
-    }
-
     #[test]
     fn nothing_predicted_or_nothing_true_scores_zero() {
-        for matching in [Matching::MinimumSum, Matching::PerThreshold] {
-            for (predicted, truth) in [(&[][..], &[1.0][..]), (&[1.0], &[]), (&[], &[])] {
-                let distances = junction_distances(&on_x(predicted), &on_x(truth)).unwrap();
-                let scores = precision_recall(&distances, &[0.01], matching).unwrap();
+        for (predicted, truth) in [(&[][..], &[1.0][..]), (&[1.0], &[]), (&[], &[])] {
+            let (predicted, truth) = (on_x(predicted), on_x(truth));
+            let distances = junction_distances(&predicted, &truth).unwrap();
+            let near = NearPairs::of_junctions(&predicted, &truth, &[0.01]).unwrap();
+            for scores in [
+                precision_recall(&distances, &[0.01]).unwrap(),
+                near.precision_recall(),
+            ] {
                 assert_eq!((scores[0].precision, scores[0].recall), (0.0, 0.0));
             }
         }
@@ -189,7 +185,7 @@ mod tests {
     #[test]
     fn nan_is_an_error() {
         let distances = junction_distances(&on_x(&[f64::NAN]), &on_x(&[0.0])).unwrap();
-        assert!(precision_recall(&distances, &[0.01], Matching::MinimumSum).is_err());
+        assert!(precision_recall(&distances, &[0.01]).is_err());
     }
 
     #[test]

@@ -3,8 +3,7 @@
 use neat_core::Wireframe3d;
 use neat_wireframe::metrics::DistanceMatrix;
 use neat_wireframe::metrics::{
-    Matching, PrecisionRecall, SegmentDistance, junction_distances, precision_recall,
-    segment_distances,
+    PrecisionRecall, SegmentDistance, junction_distances, precision_recall, segment_distances,
 };
 
 /// Of junctions, and of segments at both ends, within `threshold`.
@@ -13,9 +12,7 @@ pub fn scores_within(
     found: &Wireframe3d,
     truth: &Wireframe3d,
 ) -> (PrecisionRecall, PrecisionRecall) {
-    let score = |distances: DistanceMatrix| {
-        precision_recall(&distances, &[threshold], Matching::MinimumSum).unwrap()[0]
-    };
+    let score = |distances: DistanceMatrix| precision_recall(&distances, &[threshold]).unwrap()[0];
     let (segments, true_ones) = (found.segments(), truth.segments());
     (
         score(junction_distances(&found.junctions, &truth.junctions).unwrap()),
