@@ -97,7 +97,8 @@ def colmap(place, size, lines_of_points, images_there):
 
 
 ROWS = [
-    ("`eval`, neat-abc, lines on both sides", 500, eval_of_lines),
+    ("`eval`, neat-abc, lines on both sides", 250, eval_of_lines),
+    ("`eval --matching per-threshold`", 2000, lambda *of: [*eval_of_lines(*of), "--matching", "per-threshold"]),
     ("`batch --dry-run`, jobs", 2500, batch),
     ("`info`, COLMAP points", 50_000, lambda place, size, _: colmap(place, size, size, 8)),
     ("`info`, COLMAP images that are not there", 50_000, lambda place, size, _: colmap(place, size, 0, 0)),
