@@ -1,68 +1,123 @@
-//! Spoils a good scene in many ways and prints what the doctor says, as a
-//! Markdown table.
+//! Spoils good scenes in many ways and prints what the doctor says of them, and of
+//! right scenes, as Markdown tables with their counts.
 //!
-//! `cargo run --release -p neat-doctor --example corruptions -- SCENE`, where
-//! SCENE is a folder, or the name of a synthetic solid such as `l-prism`.
+//! `cargo run --release -p neat-doctor --example corruptions -- SCENE...`, where each
+//! SCENE is a folder, or the name of a synthetic solid such as `l-prism`. What is not
+//! named right is printed to the standard error in full.
 
 #[path = "../tests/corruption/mod.rs"]
 mod corruption;
+#[path = "../tests/right/mod.rs"]
+mod right;
 
-use corruption::{Base, Corruption, judged, load_options};
-use neat_core::layout::abc;
-use neat_core::load_scene;
+use corruption::Corruption;
+use corruption::draft::Base;
 use neat_core::synthetic::{Solid, SyntheticScene, generate};
-use neat_doctor::{ExamineOptions, examine_folder};
+use neat_doctor::{Depth, Verdict};
+use right::Right;
 use std::error::Error;
-use std::path::PathBuf;
-use std::time::Instant;
+use std::path::Path;
 
-#[expect(clippy::print_stdout, reason = "the table is what this program is for")]
+/// Of how many corruptions what was said.
+#[derive(Default)]
+struct Counts {
+    all: usize,
+    named: usize,
+    refused: usize,
+    to_refuse: usize,
+    ready: usize,
+}
+
+#[expect(
+    clippy::print_stdout,
+    reason = "the tables are what this program is for"
+)]
 fn main() -> Result<(), Box<dyn Error>> {
-    let Some(scene) = std::env::args().nth(1) else {
-        return Err("give the folder of a scene, or the name of a synthetic solid".into());
-    };
-    let only = std::env::args().nth(2);
-    let temporary = tempfile::tempdir()?;
-    let solid = Solid::ALL.into_iter().find(|solid| solid.name() == scene);
-    let dir = match solid {
-        Some(solid) => {
-            let config = SyntheticScene {
-                solid,
-                views: 40,
-                ..SyntheticScene::default()
-            };
-            abc::write_scene(&generate(&config)?.scene, temporary.path())?;
-            temporary.path().to_owned()
-        }
-        None => PathBuf::from(&scene),
-    };
-    let base = Base::new(load_scene(&dir, &load_options())?.scene, &dir);
-    let start = Instant::now();
-    let examination = examine_folder(&dir, &load_options(), &ExamineOptions::default());
-    println!("{examination}\n({:.1} s)\n", start.elapsed().as_secs_f64());
-    println!("| corruption | what the doctor says | repaired by | cause |");
-    println!("|---|---|---|---|");
-    for corruption in Corruption::ALL {
-        if only
-            .as_ref()
-            .is_some_and(|only| !corruption.name().contains(only.as_str()))
-        {
-            continue;
-        }
-        let dir = corruption.write(&base);
-        let examination = examine_folder(dir.path(), &load_options(), &ExamineOptions::default());
-        let problem = examination.problems().next();
-        let path = dir.path().display().to_string();
-        let cell = |text: &str| text.replace(&path, "SCENE").replace(['|', '\n'], " ");
-        println!(
-            "| {} | {} | {} | {} |",
-            corruption.name(),
-            problem.map_or("nothing".into(), |problem| cell(&problem.message)),
-            problem
-                .and_then(|problem| problem.remedy.as_deref())
-                .map_or("what the message says".into(), cell),
-            judged(corruption, &examination).map_or_else(|wrong| cell(&wrong), |()| "right".into()),
-        );
+    let scenes: Vec<String> = std::env::args().skip(1).collect();
+    if scenes.is_empty() {
+        return Err("give folders of scenes, or names of synthetic solids".into());
     }
+    let bases: Vec<Base> = scenes
+        .iter()
+        .map(|scene| base(scene))
+        .collect::<Result<_, _>>()?;
+    println!("| spoilt by | has to be named | {} |", scenes.join(" | "));
+    println!("|---|---|{}", "---|".repeat(scenes.len()));
+    let mut counts = Counts::default();
+    for corruption in Corruption::all() {
+        let cells: Vec<_> = (bases.iter())
+            .map(|base| counts.count(&corruption, base))
+            .collect();
+        let (name, expected) = (corruption.name, corruption.expected());
+        println!("| {name} | {expected} | {} |", cells.join(" | "));
+    }
+    println!("\n| right scene | what the doctor says |\n|---|---|");
+    let (rights, mut refused) = (Right::all(), 0);
+    for right in &rights {
+        let examination = right.examined(Depth::Full);
+        refused += usize::from(examination.verdict == Verdict::NotReady);
+        let judged = match right.judged(&examination) {
+            Ok(()) if right.shows_little => "accepted, cannot tell of its poses",
+            Ok(()) => "accepted, its poses are good",
+            Err(_) => "wrong",
+        };
+        println!("| {} | {judged} |", right.name);
+    }
+    let share = |part: usize, all: usize| 100.0 * part as f64 / all.max(1) as f64;
+    println!(
+        "\n{} spoilt scenes: {} named, {} passed as ready. {} of {} that have to be refused are: \
+         recall {:.1} %. {refused} of {} right scenes are refused: precision {:.1} %.",
+        counts.all,
+        counts.named,
+        counts.ready,
+        counts.refused,
+        counts.to_refuse,
+        share(counts.refused, counts.to_refuse),
+        rights.len(),
+        share(counts.refused, counts.refused + refused),
+    );
     Ok(())
+}
+
+impl Counts {
+    /// What is said of the base, spoilt; in a word.
+    #[expect(clippy::print_stderr, reason = "what went wrong is to be seen")]
+    fn count(&mut self, corruption: &Corruption, base: &Base) -> &'static str {
+        if !corruption.applies_to(base) {
+            return "–";
+        }
+        let examination = corruption.examined(base);
+        let judged = corruption.judged(&examination);
+        let refused = examination.verdict == Verdict::NotReady;
+        self.all += 1;
+        self.named += usize::from(judged.is_ok());
+        self.ready += usize::from(examination.verdict == Verdict::Ready);
+        if !corruption.may_be_a_warning() {
+            self.to_refuse += 1;
+            self.refused += usize::from(refused);
+        }
+        match judged {
+            Ok(()) if refused => "named",
+            Ok(()) => "named, a warning",
+            Err(wrong) => {
+                eprintln!("{}: {wrong}", corruption.name);
+                if refused { "refused" } else { "passed" }
+            }
+        }
+    }
+}
+
+fn base(scene: &str) -> Result<Base, Box<dyn Error>> {
+    let Some(solid) = Solid::ALL.into_iter().find(|solid| solid.name() == scene) else {
+        return Ok(Base::read(Path::new(scene))?);
+    };
+    let config = SyntheticScene {
+        solid,
+        views: 30,
+        image_size: 400,
+        image_height: Some(320),
+        camera_distance: 2.3,
+        ..SyntheticScene::default()
+    };
+    Ok(Base::new(generate(&config)?.scene)?)
 }

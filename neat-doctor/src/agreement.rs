@@ -54,3 +54,24 @@ impl Agreement {
         self.all.share()
     }
 }
+
+/// What each two views have in common.
+pub(crate) struct PairTallies {
+    views: usize,
+    tallies: Vec<Tally>,
+}
+
+impl PairTallies {
+    pub fn new(views: usize) -> Self {
+        let tallies = vec![Tally::default(); views * views];
+        Self { views, tallies }
+    }
+
+    pub fn add(&mut self, [a, b]: [usize; 2], tally: Tally) {
+        self.tallies[a.min(b) * self.views + a.max(b)] += tally;
+    }
+
+    pub fn of(&self, [a, b]: [usize; 2]) -> Tally {
+        self.tallies[a.min(b) * self.views + a.max(b)]
+    }
+}

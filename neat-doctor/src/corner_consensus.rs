@@ -6,7 +6,8 @@
 //! where two rays meet is confirmed by a corner in many other views, far more
 //! often than chance allows. With wrong cameras hardly any point is.
 
-use crate::agreement::{Agreement, Tally};
+use crate::agreement::{Agreement, PairTallies, Tally};
+use crate::lens::straightened;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::{Camera, Ray};
 
@@ -81,17 +82,24 @@ impl ViewCorners {
         self.columns = size.x.ceil() as usize + 1;
         let rows = size.y.ceil() as usize + 1;
         self.cells = vec![0; self.columns * rows];
-        for row in 0..rows {
-            for column in 0..self.columns {
-                let middle = Vector2::new(column as f64 + 0.5, row as f64 + 0.5) * cell;
-                let near = |corner: &Vector2<f64>| (corner - self.lower - middle).norm();
-                let nearest = (self.corners.iter().enumerate())
-                    .map(|(index, corner)| (near(corner), index))
-                    .min_by(|a, b| a.0.total_cmp(&b.0));
-                if let Some((distance, index)) = nearest
-                    && distance < self.tolerance
-                {
-                    self.cells[row * self.columns + column] = index as u8 + 1;
+        // How far the corner of each cell is from its middle.
+        let mut distances = vec![self.tolerance; self.cells.len()];
+        // A disc of the tolerance reaches over two cells to each side, and its own.
+        let reach = |middle: f64| {
+            let first = (middle - 2.5).floor().max(0.0) as usize;
+            first..first + 6
+        };
+        for (index, corner) in self.corners.iter().enumerate() {
+            let at = (corner - self.lower) / cell;
+            for row in reach(at.y).take_while(|row| *row < rows) {
+                for column in reach(at.x).take_while(|column| *column < self.columns) {
+                    let middle = Vector2::new(column as f64 + 0.5, row as f64 + 0.5) * cell;
+                    let distance = (corner - self.lower - middle).norm();
+                    let place = row * self.columns + column;
+                    if distance < distances[place] {
+                        distances[place] = distance;
+                        self.cells[place] = index as u8 + 1;
+                    }
                 }
             }
         }
@@ -121,6 +129,18 @@ impl CornerEvidence {
         Self { views }
     }
 
+    /// The corners as pinholes see them, in place of a lens of this strength.
+    pub fn straightened(&self, cameras: &[Camera], strength: f64) -> Self {
+        let views = self.views.iter().map(|view| {
+            let camera = &cameras[view.view];
+            let corners = view.corners.iter();
+            let corners = corners.map(|corner| straightened(corner, camera, strength));
+            let larger_side = f64::from(camera.width.max(camera.height));
+            ViewCorners::new(view.view, corners.collect(), larger_side)
+        });
+        Self::new(views.collect())
+    }
+
     /// The share of corners that belong to a point of space which the trusted
     /// views confirm. Corners of other views count only where they are asked
     /// for one by one.
@@ -132,39 +152,14 @@ impl CornerEvidence {
         let mut fits: Vec<Vec<f64>> = (views.iter())
             .map(|view| vec![0.0; view.corners.len()])
             .collect();
-        let rays: Vec<Vec<Ray>> = (views.iter())
-            .map(|view| {
-                let ray = |corner| cameras[view.view].ray_through(corner);
-                view.corners.iter().map(ray).collect()
-            })
-            .collect();
         let mut agreement = Agreement::none(cameras.len());
-        let mut hits = Vec::new();
-        for first in 0..views.len() {
-            for offset in PARTNERS {
-                let second = first + offset;
-                if second >= views.len() {
-                    break;
-                }
-                let pair = [first, second];
-                let geometry = PairGeometry::new(&views, cameras, pair);
-                for a in 0..views[first].corners.len() {
-                    for b in 0..views[second].corners.len() {
-                        let Some(point) = geometry.meeting(&views, &rays, [a, b]) else {
-                            continue;
-                        };
-                        hits.clear();
-                        if confirmed(&views, cameras, pair, &point, &mut hits) {
-                            for &(view, corner, fit) in &hits {
-                                agreement.score += fit;
-                                let best: &mut f64 = &mut fits[view][corner];
-                                *best = best.max(fit);
-                            }
-                        }
-                    }
-                }
+        for_each_confirmed(&views, cameras, |_, hits| {
+            for &(view, corner, fit) in hits {
+                agreement.score += fit;
+                let best: &mut f64 = &mut fits[view][corner];
+                *best = best.max(fit);
             }
-        }
+        });
         for (view, fits) in views.iter().zip(fits) {
             for fit in fits {
                 let tally = Tally::one(fit > 0.0);
@@ -173,6 +168,65 @@ impl CornerEvidence {
             }
         }
         agreement
+    }
+
+    /// For each two views how many of the points that the one confirms, and the other could,
+    /// both do.
+    pub fn in_common(&self, cameras: &[Camera], trusted: &[bool]) -> PairTallies {
+        let views: Vec<&ViewCorners> = (self.views.iter())
+            .filter(|view| trusted[view.view])
+            .collect();
+        let mut pairs = PairTallies::new(cameras.len());
+        for_each_confirmed(&views, cameras, |point, hits| {
+            for (index, view) in views.iter().enumerate() {
+                let projection = cameras[view.view].project(point);
+                if projection.depth <= 0.0 || view.look_up(&projection.pixel).is_none() {
+                    continue;
+                }
+                let own = hits.iter().any(|(hit, ..)| *hit == index);
+                for (other, ..) in hits.iter().filter(|(hit, ..)| *hit != index) {
+                    pairs.add([view.view, views[*other].view], Tally::one(own));
+                }
+            }
+        });
+        pairs
+    }
+}
+
+/// Visits the points where the corners of two views meet that others confirm, with the view,
+/// the corner and the fit of each of their images.
+fn for_each_confirmed(
+    views: &[&ViewCorners],
+    cameras: &[Camera],
+    mut visit: impl FnMut(&Vector3<f64>, &[(usize, usize, f64)]),
+) {
+    let rays: Vec<Vec<Ray>> = (views.iter())
+        .map(|view| {
+            let ray = |corner| cameras[view.view].ray_through(corner);
+            view.corners.iter().map(ray).collect()
+        })
+        .collect();
+    let mut hits = Vec::new();
+    for first in 0..views.len() {
+        for offset in PARTNERS {
+            let second = first + offset;
+            if second >= views.len() {
+                break;
+            }
+            let pair = [first, second];
+            let geometry = PairGeometry::new(views, cameras, pair);
+            for a in 0..views[first].corners.len() {
+                for b in 0..views[second].corners.len() {
+                    let Some(point) = geometry.meeting(views, &rays, [a, b]) else {
+                        continue;
+                    };
+                    hits.clear();
+                    if confirmed(views, cameras, pair, &point, &mut hits) {
+                        visit(&point, &hits);
+                    }
+                }
+            }
+        }
     }
 }
 

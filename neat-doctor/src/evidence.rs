@@ -1,6 +1,6 @@
 //! Gathers what the images show, without looking at the poses.
 
-use crate::agreement::Agreement;
+use crate::agreement::{Agreement, PairTallies};
 use crate::corner_consensus::{CornerEvidence, MAX_CORNERS, ViewCorners};
 use crate::corners::{corners, refined};
 use crate::descriptor::keypoints;
@@ -39,6 +39,27 @@ impl Evidence {
         match self {
             Self::Tracks { tracks, .. } => tracks::agreement(tracks, cameras, trusted),
             Self::Corners(corners) => corners.agreement(cameras, trusted),
+        }
+    }
+
+    /// What each two views show in common, and how much of it `cameras` explain.
+    pub fn in_common(&self, cameras: &[Camera], trusted: &[bool]) -> PairTallies {
+        match self {
+            Self::Tracks { tracks, .. } => tracks::in_common(tracks, cameras),
+            Self::Corners(corners) => corners.in_common(cameras, trusted),
+        }
+    }
+
+    /// What pinholes would show in place of a lens of this [strength](crate::lens).
+    pub fn straightened(&self, cameras: &[Camera], strength: f64) -> Self {
+        match self {
+            Self::Tracks { tracks, .. } => Self::Tracks {
+                tracks: (tracks.iter())
+                    .map(|track| track.straightened(cameras, strength))
+                    .collect(),
+                keypoints: Vec::new(),
+            },
+            Self::Corners(corners) => Self::Corners(corners.straightened(cameras, strength)),
         }
     }
 

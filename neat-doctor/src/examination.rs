@@ -67,14 +67,22 @@ pub enum Cause {
     InvertedPoses,
     /// Rotation and translation lead into different directions.
     TransposedRotations,
+    /// Quaternions whose real part was taken for another one.
+    QuaternionOrder,
     /// Camera axes other than x right, y down, z forward.
     CameraAxes,
     /// The focal length.
     FocalLength,
+    /// fx or fy alone.
+    PixelAspect,
+    /// Photographs of a lens that bends straight lines, taken for those of a pinhole.
+    LensDistortion,
     /// The principal point.
     PrincipalPoint,
     /// fx and fy, cx and cy stand in each other's place.
     SwappedIntrinsics,
+    /// Images that were turned after the cameras were estimated, or before.
+    TurnedImages,
     /// Images of another size than those that the intrinsics are for.
     ResizedImages,
     /// Images and poses that are not in the same order.

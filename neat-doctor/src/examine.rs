@@ -81,7 +81,11 @@ fn findings(
     let _span = debug_span!("examine", scene = scene.name, views = scene.views.len()).entered();
     let working = WorkingCopies::new(scene, options.memory_limit);
     let mut findings = pose_findings(scene, &working, options, mirrored)?;
-    findings.extend(image_findings(scene, &working)?);
+    let of_images = image_findings(scene, &working)?;
+    // Images that show nothing say nothing about poses.
+    let before = of_images.iter().any(|f| f.level == Level::Problem);
+    let at = if before { 0 } else { findings.len() };
+    findings.splice(at..at, of_images);
     findings.extend(capture_findings(scene));
     findings.extend(segment_findings(scene, &working)?);
     for Finding { level, message, .. } in &findings {

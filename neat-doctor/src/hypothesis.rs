@@ -1,6 +1,7 @@
 //! What the cameras may really be, where they are not what they were read as.
 
-use nalgebra::Matrix4;
+use crate::quaternion_order::QuaternionOrder;
+use nalgebra::{Matrix3, Matrix4};
 use neat_core::Camera;
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
 
@@ -12,12 +13,26 @@ pub(crate) enum Hypothesis {
         read_as: PoseConvention,
         is: PoseConvention,
     },
+    /// Quaternions whose numbers were read in another order.
+    Quaternions(QuaternionOrder),
+    /// The centres of the cameras were read as world-to-camera translations.
+    CentersAsTranslations,
     /// Focal lengths times a factor.
     FocalScale(f64),
+    /// Pixels are square: fx and fy are both what the one or the other is.
+    SquarePixels { by_fx: bool },
+    /// A lens of this [strength](crate::lens): it moves what images show, not the cameras.
+    Lens(f64),
     /// All intrinsics times a factor: the images were scaled.
     IntrinsicsScale(f64),
+    /// The images were stretched to another shape: intrinsics of x and y times a factor each.
+    StretchedImages([f64; 2]),
     /// The principal point in the middle of the image.
     CenteredPrincipalPoint,
+    /// The images were cut: so many pixels are missing at their left and at their upper side.
+    CutImages([f64; 2]),
+    /// The images were turned clockwise by so many quarters.
+    TurnedImages(u32),
     /// fx and fy, cx and cy change places.
     SwappedIntrinsics,
     /// Poses in another order.
@@ -47,16 +62,39 @@ impl Hypothesis {
                 *camera =
                     Camera::from_matrices(camera.intrinsics, &pose, camera.width, camera.height);
             }),
+            Self::Quaternions(order) => with_each(cameras, |camera| order.restore(camera)),
+            Self::CentersAsTranslations => with_each(cameras, |camera| {
+                let back = camera.world_from_camera.transpose();
+                camera.center_in_world = -(back * camera.center_in_world);
+            }),
+            Self::Lens(_) => cameras.to_vec(),
             Self::FocalScale(scale) => with_each(cameras, |camera| {
                 camera.intrinsics.fx *= scale;
                 camera.intrinsics.fy *= scale;
                 camera.intrinsics.skew *= scale;
             }),
-            Self::IntrinsicsScale(scale) => with_each(cameras, |camera| {
+            Self::SquarePixels { by_fx } => with_each(cameras, |camera| {
                 let k = &mut camera.intrinsics;
-                for value in [&mut k.fx, &mut k.fy, &mut k.cx, &mut k.cy, &mut k.skew] {
-                    *value *= scale;
+                (k.fx, k.fy) = if *by_fx { (k.fx, k.fx) } else { (k.fy, k.fy) };
+            }),
+            Self::IntrinsicsScale(scale) => {
+                Self::StretchedImages([*scale; 2]).cameras(cameras, names)
+            }
+            Self::StretchedImages([along_x, along_y]) => with_each(cameras, |camera| {
+                let k = &mut camera.intrinsics;
+                for value in [&mut k.fx, &mut k.cx, &mut k.skew] {
+                    *value *= along_x;
                 }
+                for value in [&mut k.fy, &mut k.cy] {
+                    *value *= along_y;
+                }
+            }),
+            Self::CutImages([left, above]) => with_each(cameras, |camera| {
+                camera.intrinsics.cx -= left;
+                camera.intrinsics.cy -= above;
+            }),
+            Self::TurnedImages(quarters) => with_each(cameras, |camera| {
+                turn_clockwise(camera, *quarters);
             }),
             Self::CenteredPrincipalPoint => with_each(cameras, |camera| {
                 camera.intrinsics.cx = f64::from(camera.width) / 2.0;
@@ -95,8 +133,29 @@ impl Hypothesis {
                 };
                 axes + direction + u32::from(convention.mirrored_world)
             }
+            Self::Quaternions(_) | Self::CentersAsTranslations | Self::StretchedImages(_) => 2,
             _ => 1,
         }
+    }
+}
+
+/// Makes the camera of an image that of the image turned clockwise by so many quarters, whose
+/// width and height it already has.
+fn turn_clockwise(camera: &mut Camera, quarters: u32) {
+    let turned = [camera.width, camera.height].map(f64::from);
+    let mut bottom = turned[usize::from(quarters.is_multiple_of(2))];
+    for _ in 0..quarters {
+        let k = &mut camera.intrinsics;
+        // What was below is to the left now, what was to the left is above.
+        (k.fx, k.fy, k.cx, k.cy, k.skew) = (k.fy, k.fx, bottom - k.cy, k.cx, 0.0);
+        let r = camera.world_from_camera;
+        let axes = [
+            -r.column(1),
+            r.column(0).into_owned(),
+            r.column(2).into_owned(),
+        ];
+        camera.world_from_camera = Matrix3::from_columns(&axes);
+        bottom = turned[0] + turned[1] - bottom;
     }
 }
 
@@ -160,9 +219,19 @@ pub(crate) fn of_intrinsics(cameras: &[Camera]) -> Vec<Hypothesis> {
     let scale_x = f64::from(camera.width) / (2.0 * k.cx);
     let scale_y = f64::from(camera.height) / (2.0 * k.cy);
     let mut hypotheses = Vec::new();
+    if (k.fx / k.fy - 1.0).abs() > 0.02 {
+        hypotheses.extend([true, false].map(|by_fx| Hypothesis::SquarePixels { by_fx }));
+    }
+    if (k.fx / k.fy - 1.0).abs() > 0.02 || (k.cx - k.cy).abs() > 0.02 * k.fx {
+        hypotheses.push(Hypothesis::SwappedIntrinsics);
+    }
     let off = |scale: f64| (scale - 1.0).abs() > 0.1;
     if off(scale_x) || off(scale_y) {
         hypotheses.push(Hypothesis::CenteredPrincipalPoint);
+        hypotheses.extend(cuts(camera));
+        if scale_x > 0.0 && scale_y > 0.0 {
+            hypotheses.push(Hypothesis::StretchedImages([scale_x, scale_y]));
+        }
         if scale_x > 0.0 && (scale_x / scale_y - 1.0).abs() < 0.15 {
             // Images are scaled by simple factors, principal points are not
             // quite in the middle.
@@ -187,17 +256,31 @@ pub(crate) fn of_intrinsics(cameras: &[Camera]) -> Vec<Hypothesis> {
             hypotheses.push(Hypothesis::IntrinsicsScale(rounded));
         }
     }
-    if (k.fx / k.fy - 1.0).abs() > 0.02 || (k.cx - k.cy).abs() > 0.02 * k.fx {
-        hypotheses.push(Hypothesis::SwappedIntrinsics);
-    }
     hypotheses
+}
+
+/// Cuts that leave an image of the size it has, of one whose principal point was its middle:
+/// on one side, on the other, or as much on both.
+fn cuts(camera: &Camera) -> Vec<Hypothesis> {
+    let k = &camera.intrinsics;
+    let missing = [
+        2.0 * k.cx - f64::from(camera.width),
+        2.0 * k.cy - f64::from(camera.height),
+    ];
+    let shares = || [0.0, 0.5, 1.0].into_iter();
+    let cuts = shares().flat_map(|x| shares().map(move |y| [x, y]));
+    cuts.filter(|cut| *cut != [0.0; 2])
+        .map(|[x, y]| Hypothesis::CutImages([x * missing[0], y * missing[1]]))
+        .collect()
 }
 
 impl PoseOrder {
     /// Orders that happen, for scenes of these views.
     pub fn all(names: &[&str]) -> Vec<Self> {
         let mut orders = vec![Self::Reversed];
-        orders.extend([1, -1, 2, -2, 3, -3].map(Self::Shifted));
+        // Small ones first: of two that explain the same, as on a turntable, they are meant.
+        let half = names.len() as isize / 2;
+        orders.extend((1..=half).flat_map(|by| [Self::Shifted(by), Self::Shifted(-by)]));
         if by_number(names).iter().enumerate().any(|(i, &j)| i != j) {
             orders.extend([Self::ByNumber, Self::ByText]);
         }

@@ -112,6 +112,18 @@ fn sizes(scene: &Scene) -> Finding {
 /// Fields of view beyond these, in degrees, are seldom meant.
 const FIELD_OF_VIEW: [f64; 2] = [4.0, 130.0];
 
+/// How far a camera sees to the sides, in degrees.
+pub(crate) fn field_of_view(camera: &Camera) -> f64 {
+    let half = f64::from(camera.width) / (2.0 * camera.intrinsics.fx);
+    2.0 * half.atan().to_degrees()
+}
+
+/// Whether a field of view is one of those that are meant.
+pub(crate) fn is_usual(field_of_view: f64) -> bool {
+    let [narrowest, widest] = FIELD_OF_VIEW;
+    (narrowest..=widest).contains(&field_of_view)
+}
+
 fn intrinsics(scene: &Scene) -> Vec<Finding> {
     let mut findings = Vec::new();
     let camera = |view: usize| &scene.views[view].camera;
@@ -136,14 +148,7 @@ fn intrinsics(scene: &Scene) -> Vec<Finding> {
             .remedied_by("give the intrinsics of these very images: were they scaled or cut?");
         findings.push(finding.of_views(far));
     }
-    let field_of_view = |camera: &Camera| {
-        let half = f64::from(camera.width) / (2.0 * camera.intrinsics.fx);
-        2.0 * half.atan().to_degrees()
-    };
-    let [narrowest, widest] = FIELD_OF_VIEW;
-    let odd = views_where(scene, |view| {
-        !(narrowest..=widest).contains(&field_of_view(camera(view)))
-    });
+    let odd = views_where(scene, |view| !is_usual(field_of_view(camera(view))));
     if !odd.is_empty() {
         let message = format!(
             "the field of view of {} is unusual: {:.1}° to the sides in the first view",
@@ -273,7 +278,10 @@ fn duplicates(scene: &Scene, fingerprints: &[u64]) -> Result<Option<Finding>, Sc
         listed(&names)
     );
     let remedy = "keep one image of each and its pose";
-    let finding = Finding::warning(Check::Duplicates, message, remedy);
+    let mut finding = Finding::warning(Check::Duplicates, message, remedy);
+    if 2 * twice.len() > scene.views.len() {
+        finding.level = Level::Problem;
+    }
     Ok(Some(finding.of_views(names)))
 }
 

@@ -36,14 +36,18 @@ mod examine;
 mod gray_image;
 mod hypothesis;
 mod image_checks;
+mod lens;
 mod likeness;
 mod load_failure;
 mod point_transfer;
 mod pose_diagnosis;
 mod pose_findings;
+mod quaternion_order;
 mod segment_checks;
 mod silhouettes;
 mod tracks;
+mod view_faults;
+mod view_groups;
 mod working_copies;
 
 pub use examination::{Cause, Check, Examination, Finding, Level, Repair, Verdict};

@@ -4,8 +4,12 @@ use crate::agreement::Agreement;
 use crate::evidence::{Evidence, Gathered, evenly};
 use crate::examination::{Check, Finding, Level, Repair, counted, percent};
 use crate::hypothesis::{Hypothesis, PoseOrder, conventions, of_intrinsics};
+use crate::image_checks::{field_of_view, is_usual};
+use crate::lens::strengths;
 use crate::point_transfer::{known_points, transfer_gain};
+use crate::quaternion_order::QuaternionOrder;
 use crate::silhouettes::covered_share;
+use crate::view_faults::ViewFault;
 use neat_core::layout::PoseConvention;
 use neat_core::{Camera, Scene};
 use rayon::prelude::*;
@@ -31,6 +35,7 @@ const MIN_DIFFERENCE: f64 = 0.05;
 pub(crate) struct Diagnosis<'a> {
     pub scene: &'a Scene,
     pub gathered: &'a Gathered,
+    /// In the frame of the files: a pose is inverted about their origin.
     pub cameras: Vec<Camera>,
     pub names: Vec<&'a str>,
     /// What the scene was read with.
@@ -50,6 +55,8 @@ pub(crate) struct Candidate {
 pub(crate) struct Limits {
     /// Fewer pieces than this show nothing.
     min_total: usize,
+    /// Fewer than so many for each view may all be false.
+    min_per_view: usize,
     /// Shares from here on are those of right cameras.
     pub good_share: f64,
     /// Shares below are those of wrong cameras.
@@ -61,16 +68,27 @@ impl Limits {
         match evidence {
             Evidence::Tracks { .. } => Self {
                 min_total: 60,
+                // Walls of bricks from places 35° apart make 7 false ones.
+                min_per_view: 10,
                 good_share: 0.35,
                 bad_share: 0.15,
             },
             // Curved things have few real corners among those that are found.
             Evidence::Corners(_) => Self {
                 min_total: 5 * views.clamp(8, SEARCHED_VIEWS / 2),
+                min_per_view: 0,
                 good_share: 0.15,
                 bad_share: 0.05,
             },
         }
+    }
+}
+
+fn in_frame_of_files(scene: &Scene, camera: Camera) -> Camera {
+    let frame = &scene.original_from_world;
+    Camera {
+        center_in_world: frame.scale * camera.center_in_world + frame.translation,
+        ..camera
     }
 }
 
@@ -84,7 +102,9 @@ impl<'a> Diagnosis<'a> {
         Self {
             scene,
             gathered,
-            cameras: scene.views.iter().map(|view| view.camera).collect(),
+            cameras: (scene.views.iter())
+                .map(|view| in_frame_of_files(scene, view.camera))
+                .collect(),
             names: scene.views.iter().map(|view| view.name.as_str()).collect(),
             read_with,
             mirrored,
@@ -128,21 +148,24 @@ impl<'a> Diagnosis<'a> {
     }
 
     /// Whether the given cameras explain what they should, in all views and
-    /// better than with other focal lengths: nothing has to be searched for.
+    /// better than with other focal lengths or a lens: nothing has to be searched for.
     pub fn is_plainly_good(&self) -> bool {
         const FOCAL_SCALES: [f64; 6] = [0.8, 0.9, 0.95, 1.05, 1.1, 1.25];
+        const LENSES: [f64; 4] = [-0.05, 0.05, 0.1, 0.2];
         let trusted = self.all_trusted();
         let (given, limits) = (self.given(&trusted), self.limits());
         let explains = given.all.total >= limits.min_total && given.share() >= limits.good_share;
-        let focal_is_better = || {
-            FOCAL_SCALES.into_par_iter().any(|scale| {
-                let other = self.try_out(Hypothesis::FocalScale(scale), &self.cameras, &trusted);
+        let other_is_better = || {
+            let focal = FOCAL_SCALES.into_iter().map(Hypothesis::FocalScale);
+            let others: Vec<_> = focal.chain(LENSES.map(Hypothesis::Lens)).collect();
+            others.into_par_iter().any(|other| {
+                let other = self.try_out(other, &self.cameras, &trusted);
                 other.agreement.score > CLEARLY * given.score
             })
         };
         !self.mirrored
             && explains
-            && !focal_is_better()
+            && !other_is_better()
             && self.without_bad_views(trusted.clone()) == trusted
     }
 
@@ -170,6 +193,9 @@ impl<'a> Diagnosis<'a> {
         if rest.share() < limits.bad_share {
             let finding = match self.other_witness() {
                 Some(message) => Finding::new(Check::Poses, Level::Good, message),
+                None if given.all.total < self.gathered.views.len() * limits.min_per_view => {
+                    self.too_little(&given)
+                }
                 None => self.disagreement(&given),
             };
             return vec![finding];
@@ -182,20 +208,28 @@ impl<'a> Diagnosis<'a> {
             .collect();
         let mut findings = Vec::new();
         if !bad.is_empty() {
-            let fits: Vec<Option<usize>> = (bad.par_iter())
-                .map(|&view| self.fitting_pose(view, &bad, &trusted, &rest))
+            let faults: Vec<Option<ViewFault>> = (bad.par_iter())
+                .map(|&view| self.fault_of(view, &bad, &trusted, &rest))
                 .collect();
-            findings.push(self.bad_views(&bad, &fits));
+            findings.push(self.bad_views(&bad, &faults));
         }
         let good = rest.share() >= limits.good_share || self.other_witness().is_some();
         findings.push(self.agreeing(&rest, good));
+        findings.extend(self.views_apart(&trusted));
         findings
     }
 
     fn try_out(&self, hypothesis: Hypothesis, cameras: &[Camera], trusted: &[bool]) -> Candidate {
         let cameras = hypothesis.cameras(cameras, &self.names);
+        let agreement = match hypothesis {
+            Hypothesis::Lens(strength) => {
+                let straight = self.evidence().straightened(&cameras, strength);
+                straight.agreement(&cameras, trusted)
+            }
+            _ => self.evidence().agreement(&cameras, trusted),
+        };
         Candidate {
-            agreement: self.evidence().agreement(&cameras, trusted),
+            agreement,
             hypothesis,
             cameras,
         }
@@ -214,6 +248,7 @@ impl<'a> Diagnosis<'a> {
             .map(|hypothesis| self.try_out(hypothesis, &self.cameras, trusted))
             .collect();
         candidates.push(self.best_focal(&self.cameras, trusted));
+        candidates.push(self.best_along(&strengths(), Hypothesis::Lens, &self.cameras, trusted));
         let best = candidates
             .iter()
             .map(|candidate| candidate.agreement.score)
@@ -223,7 +258,10 @@ impl<'a> Diagnosis<'a> {
             .filter(|candidate| candidate.agreement.score >= EQUALLY * best)
             .min_by_key(|candidate| candidate.hypothesis.complexity())?;
         let mut found = vec![candidate];
-        if !matches!(found[0].hypothesis, Hypothesis::FocalScale(_)) {
+        if !matches!(
+            found[0].hypothesis,
+            Hypothesis::FocalScale(_) | Hypothesis::Lens(_)
+        ) {
             // Scenes of other programs can be wrong in two ways.
             let focal = self.best_focal(&found[0].cameras, trusted);
             if focal.agreement.score > CLEARLY * found[0].agreement.score {
@@ -250,6 +288,10 @@ impl<'a> Diagnosis<'a> {
                 .map(Hypothesis::Order),
         );
         hypotheses.extend(of_intrinsics(&self.cameras));
+        hypotheses.extend(QuaternionOrder::ALL.map(Hypothesis::Quaternions));
+        hypotheses.push(Hypothesis::CentersAsTranslations);
+        // Turned by two quarters they are cameras with other axes.
+        hypotheses.extend([1, 3].map(Hypothesis::TurnedImages));
         hypotheses
     }
 
@@ -257,33 +299,52 @@ impl<'a> Diagnosis<'a> {
     fn best_focal(&self, cameras: &[Camera], trusted: &[bool]) -> Candidate {
         const STEPS: i32 = 14;
         const STEP: f64 = 1.07;
-        let try_scale = |scale: f64| self.try_out(Hypothesis::FocalScale(scale), cameras, trusted);
-        let scored: Vec<(f64, f64)> = (-STEPS..=STEPS)
-            .into_par_iter()
-            .filter(|&step| step != 0)
-            .map(|step| {
-                let scale = STEP.powi(step);
-                (try_scale(scale).agreement.score, scale)
-            })
+        // In another unit, such as millimetres, they are anything: a normal lens is looked for.
+        let start = match field_of_view(&cameras[0]) {
+            angle if is_usual(angle) => 1.0,
+            _ => f64::from(cameras[0].width) / cameras[0].intrinsics.fx,
+        };
+        let scales: Vec<f64> = (-STEPS..=STEPS)
+            .map(|step| start * STEP.powi(step))
             .collect();
-        let (_, mut scale) =
-            (scored.into_iter()).fold(
-                (0.0, 1.0),
-                |best, next| if next.0 > best.0 { next } else { best },
-            );
+        self.best_along(&scales, Hypothesis::FocalScale, cameras, trusted)
+    }
+
+    /// What explains most of a family of hypotheses that is told by a number: the best of the
+    /// given numbers, and what is better beside it.
+    fn best_along(
+        &self,
+        numbers: &[f64],
+        of: fn(f64) -> Hypothesis,
+        cameras: &[Camera],
+        trusted: &[bool],
+    ) -> Candidate {
+        let try_out = |number: f64| self.try_out(of(number), cameras, trusted);
+        let score = |number: f64| try_out(number).agreement.score;
+        let scores: Vec<f64> = numbers.par_iter().map(|number| score(*number)).collect();
+        let best = (0..numbers.len()).fold(0, |best, next| {
+            if scores[next] > scores[best] {
+                next
+            } else {
+                best
+            }
+        });
         // Thirds of the interval that holds the top.
-        let (mut lower, mut upper) = (scale / STEP, scale * STEP);
+        let mut lower = numbers[best.saturating_sub(1)];
+        let mut upper = numbers[(best + 1).min(numbers.len() - 1)];
         for _ in 0..9 {
             let thirds = [lower + (upper - lower) / 3.0, upper - (upper - lower) / 3.0];
-            let [below, above] = thirds.map(|scale| try_scale(scale).agreement.score);
+            let [below, above] = thirds.map(score);
             if below < above {
                 lower = thirds[0];
             } else {
                 upper = thirds[1];
             }
-            scale = 0.5 * (lower + upper);
         }
-        try_scale((scale * 1000.0).round() / 1000.0)
+        let found = 0.5 * (lower + upper);
+        // Three digits after the first: as exact as the search is.
+        let unit = 10f64.powf(found.abs().max(0.1).log10().floor() - 3.0);
+        try_out((found / unit).round() * unit)
     }
 
     /// Takes trust from views, the worst first, that explain next to nothing
@@ -297,11 +358,16 @@ impl<'a> Diagnosis<'a> {
                 .map(|&view| (agreement.per_view[view].share(), view))
                 .collect();
             shares.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            let at = |quantile: usize| shares.get(quantile * shares.len() / 10).map(|s| s.0);
-            let (Some(&(worst, view)), Some(median), Some(low)) = (shares.first(), at(5), at(3))
+            let (Some(&(worst, view)), Some(&(median, _))) =
+                (shares.first(), shares.get(shares.len() / 2))
             else {
                 break;
             };
+            // What a view with few right points shows, among those that show some: up to half
+            // of all may be bad.
+            let first = shares.partition_point(|share| share.0 <= 0.2 * median);
+            let low = shares.get(first + 3 * (shares.len() - first) / 10);
+            let low = low.map_or(0.0, |share| share.0);
             let chance_of_none = (1.0 - low).powi(agreement.per_view[view].total as i32);
             if worst > 0.2 * median || worst > 0.1 || chance_of_none > 0.01 {
                 break;
@@ -332,11 +398,13 @@ impl<'a> Diagnosis<'a> {
         }
         let share =
             |cameras: &[Camera]| covered_share(silhouettes, cameras, self.scene.sphere_radius);
-        let given = share(&self.cameras);
+        // Their ball is around the origin of the scene, not of the files.
+        let cameras: Vec<Camera> = self.scene.views.iter().map(|view| view.camera).collect();
+        let given = share(&cameras);
         // Things that look the same from everywhere tell nothing.
         let stands_out = |by: usize| {
             let order = Hypothesis::Order(PoseOrder::Shifted(by as isize));
-            share(&order.cameras(&self.cameras, &self.names)) < given - MIN_DIFFERENCE
+            share(&order.cameras(&cameras, &self.names)) < given - MIN_DIFFERENCE
         };
         let agree = given > MIN_COVERED
             && [1, views.len() / 3, views.len() / 2]
@@ -361,28 +429,5 @@ impl<'a> Diagnosis<'a> {
         let points = known_points(tracks, &self.cameras, &others);
         (keypoints.iter().find(|of_view| of_view.view == view))
             .is_some_and(|own| transfer_gain(own, &self.cameras[view], &points) > SIGNIFICANT)
-    }
-
-    /// The view whose pose would explain the image of a bad one.
-    fn fitting_pose(
-        &self,
-        view: usize,
-        bad: &[usize],
-        trusted: &[bool],
-        rest: &Agreement,
-    ) -> Option<usize> {
-        let mut trusted = trusted.to_vec();
-        trusted[view] = true;
-        let mut best = (0.0, None);
-        for &other in bad.iter().filter(|&&other| other != view) {
-            let mut cameras = self.cameras.clone();
-            cameras[view].world_from_camera = self.cameras[other].world_from_camera;
-            cameras[view].center_in_world = self.cameras[other].center_in_world;
-            let share = self.evidence().agreement(&cameras, &trusted).per_view[view].share();
-            if share > best.0 {
-                best = (share, Some(other));
-            }
-        }
-        best.1.filter(|_| best.0 > 0.5 * rest.share())
     }
 }

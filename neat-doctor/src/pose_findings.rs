@@ -5,6 +5,7 @@ use crate::examination::{Cause, Check, Finding, Level, Repair, counted, listed, 
 use crate::hypothesis::{Hypothesis, PoseOrder};
 use crate::likeness::poses_follow_likeness;
 use crate::pose_diagnosis::{Candidate, Diagnosis};
+use crate::view_faults::ViewFault;
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
 
 /// A focal length further off than this, as a factor, spoils every result.
@@ -36,23 +37,7 @@ impl Diagnosis<'_> {
                 Hypothesis::IntrinsicsScale(scale) => {
                     repair.intrinsics_scale = Some(times(repair.intrinsics_scale, scale));
                 }
-                Hypothesis::CenteredPrincipalPoint => {
-                    remedy = Some(
-                        "give the principal point of these very images, \
-                                   most often their middle"
-                            .to_owned(),
-                    );
-                }
-                Hypothesis::SwappedIntrinsics => {
-                    remedy = Some("exchange fx with fy and cx with cy".to_owned());
-                }
-                Hypothesis::Order(_) => {
-                    remedy = Some(
-                        "give images names whose alphabetical order is that of the \
-                                   poses, with leading zeros"
-                            .to_owned(),
-                    );
-                }
+                _ => remedy = Some(by_hand(&candidate.hypothesis).to_owned()),
             }
         }
         let remedy = remedy.unwrap_or_else(|| run_with(&repair));
@@ -85,6 +70,53 @@ impl Diagnosis<'_> {
                 format!(
                     "the images are {scale} times as large as those that the intrinsics are for"
                 ),
+            ),
+            Hypothesis::Quaternions(order) => (
+                Cause::QuaternionOrder,
+                format!(
+                    "the quaternions have their real part {}",
+                    if order.real_first {
+                        "first, as w x y z, and were read as x y z w"
+                    } else {
+                        "last, as x y z w, and were read as w x y z"
+                    }
+                ),
+            ),
+            Hypothesis::CentersAsTranslations => (
+                Cause::TransposedRotations,
+                "the cameras' centres stand where world-to-camera translations are read".into(),
+            ),
+            Hypothesis::SquarePixels { by_fx } => (
+                Cause::PixelAspect,
+                format!(
+                    "the pixels are square, and {} is right for both axes",
+                    if *by_fx { "fx" } else { "fy" }
+                ),
+            ),
+            Hypothesis::Lens(strength) => (
+                Cause::LensDistortion,
+                format!(
+                    "a lens bends straight lines: it moves the middles of the sides by {}",
+                    percent(strength.abs())
+                ),
+            ),
+            Hypothesis::StretchedImages([x, y]) => (
+                Cause::ResizedImages,
+                format!(
+                    "the images are {x:.3} times as wide and {y:.3} times as high as those that \
+                     the intrinsics are for"
+                ),
+            ),
+            Hypothesis::CutImages([left, above]) => (
+                Cause::PrincipalPoint,
+                format!(
+                    "the images were cut: {left:.0} pixels are missing at their left and \
+                     {above:.0} above"
+                ),
+            ),
+            Hypothesis::TurnedImages(quarters) => (
+                Cause::TurnedImages,
+                format!("the images were turned clockwise by {}°", 90 * quarters),
             ),
             Hypothesis::CenteredPrincipalPoint => (
                 Cause::PrincipalPoint,
@@ -161,39 +193,58 @@ impl Diagnosis<'_> {
         }
     }
 
-    /// That some views do not fit; `fits` says of each the view whose pose it
-    /// fits instead, if there is one.
-    pub fn bad_views(&self, bad: &[usize], fits: &[Option<usize>]) -> Finding {
+    /// That some views do not fit; `faults` says of each why, where that is known.
+    pub fn bad_views(&self, bad: &[usize], faults: &[Option<ViewFault>]) -> Finding {
         let names: Vec<String> = bad
             .iter()
             .map(|&view| self.names[view].to_owned())
             .collect();
-        let exchanged = fits.iter().flatten().count();
         let message = format!(
             "the poses of {} do not fit their images, the other {} agree",
             listed(&names),
             counted(self.gathered.views.len() - bad.len(), "view"),
         );
-        let finding = Finding::new(Check::Poses, Level::Problem, message).of_views(names);
-        if 2 * exchanged <= bad.len() {
-            return finding.because(Cause::BadPose).remedied_by(
-                "estimate these poses again, or take the images with their poses out of the scene",
-            );
-        }
-        let which: Vec<String> = (bad.iter().zip(fits))
-            .filter_map(|(&view, fit)| Some((view, (*fit)?)))
-            .take(4)
-            .map(|(view, fit)| {
-                format!(
-                    "`{}` fits the pose of `{}`",
-                    self.names[view], self.names[fit]
-                )
+        let finding = |message| Finding::new(Check::Poses, Level::Problem, message);
+        let known: Vec<(&str, &ViewFault)> = (bad.iter().zip(faults))
+            .filter_map(|(&view, fault)| Some((self.names[view], fault.as_ref()?)))
+            .collect();
+        let exchanged: Vec<String> = (known.iter())
+            .filter_map(|(name, fault)| match fault {
+                ViewFault::PoseOf(other) => Some(format!(
+                    "`{name}` fits the pose of `{}`",
+                    self.names[*other]
+                )),
+                ViewFault::Camera(_) => None,
             })
             .collect();
-        finding.because(Cause::ImageOrder).remedied_by(format!(
-            "give these images their poses back: {}",
-            which.join(", ")
-        ))
+        if 2 * exchanged.len() > bad.len() {
+            return finding(message)
+                .of_views(names)
+                .because(Cause::ImageOrder)
+                .remedied_by(format!(
+                    "give these images their poses back: {}",
+                    exchanged[..exchanged.len().min(4)].join(", ")
+                ));
+        }
+        let of_camera = known.iter().find_map(|(name, fault)| match fault {
+            ViewFault::Camera(hypothesis) => Some((name, hypothesis)),
+            ViewFault::PoseOf(_) => None,
+        });
+        if let Some((name, hypothesis)) = of_camera
+            && 2 * known.len() > bad.len()
+        {
+            let (cause, reason) = self.reason(hypothesis);
+            return finding(format!("{message}: of `{name}` {reason}"))
+                .of_views(names)
+                .because(cause)
+                .remedied_by(by_hand(hypothesis));
+        }
+        finding(message)
+            .of_views(names)
+            .because(Cause::BadPose)
+            .remedied_by(
+                "estimate these poses again, or take the images with their poses out of the scene",
+            )
     }
 
     /// That nothing is known to explain the images.
@@ -250,6 +301,42 @@ impl Diagnosis<'_> {
             agreement.all.total,
             self.evidence().noun()
         )
+    }
+}
+
+/// What to do where no flag repairs it.
+fn by_hand(hypothesis: &Hypothesis) -> &'static str {
+    match hypothesis {
+        Hypothesis::Quaternions(_) => "read or write the four numbers in the other order",
+        Hypothesis::CentersAsTranslations => {
+            "give −R times the centre as the translation beside a world-to-camera rotation R"
+        }
+        Hypothesis::SquarePixels { .. } => "give one focal length for both axes",
+        Hypothesis::Lens(_) => {
+            "undistort the images, or give the lens: COLMAP's models and transforms.json hold one"
+        }
+        Hypothesis::StretchedImages(_) => {
+            "give intrinsics of these very images: fx and cx times the one factor, fy and cy \
+             times the other"
+        }
+        Hypothesis::CutImages(_) => {
+            "take the missing pixels off cx and cy, or give the images that were not cut"
+        }
+        Hypothesis::TurnedImages(_) => {
+            "turn the images back: most often one program followed the orientation in their EXIF \
+             data and another did not"
+        }
+        Hypothesis::CenteredPrincipalPoint => {
+            "give the principal point of these very images, most often their middle"
+        }
+        Hypothesis::SwappedIntrinsics => "exchange fx with fy and cx with cy",
+        Hypothesis::Order(_) => {
+            "give images names whose alphabetical order is that of the poses, with leading zeros"
+        }
+        Hypothesis::FocalScale(_) | Hypothesis::IntrinsicsScale(_) => {
+            "give the intrinsics of these very images"
+        }
+        Hypothesis::Convention { .. } => "convert the poses",
     }
 }
 

@@ -1,10 +1,11 @@
 //! Points followed by what they look like through three views: the evidence in
 //! photographs of textured things. Poses play no part in finding them.
 
-use crate::agreement::{Agreement, Tally};
+use crate::agreement::{Agreement, PairTallies, Tally};
 use crate::descriptor::{Descriptor, Keypoint, distance};
+use crate::lens::straightened;
 use nalgebra::{Matrix3, Vector2, Vector3};
-use neat_core::Camera;
+use neat_core::{Camera, Projection};
 use rayon::prelude::*;
 
 /// One point, seen by three views.
@@ -205,21 +206,42 @@ impl Track {
         self.0.map(|sighting| sighting.view)
     }
 
-    /// The largest distance to the projections of the triangulated point, in
-    /// tolerances; infinite if it is behind a camera.
+    /// The track as pinholes see it, in place of a lens of this strength.
+    pub fn straightened(&self, cameras: &[Camera], strength: f64) -> Self {
+        Self(self.0.map(|sighting| Sighting {
+            pixel: straightened(&sighting.pixel, &cameras[sighting.view], strength),
+            ..sighting
+        }))
+    }
+
+    /// The largest distance to the projections of the point, in tolerances; infinite if it is
+    /// behind a camera. The point is the triangulated one, or one as far away as can be: rays
+    /// to a mountain are parallel, and where they meet is chance.
     pub fn residual(&self, cameras: &[Camera]) -> f64 {
-        let Some(point) = self.triangulated(cameras) else {
-            return f64::INFINITY;
-        };
-        let residuals = self.0.map(|sighting| {
-            let projection = cameras[sighting.view].project(&point);
+        let near = (self.triangulated(cameras)).map_or(f64::INFINITY, |point| {
+            self.largest(|sighting| cameras[sighting.view].project(&point))
+        });
+        let directions = self.0.map(|sighting| {
+            let ray = cameras[sighting.view].ray_through(&sighting.pixel);
+            ray.direction
+        });
+        let far: Vector3<f64> = directions.iter().sum();
+        near.min(self.largest(|sighting| {
+            let camera = &cameras[sighting.view];
+            camera.project(&(camera.center_in_world + far))
+        }))
+    }
+
+    fn largest(&self, projection: impl Fn(&Sighting) -> Projection) -> f64 {
+        let residuals = self.0.iter().map(|sighting| {
+            let projection = projection(sighting);
             if projection.depth > 0.0 {
                 (projection.pixel - sighting.pixel).norm() / sighting.tolerance
             } else {
                 f64::INFINITY
             }
         });
-        residuals.into_iter().fold(0.0, f64::max)
+        residuals.fold(0.0, f64::max)
     }
 
     /// Where its views see it.
@@ -257,4 +279,17 @@ pub(crate) fn agreement(tracks: &[Track], cameras: &[Camera], trusted: &[bool]) 
         }
     }
     agreement
+}
+
+/// For each two views how many of the tracks through both the cameras explain.
+pub(crate) fn in_common(tracks: &[Track], cameras: &[Camera]) -> PairTallies {
+    let mut pairs = PairTallies::new(cameras.len());
+    for track in tracks {
+        let explained = Tally::one(track.residual(cameras) < 1.0);
+        let [a, b, c] = track.views();
+        for pair in [[a, b], [b, c], [a, c]] {
+            pairs.add(pair, explained);
+        }
+    }
+    pairs
 }
