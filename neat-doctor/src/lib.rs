@@ -33,6 +33,7 @@ mod descriptor;
 mod evidence;
 mod examination;
 mod examine;
+mod explanations;
 mod gray_image;
 mod hypothesis;
 mod image_checks;

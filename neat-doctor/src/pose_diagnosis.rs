@@ -3,21 +3,15 @@
 use crate::agreement::Agreement;
 use crate::evidence::{Evidence, Gathered, evenly};
 use crate::examination::{Check, Finding, Level, Repair, counted, percent};
-use crate::hypothesis::{Hypothesis, PoseOrder, conventions, of_intrinsics};
-use crate::image_checks::{field_of_view, is_usual};
-use crate::lens::strengths;
+use crate::hypothesis::{Hypothesis, PoseOrder};
 use crate::point_transfer::{known_points, transfer_gain};
-use crate::quaternion_order::QuaternionOrder;
 use crate::silhouettes::covered_share;
-use crate::view_faults::ViewFault;
 use neat_core::layout::PoseConvention;
 use neat_core::{Camera, Scene};
 use rayon::prelude::*;
 
 /// Another explanation has to score this many times as much as what is given.
-const CLEARLY: f64 = 1.3;
-/// Explanations whose scores differ less are equally good: the simpler holds.
-const EQUALLY: f64 = 0.95;
+pub(crate) const CLEARLY: f64 = 1.3;
 /// Views among whose corners better cameras are searched for.
 const SEARCHED_VIEWS: usize = 60;
 
@@ -208,7 +202,7 @@ impl<'a> Diagnosis<'a> {
             .collect();
         let mut findings = Vec::new();
         if !bad.is_empty() {
-            let faults: Vec<Option<ViewFault>> = (bad.par_iter())
+            let faults: Vec<_> = (bad.par_iter())
                 .map(|&view| self.fault_of(view, &bad, &trusted, &rest))
                 .collect();
             findings.push(self.bad_views(&bad, &faults));
@@ -217,134 +211,6 @@ impl<'a> Diagnosis<'a> {
         findings.push(self.agreeing(&rest, good));
         findings.extend(self.views_apart(&trusted));
         findings
-    }
-
-    fn try_out(&self, hypothesis: Hypothesis, cameras: &[Camera], trusted: &[bool]) -> Candidate {
-        let cameras = hypothesis.cameras(cameras, &self.names);
-        let agreement = match hypothesis {
-            Hypothesis::Lens(strength) => {
-                let straight = self.evidence().straightened(&cameras, strength);
-                straight.agreement(&cameras, trusted)
-            }
-            _ => self.evidence().agreement(&cameras, trusted),
-        };
-        Candidate {
-            agreement,
-            hypothesis,
-            cameras,
-        }
-    }
-
-    /// What explains clearly more than the given cameras.
-    fn better_explanation(
-        &self,
-        given: &Agreement,
-        trusted: &[bool],
-        min_share: f64,
-    ) -> Option<Vec<Candidate>> {
-        let mut candidates: Vec<Candidate> = self
-            .hypotheses()
-            .into_par_iter()
-            .map(|hypothesis| self.try_out(hypothesis, &self.cameras, trusted))
-            .collect();
-        candidates.push(self.best_focal(&self.cameras, trusted));
-        candidates.push(self.best_along(&strengths(), Hypothesis::Lens, &self.cameras, trusted));
-        let best = candidates
-            .iter()
-            .map(|candidate| candidate.agreement.score)
-            .fold(0.0, f64::max);
-        let candidate = candidates
-            .into_iter()
-            .filter(|candidate| candidate.agreement.score >= EQUALLY * best)
-            .min_by_key(|candidate| candidate.hypothesis.complexity())?;
-        let mut found = vec![candidate];
-        if !matches!(
-            found[0].hypothesis,
-            Hypothesis::FocalScale(_) | Hypothesis::Lens(_)
-        ) {
-            // Scenes of other programs can be wrong in two ways.
-            let focal = self.best_focal(&found[0].cameras, trusted);
-            if focal.agreement.score > CLEARLY * found[0].agreement.score {
-                found.push(focal);
-            }
-        }
-        let agreement = &found.last()?.agreement;
-        let clear = agreement.score > CLEARLY * given.score && agreement.share() >= min_share;
-        clear.then_some(found)
-    }
-
-    fn hypotheses(&self) -> Vec<Hypothesis> {
-        let convention = |is| Hypothesis::Convention {
-            read_as: self.read_as(),
-            is,
-        };
-        let mut hypotheses: Vec<_> = conventions(&self.cameras[0], self.read_as())
-            .into_iter()
-            .map(convention)
-            .collect();
-        hypotheses.extend(
-            PoseOrder::all(&self.names)
-                .into_iter()
-                .map(Hypothesis::Order),
-        );
-        hypotheses.extend(of_intrinsics(&self.cameras));
-        hypotheses.extend(QuaternionOrder::ALL.map(Hypothesis::Quaternions));
-        hypotheses.push(Hypothesis::CentersAsTranslations);
-        // Turned by two quarters they are cameras with other axes.
-        hypotheses.extend([1, 3].map(Hypothesis::TurnedImages));
-        hypotheses
-    }
-
-    /// The factor of the focal lengths that explains most.
-    fn best_focal(&self, cameras: &[Camera], trusted: &[bool]) -> Candidate {
-        const STEPS: i32 = 14;
-        const STEP: f64 = 1.07;
-        // In another unit, such as millimetres, they are anything: a normal lens is looked for.
-        let start = match field_of_view(&cameras[0]) {
-            angle if is_usual(angle) => 1.0,
-            _ => f64::from(cameras[0].width) / cameras[0].intrinsics.fx,
-        };
-        let scales: Vec<f64> = (-STEPS..=STEPS)
-            .map(|step| start * STEP.powi(step))
-            .collect();
-        self.best_along(&scales, Hypothesis::FocalScale, cameras, trusted)
-    }
-
-    /// What explains most of a family of hypotheses that is told by a number: the best of the
-    /// given numbers, and what is better beside it.
-    fn best_along(
-        &self,
-        numbers: &[f64],
-        of: fn(f64) -> Hypothesis,
-        cameras: &[Camera],
-        trusted: &[bool],
-    ) -> Candidate {
-        let try_out = |number: f64| self.try_out(of(number), cameras, trusted);
-        let score = |number: f64| try_out(number).agreement.score;
-        let scores: Vec<f64> = numbers.par_iter().map(|number| score(*number)).collect();
-        let best = (0..numbers.len()).fold(0, |best, next| {
-            if scores[next] > scores[best] {
-                next
-            } else {
-                best
-            }
-        });
-        // Thirds of the interval that holds the top.
-        let mut lower = numbers[best.saturating_sub(1)];
-        let mut upper = numbers[(best + 1).min(numbers.len() - 1)];
-        for _ in 0..9 {
-            let thirds = [lower + (upper - lower) / 3.0, upper - (upper - lower) / 3.0];
-            let [below, above] = thirds.map(score);
-            if below < above {
-                lower = thirds[0];
-            } else {
-                upper = thirds[1];
-            }
-        }
-        let found = 0.5 * (lower + upper);
-        // Three digits after the first: as exact as the search is.
-        let unit = 10f64.powf(found.abs().max(0.1).log10().floor() - 3.0);
-        try_out((found / unit).round() * unit)
     }
 
     /// Takes trust from views, the worst first, that explain next to nothing

@@ -86,38 +86,6 @@ impl Diagnosis<'_> {
                 Cause::TransposedRotations,
                 "the cameras' centres stand where world-to-camera translations are read".into(),
             ),
-            Hypothesis::SquarePixels { by_fx } => (
-                Cause::PixelAspect,
-                format!(
-                    "the pixels are square, and {} is right for both axes",
-                    if *by_fx { "fx" } else { "fy" }
-                ),
-            ),
-            Hypothesis::Lens(strength) => (
-                Cause::LensDistortion,
-                format!(
-                    "a lens bends straight lines: it moves the middles of the sides by {}",
-                    percent(strength.abs())
-                ),
-            ),
-            Hypothesis::StretchedImages([x, y]) => (
-                Cause::ResizedImages,
-                format!(
-                    "the images are {x:.3} times as wide and {y:.3} times as high as those that \
-                     the intrinsics are for"
-                ),
-            ),
-            Hypothesis::CutImages([left, above]) => (
-                Cause::PrincipalPoint,
-                format!(
-                    "the images were cut: {left:.0} pixels are missing at their left and \
-                     {above:.0} above"
-                ),
-            ),
-            Hypothesis::TurnedImages(quarters) => (
-                Cause::TurnedImages,
-                format!("the images were turned clockwise by {}°", 90 * quarters),
-            ),
             Hypothesis::CenteredPrincipalPoint => (
                 Cause::PrincipalPoint,
                 "the principal point should be the middle of the images".into(),
@@ -139,6 +107,7 @@ impl Diagnosis<'_> {
                 };
                 (Cause::ImageOrder, format!("the poses {how}"))
             }
+            hypothesis => reason_of_images(hypothesis),
         }
     }
 
@@ -301,6 +270,45 @@ impl Diagnosis<'_> {
             agreement.all.total,
             self.evidence().noun()
         )
+    }
+}
+
+/// Why images do not suit their intrinsics, where neither a flag nor a swap repairs it.
+fn reason_of_images(hypothesis: &Hypothesis) -> (Cause, String) {
+    match hypothesis {
+        Hypothesis::SquarePixels { by_fx } => (
+            Cause::PixelAspect,
+            format!(
+                "the pixels are square, and {} is right for both axes",
+                if *by_fx { "fx" } else { "fy" }
+            ),
+        ),
+        Hypothesis::Lens(strength) => (
+            Cause::LensDistortion,
+            format!(
+                "a lens bends straight lines: it moves the middles of the sides by {}",
+                percent(strength.abs())
+            ),
+        ),
+        Hypothesis::StretchedImages([x, y]) => (
+            Cause::ResizedImages,
+            format!(
+                "the images are {x:.3} times as wide and {y:.3} times as high as those that \
+                 the intrinsics are for"
+            ),
+        ),
+        Hypothesis::CutImages([left, above]) => (
+            Cause::PrincipalPoint,
+            format!(
+                "the images were cut: {left:.0} pixels are missing at their left and \
+                 {above:.0} above"
+            ),
+        ),
+        Hypothesis::TurnedImages(quarters) => (
+            Cause::TurnedImages,
+            format!("the images were turned clockwise by {}°", 90 * quarters),
+        ),
+        _ => (Cause::PosesDisagree, "the cameras are others".into()),
     }
 }
 
