@@ -19,8 +19,9 @@ const WINDOW_IN_PIXELS: f64 = 16.0;
 const WINDOW_SHARE: f64 = 0.1;
 /// … but never by so much of it that its other end would be meant.
 const MAX_WINDOW_SHARE: f64 = 0.4;
-/// Squared sine of the least angle under which lines meet in a point, about 10°.
-const MIN_SQUARED_SINE: f64 = 0.03;
+/// Squared sine of the least angle under which lines meet in a point, about 4°: faces that bend
+/// away from each other by 6° end in slivers like that.
+const MIN_SQUARED_SINE: f64 = 0.005;
 /// How much an end's own place counts along its line, where nothing else fixes it.
 const ALONG: f64 = 1e-3;
 
