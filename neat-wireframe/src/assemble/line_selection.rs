@@ -6,6 +6,7 @@ use super::config::AssembleConfig;
 use super::edge_samples::{Images, project_segment};
 use super::hypothesis_scoring::Alternatives;
 use super::line_evidence::LineEvidence;
+use super::outlines::Tube;
 use super::progress::OnProgress;
 use super::projected_line::ProjectedLine;
 use super::view_segments::SegmentId;
@@ -147,11 +148,10 @@ fn noise_of_edgels(images: &Images, lines: &[ChosenLine]) -> f64 {
 }
 
 /// What a line that the images show stands for.
-#[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Straight,
     Curve,
-    Outline,
+    Outline(Tube),
 }
 
 fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
@@ -161,10 +161,10 @@ fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
         || images.is_chord(line, evidence, bend.bow.as_ref(), noise)
     {
         Kind::Curve
-    } else if images.is_outline(line, evidence) {
-        Kind::Outline
     } else {
-        Kind::Straight
+        images
+            .tube(line, evidence)
+            .map_or(Kind::Straight, Kind::Outline)
     }
 }
 
@@ -189,7 +189,7 @@ fn choose<'a>(
             .map(|view| vec![false; view.segments.len()])
             .collect(),
     };
-    let (mut lines, mut curved, mut outlines) = (Vec::new(), 0, 0);
+    let (mut lines, mut curved, mut tubes) = (Vec::new(), 0, Vec::new());
     loop {
         // A line takes its edgels whatever it stands for: that is asked of many at once.
         let room = most - lines.len();
@@ -208,11 +208,17 @@ fn choose<'a>(
             kinds.par_extend(some.par_iter().map(|line| kind(&images, line, noise)));
             progress(FOUND + (1.0 - FOUND) * kinds.len() as f64 / found.len() as f64)?;
         }
-        curved += kinds.iter().filter(|kind| **kind == Kind::Curve).count();
-        outlines += kinds.iter().filter(|kind| **kind == Kind::Outline).count();
-        let of_kinds = found.into_iter().zip(kinds);
-        lines.extend(of_kinds.filter_map(|(line, kind)| (kind == Kind::Straight).then_some(line)));
+        for (line, kind) in found.into_iter().zip(kinds) {
+            match kind {
+                Kind::Straight => lines.push(line),
+                Kind::Curve => curved += 1,
+                Kind::Outline(tube) => tubes.push(tube),
+            }
+        }
     }
+    let count = lines.len();
+    let lines = images.without_outlines(lines, &tubes);
+    let outlines = tubes.len() + count - lines.len();
     ControlFlow::Continue(Selection {
         images,
         noise,

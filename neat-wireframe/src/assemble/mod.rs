@@ -29,6 +29,7 @@ mod free_ends;
 mod graph_fitting;
 mod graph_segmentation;
 mod hypothesis_scoring;
+mod known_tubes;
 mod line3d;
 mod line_continuation;
 mod line_evidence;

@@ -27,10 +27,10 @@ const MIN_EDGELS: usize = 20;
 /// Three views show a cylinder wherever they want, as two do with a line. Four do so with a
 /// cone, which has a parameter more; but with four fewer outlines are told on the parts, and
 /// with three no object loses an edge.
-const FREE_VIEWS: usize = 3;
+pub(super) const FREE_VIEWS: usize = 3;
 /// A tube must explain the images so much better than the line, in nats, as it is the best of
 /// many tries: with 8 photographs with truth lose edges, with 15 tubes remain.
-const ADVANTAGE: f64 = 12.0;
+pub(super) const ADVANTAGE: f64 = 12.0;
 /// It must explain this share of the views that show the line: else it is another thing.
 const COMMON: f64 = 0.75;
 /// What keeps a parameter where no edgel tells of it.
@@ -38,21 +38,25 @@ const RIDGE: f64 = 1e-4;
 
 /// A cylinder or a cone that touches a line.
 #[derive(Clone, Copy, Debug)]
-struct Tube {
-    line: LineSegment3,
-    across: Matrix3x2<f64>,
+pub(super) struct Tube {
+    pub(super) line: LineSegment3,
+    pub(super) across: Matrix3x2<f64>,
     /// Out of the surface, where the line touches it.
-    outward: Vector2<f64>,
+    pub(super) outward: Vector2<f64>,
     /// Where the axis lies, from the line's start and from its end.
-    axis: [Vector2<f64>; 2],
+    pub(super) axis: [Vector2<f64>; 2],
     /// At the line's middle …
-    radius: f64,
+    pub(super) radius: f64,
     /// … and so much more at its end.
-    taper: f64,
+    pub(super) taper: f64,
 }
 
 impl Tube {
-    fn touching(line: &LineSegment3, across: Matrix3x2<f64>, outward: Vector2<f64>) -> Self {
+    pub(super) fn touching(
+        line: &LineSegment3,
+        across: Matrix3x2<f64>,
+        outward: Vector2<f64>,
+    ) -> Self {
         Self {
             line: *line,
             across,
@@ -64,12 +68,16 @@ impl Tube {
     }
 
     /// At a place along the line, which is 0 at its start and 1 at its end.
-    fn radius_at(&self, place: f64) -> f64 {
+    pub(super) fn radius_at(&self, place: f64) -> f64 {
         self.radius + (2.0 * place - 1.0) * self.taper
     }
 
     /// The line of the surface that is its outline in a view, and the normal there.
-    fn outline(&self, images: &Images, view: usize) -> Option<(LineSegment3, Vector2<f64>)> {
+    pub(super) fn outline(
+        &self,
+        images: &Images,
+        view: usize,
+    ) -> Option<(LineSegment3, Vector2<f64>)> {
         let [start, end] = self.axis;
         let camera = images.views[view].camera.center_in_world;
         // A tangent plane through the camera touches the circle beside it.
@@ -94,15 +102,12 @@ impl Tube {
 }
 
 impl Images<'_> {
-    /// Whether the outline of a tube explains the images better than a line.
-    pub(super) fn is_outline(&self, line: &LineSegment3, evidence: &LineEvidence) -> bool {
-        let Some((across, normal)) = self.tangent_normal(line, evidence) else {
-            return false;
-        };
+    /// The tube whose outline explains the images better than a line.
+    pub(super) fn tube(&self, line: &LineSegment3, evidence: &LineEvidence) -> Option<Tube> {
+        let (across, normal) = self.tangent_normal(line, evidence)?;
         // What others have taken counts for both.
         let of_line = self.evidence(line, None, f64::NEG_INFINITY).gain;
         let pixel = self.pixel_size(line, evidence.views());
-        let shown = evidence.showing.len() as f64;
         let outwards: Vec<Vector2<f64>> = (RADII.iter())
             .flat_map(|radius| [radius * pixel * normal, -radius * pixel * normal])
             .collect();
@@ -114,10 +119,7 @@ impl Images<'_> {
                 .filter(|found| found.gain > of_line)
         };
         let explains = |tube: &Tube, found: &LineEvidence| {
-            let common = (evidence.views())
-                .filter(|view| found.views().any(|other| other == *view))
-                .count();
-            if found.gain <= of_line + ADVANTAGE || (common as f64) < COMMON * shown {
+            if found.gain <= of_line + ADVANTAGE || !shows_as_well(found, evidence) {
                 return false;
             }
             // It may stand for another line.
@@ -126,18 +128,17 @@ impl Images<'_> {
             let axis = self.fit(&axis, found.views(), ROUNDS[0].0 * self.reach);
             found.gain > self.evidence(&axis, None, f64::NEG_INFINITY).gain + ADVANTAGE
         };
-        outwards.par_iter().any(|outward| {
+        outwards.par_iter().find_map_first(|outward| {
             let tube = Tube::touching(line, across, *outward);
-            let Some(cylinder) = self.fit_tube(&tube, false, pixel) else {
-                return false;
-            };
+            let cylinder = self.fit_tube(&tube, false, pixel)?;
             // Beside a cone some cylinder is a little better than a line.
-            let Some(found) = seen(&cylinder) else {
-                return false;
-            };
-            explains(&cylinder, &found)
-                || (self.fit_tube(&cylinder, true, pixel))
-                    .is_some_and(|cone| seen(&cone).is_some_and(|found| explains(&cone, &found)))
+            let found = seen(&cylinder)?;
+            if explains(&cylinder, &found) {
+                return Some(cylinder);
+            }
+            let cone = self.fit_tube(&cylinder, true, pixel)?;
+            let found = seen(&cone)?;
+            explains(&cone, &found).then_some(cone)
         })
     }
 
@@ -225,8 +226,16 @@ impl Images<'_> {
     }
 }
 
+/// Whether most views that show a line show what has been `found` instead, too.
+pub(super) fn shows_as_well(found: &LineEvidence, line: &LineEvidence) -> bool {
+    let common = (line.views())
+        .filter(|view| found.views().any(|other| other == *view))
+        .count();
+    common as f64 >= COMMON * line.showing.len() as f64
+}
+
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::assemble::test_views::{TestViews, cube_edge};
     use crate::assemble::view_segments::PreparedView;
@@ -237,7 +246,7 @@ mod tests {
     const HALF_LENGTH: f64 = 0.4;
 
     /// A line of the cone around the z axis with these radii at its ends.
-    fn generator([start, end]: [f64; 2], [cos, sin]: [f64; 2]) -> LineSegment3 {
+    pub(crate) fn generator([start, end]: [f64; 2], [cos, sin]: [f64; 2]) -> LineSegment3 {
         LineSegment3::new(
             Vector3::new(start * cos, start * sin, -HALF_LENGTH),
             Vector3::new(end * cos, end * sin, HALF_LENGTH),
@@ -245,7 +254,7 @@ mod tests {
     }
 
     /// Views of both outlines of that cone.
-    fn views_of_cone([start, end]: [f64; 2]) -> TestViews {
+    pub(crate) fn views_of_cone([start, end]: [f64; 2]) -> TestViews {
         let outlines = |camera: &Camera| {
             let center = camera.center_in_world;
             let beside = 0.5 * (1.0 + center.z / HALF_LENGTH);
@@ -286,17 +295,17 @@ mod tests {
             let line = generator(radii, [1.0, 0.0]);
             let evidence = images.evidence(&line, None, 0.0);
             assert!(evidence.showing.len() >= 3, "{}", evidence.showing.len());
-            assert!(images.is_outline(&line, &evidence), "{radii:?}");
+            assert!(images.tube(&line, &evidence).is_some(), "{radii:?}");
         }
 
         let cube = TestViews::of_cube(60);
         let images = cube.images();
         for edge in 0..12 {
             let evidence = images.evidence(&cube_edge(edge), None, 0.0);
-            assert!(!images.is_outline(&cube_edge(edge), &evidence));
+            assert!(images.tube(&cube_edge(edge), &evidence).is_none());
         }
         // Nobody shows it: nothing to explain better.
         let nothing = LineEvidence::default();
-        assert!(!images.is_outline(&cube_edge(0), &nothing));
+        assert!(images.tube(&cube_edge(0), &nothing).is_none());
     }
 }

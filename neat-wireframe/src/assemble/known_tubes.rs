@@ -1,0 +1,140 @@
+//! Further outlines of tubes that others have shown.
+//!
+//! A long cylinder has dozens of outlines, each of a few neighbouring views. Its last ones are
+//! seen by too few to tell a tube by, and lie off its surface, where the tangent planes of these
+//! views meet. But the tube is known by then, and need not be fitted.
+
+use super::edge_samples::Images;
+use super::line_evidence::LineEvidence;
+use super::line_fitting::directions_across;
+use super::line_selection::ChosenLine;
+use super::outlines::{ADVANTAGE, FREE_VIEWS, Tube, shows_as_well};
+use nalgebra::{Vector2, Vector3};
+use neat_core::LineSegment3;
+use rayon::prelude::*;
+
+/// A line touches a tube within so many reaches: as far as lines that meet may be apart …
+const GAP: f64 = 2.0;
+/// … or lies outside by so much of the radius, where tangent planes meet that are 60° apart …
+const MAX_BEYOND: f64 = 0.15;
+/// … if it has this cosine to the axis, 5°, judged.
+const MIN_COSINE: f64 = 0.996;
+
+impl Tube {
+    /// The same tube as one of another line; `None` unless they touch, within `gap`.
+    fn touched_by(&self, line: &LineSegment3, gap: f64) -> Option<Self> {
+        let [start, end] = self.axis.map(|axis| self.across * axis);
+        let axis = LineSegment3::new(self.line.start + start, self.line.end + end);
+        let along = (line.end - line.start).try_normalize(0.0)?;
+        let direction = axis.end - axis.start;
+        if direction.dot(&along).abs() < MIN_COSINE * direction.norm() {
+            return None;
+        }
+        let across = directions_across(line)?;
+        // Where a plane across the line meets the axis.
+        let place = |point: Vector3<f64>| (point - axis.start).dot(&along) / direction.dot(&along);
+        let ends = line.ends();
+        let axis = ends.map(|point| across.tr_mul(&(axis.point_at(place(point)) - point)));
+        let [start, end] = ends.map(|point| self.radius_at(place(point)).abs());
+        let touches = |axis: &Vector2<f64>, radius: f64| {
+            (-gap..=gap + MAX_BEYOND * radius).contains(&(axis.norm() - radius))
+        };
+        (touches(&axis[0], start) && touches(&axis[1], end)).then(|| Self {
+            axis,
+            radius: 0.5 * (start + end),
+            taper: 0.5 * (end - start),
+            ..Self::touching(line, across, -(axis[0] + axis[1]))
+        })
+    }
+}
+
+impl Images<'_> {
+    /// The lines that are no outlines of some tubes.
+    pub(super) fn without_outlines(
+        &self,
+        lines: Vec<ChosenLine>,
+        tubes: &[Tube],
+    ) -> Vec<ChosenLine> {
+        (lines.into_par_iter())
+            .filter(|found| !self.is_outline_of(&found.line, &found.evidence, tubes))
+            .collect()
+    }
+
+    /// Whether a line is an outline of one of some tubes.
+    fn is_outline_of(&self, line: &LineSegment3, evidence: &LineEvidence, tubes: &[Tube]) -> bool {
+        let gap = GAP * self.reach * self.pixel_size(line, evidence.views());
+        let mut touched = tubes
+            .iter()
+            .filter_map(|tube| tube.touched_by(line, gap))
+            .peekable();
+        if touched.peek().is_none() {
+            return false;
+        }
+        // As for tubes that are fitted.
+        let of_line = self.evidence(line, None, f64::NEG_INFINITY).gain;
+        touched.any(|tube| {
+            let in_view = |view| Some(tube.outline(self, view)?.0);
+            let found = self.evidence_of(line, in_view, None, of_line, FREE_VIEWS);
+            found.gain > of_line + ADVANTAGE && shows_as_well(&found, evidence)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::outlines::tests::{generator, views_of_cone};
+    use crate::assemble::test_views::{TestViews, cube_edge};
+
+    /// A tube of the cone, by one of its lines.
+    fn tube(radii: [f64; 2], direction: [f64; 2]) -> Tube {
+        let line = generator(radii, direction);
+        let across = directions_across(&line).unwrap();
+        let axis = generator([0.0; 2], direction);
+        let axis = [axis.start - line.start, axis.end - line.end].map(|a| across.tr_mul(&a));
+        Tube {
+            axis,
+            radius: 0.5 * (radii[0] + radii[1]),
+            taper: 0.5 * (radii[1] - radii[0]),
+            ..Tube::touching(&line, across, -axis[0])
+        }
+    }
+
+    #[test]
+    fn lines_of_a_known_tube_touch_it_and_others_do_not() {
+        let known = tube([0.15, 0.15], [1.0, 0.0]);
+        let beside = |radius: f64| known.touched_by(&generator([radius; 2], [0.6, 0.8]), 0.005);
+        let found = beside(0.15).unwrap();
+        assert!((found.radius - 0.15).abs() < 1e-9 && found.taper.abs() < 1e-9);
+        // Where tangent planes meet.
+        assert!(beside(0.17).is_some());
+        assert!(beside(0.14).is_none() && beside(0.19).is_none());
+        let across = LineSegment3::new([0.15, 0.0, -0.1].into(), [0.15, 0.1, 0.0].into());
+        assert!(known.touched_by(&across, 0.005).is_none());
+    }
+
+    #[test]
+    fn an_outline_in_few_views_is_told_by_a_known_tube() {
+        let radii = [0.15, 0.15];
+        let views = views_of_cone(radii);
+        let images = views.images();
+        let line = generator(radii, [0.0, 1.0]);
+        let mut evidence = images.evidence(&line, None, 0.0);
+        evidence.showing.truncate(3);
+        assert_eq!(evidence.showing.len(), 3);
+        let tubes = [tube(radii, [1.0, 0.0])];
+        assert!(images.is_outline_of(&line, &evidence, &tubes));
+        assert!(!images.is_outline_of(&line, &evidence, &[tube([0.1, 0.1], [1.0, 0.0])]));
+        assert!(!images.is_outline_of(&line, &evidence, &[]));
+
+        // An edge that touches a tube stays one.
+        let cube = TestViews::of_cube(60);
+        let images = cube.images();
+        let edge = cube_edge(0);
+        let evidence = images.evidence(&edge, None, 0.0);
+        let across = directions_across(&edge).unwrap();
+        let tubes = [0.0_f64, 1.0, 2.0, 3.0]
+            .map(|turn| Tube::touching(&edge, across, 0.1 * Vector2::new(turn.cos(), turn.sin())));
+        assert!(!images.is_outline_of(&edge, &evidence, &tubes));
+    }
+}
