@@ -17,8 +17,8 @@ use rayon::prelude::*;
 const GAP: f64 = 2.0;
 /// … or lies outside by so much of the radius, where tangent planes meet that are 60° apart …
 const MAX_BEYOND: f64 = 0.15;
-/// … if it has this cosine to the axis, 5°, judged.
-const MIN_COSINE: f64 = 0.996;
+/// … if it has this cosine to the axis, 15°, judged: lines of a cone are as oblique as it is.
+const MIN_COSINE: f64 = 0.966;
 
 impl Tube {
     /// The same tube as one of another line; `None` unless they touch, within `gap`.
@@ -111,6 +111,11 @@ mod tests {
         assert!(beside(0.14).is_none() && beside(0.19).is_none());
         let across = LineSegment3::new([0.15, 0.0, -0.1].into(), [0.15, 0.1, 0.0].into());
         assert!(known.touched_by(&across, 0.005).is_none());
+        // The lines of a cone are oblique to its axis.
+        let radii = [0.1, 0.3];
+        let cone = tube(radii, [1.0, 0.0]);
+        let found = cone.touched_by(&generator(radii, [0.6, 0.8]), 0.005);
+        assert!((found.unwrap().taper - 0.1).abs() < 5e-3);
     }
 
     #[test]
