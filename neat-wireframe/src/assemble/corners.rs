@@ -295,5 +295,9 @@ mod tests {
         assert!((gap - 0.25).abs() < 1e-12);
         assert!(nearest_points(&a, &line([0.0, 1.0, 0.0], [2.0, 1.01, 0.0])).is_none());
         assert!(nearest_points(&a, &line([0.0; 3], [0.0; 3])).is_none());
+        // A sliver of 6°.
+        let sliver = line([2.0, 0.0, 0.0], [0.0, 0.2, 0.0]);
+        let ([s, t], gap) = nearest_points(&a, &sliver).unwrap();
+        assert!((s - 1.0).abs() < 1e-9 && t.abs() < 1e-9 && gap < 1e-9);
     }
 }
