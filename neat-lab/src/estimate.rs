@@ -20,6 +20,9 @@ const NARROW_SHARE: f64 = 0.40;
 const WIDE: usize = 128;
 /// The program with its networks and their moments.
 const BASE_BYTES: f64 = 60.0 * 1024.0 * 1024.0;
+/// Bytes per number of a learned grid: itself, its gradient, two moments, and the copies
+/// that the kernels and the optimiser make, each a float32.
+const BYTES_PER_GRID_NUMBER: f64 = 4.0 * 8.0;
 
 /// Time and memory of a training.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -51,9 +54,14 @@ pub fn estimate(config: &Config, scene: &Scene, speed: f64) -> Estimate {
     let image_bytes: u64 = in_memory.map(|view| view.image.byte_len()).sum();
     let rays = config.train.rays;
     let at_once = config.train.ray_chunk.map_or(rays, |chunk| chunk.min(rays));
+    let grid = config.model.implicit.encoding.grid();
+    let grid_bytes = grid.map_or(0.0, |grid| grid.parameters() as f64) * BYTES_PER_GRID_NUMBER;
     Estimate {
         seconds: config.train.steps as f64 * flops / (speed * 1e9 * share),
-        bytes: BASE_BYTES + image_bytes as f64 + at_once as f64 * bytes_per_ray(config),
+        bytes: BASE_BYTES
+            + grid_bytes
+            + image_bytes as f64
+            + at_once as f64 * bytes_per_ray(config),
     }
 }
 

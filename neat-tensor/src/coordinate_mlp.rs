@@ -1,5 +1,5 @@
 //! The coordinate network of a signed distance field: softplus perceptron over
-//! encoded points, with the gradient of its first output with respect to the
+//! encoded points (sines, and learned grids where there are any), with the gradient of its first output with respect to the
 //! point.
 //!
 //! burn's reverse mode is first-order only. The gradient is therefore written
@@ -11,6 +11,7 @@
 //! ([`crate::kernels::cpu`]), which these tensor operations explain and check.
 
 use crate::encoding::PositionalEncoding;
+use crate::grid_encoding::GridEncoding;
 use crate::kernel_choice::Kernels;
 use crate::kernels::cpu::KnownPass;
 use crate::kernels::cpu::softplus_network::SoftplusNetwork;
@@ -28,6 +29,8 @@ pub struct CoordinateMlp {
     /// Frequencies of the encoding.
     #[module(skip)]
     pub octaves: usize,
+    /// Learned grids whose features follow the sines in the encoding, if any.
+    pub grid: Option<GridEncoding>,
     /// Index of the layer whose input is `[h, encoding] / √2`, if any.
     #[module(skip)]
     pub skip: Option<usize>,
@@ -54,7 +57,10 @@ impl CoordinateMlp {
 
     fn record_by(&self, by: &(impl NeatBackend + ?Sized), points: Tensor<2>) -> Recorded {
         let weights: Vec<_> = self.layers.iter().map(Linear::effective_weight).collect();
-        let encoded = by.encode(self.encoding(), points.clone());
+        let mut encoded = by.encode(self.encoding(), points.clone());
+        if let Some(grid) = &self.grid {
+            encoded = Tensor::cat(vec![encoded, by.encode_grid(grid, points.clone())], 1);
+        }
         let last = self.layers.len() - 1;
         let mut pre_activations = Vec::with_capacity(last);
         let mut h = encoded.clone();
@@ -123,10 +129,15 @@ impl CoordinateMlp {
         }
         let parameters = parameters.into_data();
         let parameters = parameters.as_slice().ok()?;
+        let table = match &self.grid {
+            Some(grid) => grid.table.val().detach().into_data().try_into_vec().ok()?,
+            None => Vec::new(),
+        };
         Some(SoftplusNetwork::new(
             Arch::new(),
             &self.network().shape(),
             parameters,
+            table,
         ))
     }
 
@@ -140,6 +151,7 @@ impl CoordinateMlp {
         DistanceNetwork {
             layers: &self.layers,
             octaves: self.octaves,
+            grid: self.grid.as_ref(),
             skip: self.skip,
             sharpness: self.sharpness,
         }
@@ -204,6 +216,13 @@ impl Recorded {
         if let Some(skipped) = to_encoding {
             g = g + skipped;
         }
-        by.pull_back(mlp.encoding(), self.points.clone(), g)
+        let points = self.points.clone();
+        let Some(grid) = &mlp.grid else {
+            return by.pull_back(mlp.encoding(), points, g);
+        };
+        let waves = mlp.encoding().output_width(3);
+        let of_grid = g.clone().narrow(1, waves, grid.shape.width());
+        by.pull_back(mlp.encoding(), points.clone(), g.narrow(1, 0, waves))
+            + by.pull_back_grid(grid, points, of_grid)
     }
 }

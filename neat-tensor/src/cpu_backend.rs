@@ -52,7 +52,8 @@ impl NeatBackend for Cpu {
             memory: self.memory.clone(),
         };
         let parameters = flat_parameters(network.layers);
-        let (first, gradient, others) = fused::softplus_network(points, parameters, request);
+        let table = network.grid.map(|grid| grid.table.val());
+        let (first, gradient, others) = fused::softplus_network(points, parameters, table, request);
         Some(Field {
             first,
             gradient,
@@ -124,6 +125,7 @@ impl DistanceNetwork<'_> {
         SoftplusShape {
             layers: layer_shapes(self.layers),
             octaves: self.octaves,
+            grid: self.grid.map(|grid| grid.shape.clone()),
             skip: self.skip,
             sharpness: self.sharpness as f32,
         }

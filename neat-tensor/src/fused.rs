@@ -45,7 +45,8 @@ pub struct ReluRequest {
 /// Networks as operations of a backend.
 ///
 /// Tensors are float32. `parameters` `[P]` hold of each layer the weight
-/// `[outputs, inputs]`, row-major, then the bias.
+/// `[outputs, inputs]`, row-major, then the bias; `table` `[entries, features]` is that of
+/// the network's grid, or, as burn wants all inputs, any tensor where there is none.
 #[backend_extension(
     Flex: cfg(feature = "flex"),
     NdArray: cfg(feature = "ndarray"),
@@ -58,6 +59,7 @@ pub trait FusedNetworks: Backend {
     fn softplus_network(
         points: FloatTensor<Self>,
         parameters: FloatTensor<Self>,
+        table: FloatTensor<Self>,
         request: SoftplusRequest,
     ) -> (
         FloatTensor<Self>,
@@ -101,15 +103,24 @@ fn write<B: Backend>(
 /// What a softplus network says, as tensors.
 pub type SoftplusTensors<B> = (FloatTensor<B>, FloatTensor<B>, Option<FloatTensor<B>>);
 
+/// The network of `[parameters, table]`.
+fn network_of<B: Backend>(shape: &SoftplusShape, learned: [FloatTensor<B>; 2]) -> SoftplusNetwork {
+    let [parameters, table] = learned.map(read::<B>);
+    let table = table
+        .try_into_vec()
+        .expect("fused: networks are float32 here");
+    SoftplusNetwork::new(Arch::new(), shape, slice(&parameters), table)
+}
+
 fn softplus_forward<B: Backend>(
     points: FloatTensor<B>,
-    parameters: FloatTensor<B>,
+    learned: [FloatTensor<B>; 2],
     request: &SoftplusRequest,
     keep: bool,
 ) -> (SoftplusTensors<B>, Option<softplus_network::Tape>) {
     let device = points.device();
-    let (points, parameters) = (read::<B>(points), read::<B>(parameters));
-    let network = SoftplusNetwork::new(Arch::new(), &request.shape, slice(&parameters));
+    let points = read::<B>(points);
+    let network = network_of::<B>(&request.shape, learned);
     let (full, light) = slice(&points).split_at(3 * request.full_rows);
     let known = request.known.as_ref().map(KnownRows::as_known);
     let (output, tape) = network.forward(full, known, request.others, keep);
@@ -159,9 +170,10 @@ macro_rules! on_the_host {
             fn softplus_network(
                 points: FloatTensor<Self>,
                 parameters: FloatTensor<Self>,
+                table: FloatTensor<Self>,
                 request: SoftplusRequest,
             ) -> SoftplusTensors<Self> {
-                softplus_forward::<Self>(points, parameters, &request, false).0
+                softplus_forward::<Self>(points, [parameters, table], &request, false).0
             }
 
             fn relu_network(
@@ -187,12 +199,15 @@ on_the_host!(burn::backend::NdArray);
 pub(crate) fn softplus_network(
     points: Tensor<2>,
     parameters: Tensor<1>,
+    table: Option<Tensor<2>>,
     request: SoftplusRequest,
 ) -> (Tensor<2>, Tensor<2>, Option<Tensor<2>>) {
     use burn::backend::Dispatch;
+    let table = table.unwrap_or_else(|| Tensor::zeros([1, 1], &points.device()));
     let (first, gradient, others) = <Dispatch as FusedNetworks>::softplus_network(
         points.into_dispatch(),
         parameters.into_dispatch(),
+        table.into_dispatch(),
         request,
     );
     (

@@ -31,6 +31,7 @@ mod encoding;
 mod fused;
 #[cfg(feature = "wgpu")]
 mod gpu_backend;
+mod grid_encoding;
 pub mod host;
 mod kernel_choice;
 pub mod kernels;
@@ -46,6 +47,7 @@ pub mod softplus;
 pub use backend::{Backend, BackendError};
 pub use coordinate_mlp::{CoordinateMlp, Recorded};
 pub use encoding::PositionalEncoding;
+pub use grid_encoding::{GridConfig, GridEncoding};
 pub use kernel_choice::Kernels;
 pub use kernels::cpu::{KnownPass, KnownRows};
 pub use linear::{Linear, NetworkSizeError};

@@ -2,6 +2,7 @@
 //! model, the field, the junctions and the optimiser share.
 
 use crate::encoding::PositionalEncoding;
+use crate::grid_encoding::GridEncoding;
 use crate::kernels::cpu::KnownRows;
 use crate::linear::Linear;
 use crate::sampling::{DrawNumbers, GridNumbers, RefineNumbers};
@@ -58,6 +59,17 @@ pub trait NeatBackend: Debug + Send + Sync {
         gradient: Tensor<2>,
     ) -> Tensor<2> {
         encoding.pull_back(x, gradient)
+    }
+
+    /// The features of learned grids at `x` `[N, 3]`: [`GridEncoding::encode`].
+    fn encode_grid(&self, grid: &GridEncoding, x: Tensor<2>) -> Tensor<2> {
+        grid.encode(x)
+    }
+
+    /// The transposed Jacobian of these features at `x` times `gradient`:
+    /// [`GridEncoding::pull_back`].
+    fn pull_back_grid(&self, grid: &GridEncoding, x: Tensor<2>, gradient: Tensor<2>) -> Tensor<2> {
+        grid.pull_back(x, gradient)
     }
 
     /// A softplus network with the gradient of its first output at `points` `[N, 3]`, as
@@ -142,6 +154,8 @@ pub struct DistanceNetwork<'a> {
     pub layers: &'a [Linear],
     /// Frequencies of the encoding.
     pub octaves: usize,
+    /// Learned grids whose features follow the sines, if any.
+    pub grid: Option<&'a GridEncoding>,
     /// Index of the layer whose input is `[h, encoding] / √2`, if any.
     pub skip: Option<usize>,
     /// Sharpness of the softplus.

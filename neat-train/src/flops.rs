@@ -1,12 +1,13 @@
 //! Arithmetic that an iteration cannot avoid: what a time is measured against.
 //!
-//! One multiplication with its addition counts 2; matrix products alone are
-//! counted, for each number once: activations that are computed again for the
+//! One multiplication with its addition counts 2; matrix products, and the interpolation
+//! of learned grids between the corners of their cells, are counted, for each number
+//! once: activations that are computed again for the
 //! backward pass, and distances that tell which samples matter, do not count
 //! twice.
 
 use crate::model::ModelConfig;
-use neat_tensor::PositionalEncoding;
+use neat_tensor::{GridConfig, PositionalEncoding};
 use serde::Serialize;
 
 /// Rows that went through the networks in one iteration.
@@ -76,7 +77,7 @@ impl StepFlops {
     pub fn count(model: &ModelConfig, rows: &StepRows) -> Self {
         let implicit = &model.implicit;
         let encoded = |octaves: usize| PositionalEncoding { octaves }.output_width(3);
-        let point = encoded(implicit.octaves);
+        let point = implicit.encoded();
         let hidden: usize = (0..implicit.hidden_layers)
             .map(|l| {
                 let inputs = if l == 0 { point } else { implicit.width };
@@ -86,9 +87,13 @@ impl StepFlops {
             })
             .sum();
         let product = |size: usize| 2.0 * size as f64;
-        let distance = product(hidden + implicit.width);
+        // Each feature of a grid lies between eight corners, and so does its derivative
+        // along each axis.
+        let grid_width = implicit.encoding.grid().map_or(0, GridConfig::width);
+        let interpolated = product(8 * grid_width);
+        let distance = product(hidden + implicit.width) + interpolated;
         let features = product(implicit.width * implicit.features);
-        let sweep = product(hidden);
+        let sweep = product(hidden) + 3.0 * interpolated;
         // First layers alone pass a gradient to part of their inputs.
         let perceptron =
             |inputs: usize, trained: usize, width: usize, layers: usize, out: usize| {
@@ -116,8 +121,9 @@ impl StepFlops {
             model.attraction.hidden_layers,
             6,
         );
-        // The first layer passes no gradient to the points.
-        let to_points = product(point * implicit.width);
+        // The first layer passes no gradient to the points, though to grids; these have no
+        // other operand that wants one.
+        let to_points = product((point - grid_width) * implicit.width) + interpolated;
         let of = |rows: usize, flops: f64| rows as f64 * flops;
         Self {
             sampler: of(rows.sampler, distance),
@@ -151,5 +157,24 @@ mod tests {
         assert!((flops.sampler - 0.92e6).abs() < 0.05e6, "{flops:?}");
         let sample = flops.forward + flops.backward;
         assert!((sample - 9.5e6).abs() < 0.7e6, "{flops:?}");
+    }
+
+    #[test]
+    fn a_grid_counts_its_columns_and_their_interpolation() {
+        let rows = StepRows {
+            sampler: 1,
+            ..StepRows::default()
+        };
+        let mut model = ModelConfig::default();
+        model.implicit.skip_layer = 0;
+        let sines = StepFlops::count(&model, &rows).sampler;
+        model.implicit.encoding = neat_sdf::PointEncoding::Grid(GridConfig {
+            levels: 5,
+            features: 4,
+            ..GridConfig::default()
+        });
+        let columns = 20.0;
+        let more = 2.0 * columns * (256.0 + 8.0);
+        assert_eq!(StepFlops::count(&model, &rows).sampler - sines, more);
     }
 }

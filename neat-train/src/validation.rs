@@ -3,6 +3,7 @@
 use crate::config::{BatchViews, TrainingConfig};
 use crate::error::TrainError;
 use neat_sdf::RaySamplerConfig;
+use neat_tensor::GridConfig;
 
 /// Most samples of a step: their arrays on the host take some 50 bytes each, and
 /// their indices are 32 bits wide.
@@ -13,6 +14,8 @@ const MAX_WIDTH: usize = 1 << 14;
 const MAX_LAYERS: usize = 1 << 8;
 /// Most junctions that the perceiver may have: their assignment is a matrix.
 const MAX_JUNCTIONS: usize = 1 << 16;
+/// Most numbers of a learned grid: a step goes through all of them several times.
+const MAX_GRID_NUMBERS: usize = 1 << 26;
 /// Most nodes of the sampler's grid along an axis.
 const MAX_RESOLUTION: usize = 1 << 10;
 
@@ -107,6 +110,11 @@ fn sizes(config: &TrainingConfig) -> Vec<(&'static str, usize, usize)> {
         ("model.perceiver.junctions", junctions, MAX_JUNCTIONS),
         ("model.perceiver.width", model.perceiver.width, MAX_WIDTH),
         ("model.implicit.width", implicit.width, MAX_WIDTH),
+        (
+            "the size of the grids of model.implicit.encoding",
+            (implicit.encoding.grid()).map_or(0, GridConfig::parameters),
+            MAX_GRID_NUMBERS,
+        ),
         ("model.implicit.features", implicit.features, MAX_WIDTH),
         (
             "model.implicit.hidden_layers",
@@ -132,6 +140,7 @@ fn sizes(config: &TrainingConfig) -> Vec<(&'static str, usize, usize)> {
 mod tests {
     use super::*;
     use neat_gjp::JunctionCount;
+    use neat_sdf::PointEncoding;
 
     fn refusal(change: impl Fn(&mut TrainingConfig)) -> String {
         let mut config = TrainingConfig::default();
@@ -166,5 +175,15 @@ mod tests {
             junctions.contains("model.perceiver.junctions"),
             "{junctions}"
         );
+        let grid = refusal(|config| {
+            config.model.implicit.encoding = PointEncoding::Grid(GridConfig {
+                levels: 32,
+                features: 8,
+                log2_entries: 20,
+                coarsest: 256,
+                finest: 2048,
+            });
+        });
+        assert!(grid.contains("grids of model.implicit.encoding"), "{grid}");
     }
 }

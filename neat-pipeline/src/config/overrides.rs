@@ -229,6 +229,22 @@ mod tests {
     }
 
     #[test]
+    fn an_encoding_is_chosen_and_sized() {
+        let fast = crate::config::Preset::Fast.config();
+        let encoding = "model.implicit.encoding";
+        let kind = format!("{encoding}.kind=grid");
+        let levels = format!("{encoding}.levels=5");
+        let config = apply_overrides(&fast, &[kind, levels]).unwrap();
+        let grid = config.model.implicit.encoding.grid().expect("chosen");
+        assert_eq!(grid.levels, 5);
+        // As a run's folder keeps it.
+        let text = toml::to_string(&config).unwrap();
+        assert_eq!(toml::from_str::<Config>(&text).unwrap(), config);
+        let unknown = format!("{encoding}.levels=5");
+        apply_overrides(&fast, &[unknown]).unwrap_err();
+    }
+
+    #[test]
     fn rays_can_stop_by_themselves() {
         use neat_sdf::ray_sampler::StopRule;
         let stop = |config: &Config| match &config.train.sampler {

@@ -1,11 +1,11 @@
 //! Derivatives of the operations in `fused.rs`, by hand-written backward passes.
 
 use super::{
-    FusedNetworks, ReluRequest, SoftplusRequest, SoftplusTensors, read, relu_forward, slice,
-    softplus_forward, write,
+    FusedNetworks, ReluRequest, SoftplusRequest, SoftplusTensors, network_of, read, relu_forward,
+    slice, softplus_forward, write,
 };
 use crate::kernels::cpu::relu_network::{self, ReluNetwork, ReluShape};
-use crate::kernels::cpu::softplus_network::{self, SoftplusAdjoint, SoftplusNetwork};
+use crate::kernels::cpu::softplus_network::{self, SoftplusAdjoint};
 use crate::kernels::cpu::{KnownRows, Tape};
 use burn::backend::tensor::{Device as BackendDevice, FloatTensor};
 use burn::backend::{Backend, TensorMetadata};
@@ -33,34 +33,35 @@ type Adjoints = Arc<Mutex<[Option<TensorData>; 3]>>;
 #[derive(Clone, Debug)]
 struct SoftplusState<B: Backend> {
     points: FloatTensor<B>,
-    parameters: FloatTensor<B>,
+    /// Parameters and the grid's table.
+    learned: [FloatTensor<B>; 2],
     request: SoftplusRequest,
     adjoints: Adjoints,
     tape: Tape<softplus_network::Tape>,
 }
 
-impl<B: Backend> Backward<B, 2> for SoftplusOp {
+impl<B: Backend> Backward<B, 3> for SoftplusOp {
     type State = SoftplusState<B>;
 
     fn backward(
         self,
-        ops: Ops<Self::State, 2>,
+        ops: Ops<Self::State, 3>,
         gradients: &mut Gradients,
         _checkpointer: &mut Checkpointer,
     ) {
         let SoftplusState {
             points,
-            parameters,
+            learned,
             request,
             adjoints,
             tape,
         } = ops.state;
         let device = points.device();
         gradients.consume::<B>(&ops.node);
-        let (points, parameters) = (read::<B>(points), read::<B>(parameters));
+        let points = read::<B>(points);
         let points = slice(&points);
         let rows = points.len() / 3;
-        let network = SoftplusNetwork::new(Arch::new(), &request.shape, slice(&parameters));
+        let network = network_of::<B>(&request.shape, learned);
         let adjoints = std::mem::take(&mut *lock(&adjoints));
         // An output that nothing depends on has left none.
         let [first, gradient] = [(0, rows), (1, 3 * request.full_rows)].map(|(i, len)| {
@@ -73,17 +74,22 @@ impl<B: Backend> Backward<B, 2> for SoftplusOp {
             gradient: adjoint_or(1, &gradient),
             others: adjoint_or(2, &[]),
         };
-        let [of_points, of_parameters] = ops.parents.map(|node| Some(node?.id));
-        let (to_parameters, to_points) = network.backward(
+        let [of_points, of_parameters, of_table] = ops.parents.map(|node| Some(node?.id));
+        let gradient = network.backward(
             points,
             request.known.as_ref().map(KnownRows::as_known),
             adjoint,
             tape.take(),
             of_points.is_some(),
         );
-        register_flat::<B>(gradients, of_parameters, to_parameters, &device);
-        if let (Some(node), Some(to_points)) = (of_points, to_points) {
+        register_flat::<B>(gradients, of_parameters, gradient.parameters, &device);
+        if let (Some(node), Some(to_points)) = (of_points, gradient.points) {
             gradients.register::<B>(node, write::<B>(to_points, [rows, 3], &device));
+        }
+        if let (Some(node), Some(to_table)) = (of_table, gradient.table) {
+            let features = request.shape.grid.map_or(1, |grid| grid.features);
+            let entries = to_table.len() / features;
+            gradients.register::<B>(node, write::<B>(to_table, [entries, features], &device));
         }
     }
 }
@@ -204,10 +210,12 @@ impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodi
     fn softplus_network(
         points: FloatTensor<Self>,
         parameters: FloatTensor<Self>,
+        table: FloatTensor<Self>,
         request: SoftplusRequest,
     ) -> SoftplusTensors<Self> {
-        let nodes = [points.node(), parameters.node()];
-        let (points, parameters) = (points.into_primitive(), parameters.into_primitive());
+        let nodes = [points.node(), parameters.node(), table.node()];
+        let points = points.into_primitive();
+        let learned = [parameters.into_primitive(), table.into_primitive()];
         let device = points.device();
         let adjoints = Adjoints::default();
         let (operation, values) = match SoftplusOp.prepare::<C>(nodes).compute_bound().stateful() {
@@ -215,13 +223,13 @@ impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodi
                 let booking = (request.memory).book(request.shape.tape_bytes(request.full_rows));
                 let (values, tape) = softplus_forward::<B>(
                     points.clone(),
-                    parameters.clone(),
+                    learned.clone(),
                     &request,
                     booking.is_some(),
                 );
                 let state = SoftplusState {
                     points,
-                    parameters,
+                    learned,
                     request,
                     adjoints: Arc::clone(&adjoints),
                     tape: Tape::new(tape, booking),
@@ -229,7 +237,8 @@ impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodi
                 (prepared.finish(state, placeholder::<B>(&device)), values)
             }
             OpsKind::UnTracked(prepared) => {
-                let values = B::softplus_network(points, parameters, request);
+                let [parameters, table] = learned;
+                let values = B::softplus_network(points, parameters, table, request);
                 (prepared.finish(placeholder::<B>(&device)), values)
             }
         };

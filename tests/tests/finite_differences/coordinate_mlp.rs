@@ -1,6 +1,7 @@
 //! The network's gradient with respect to the point, and the gradients of losses
 //! of it with respect to every parameter.
 
+use crate::grid_encoding::random_grid;
 use burn::tensor::{DType, Tensor, TensorData};
 use neat_tensor::linear::LinearInit;
 use neat_tensor::parameters::{load_parameters, named_parameters};
@@ -22,6 +23,7 @@ const SHARPNESS: f64 = 100.0;
 #[derive(Clone, Copy, Debug)]
 struct Settings {
     octaves: usize,
+    grid: bool,
     skip: Option<usize>,
     weight_norm: bool,
 }
@@ -29,10 +31,12 @@ struct Settings {
 impl Settings {
     fn all() -> impl Iterator<Item = Self> {
         let skips = [None, Some(1), Some(2)];
-        [0, 2, 6].into_iter().flat_map(move |octaves| {
+        let encodings = [(0, false), (2, false), (6, false), (0, true), (2, true)];
+        encodings.into_iter().flat_map(move |(octaves, grid)| {
             skips.into_iter().flat_map(move |skip| {
                 [false, true].map(|weight_norm| Self {
                     octaves,
+                    grid,
                     skip,
                     weight_norm,
                 })
@@ -45,7 +49,8 @@ impl Settings {
         let encoding = PositionalEncoding {
             octaves: self.octaves,
         };
-        let encoded = encoding.output_width(3);
+        let grid = self.grid.then(|| random_grid(2));
+        let encoded = encoding.output_width(3) + grid.as_ref().map_or(0, |grid| grid.shape.width());
         let width = encoded + 5;
         let mut rng = stream(7, Purpose::Weights, 0);
         let layers = (0..=HIDDEN_LAYERS)
@@ -63,6 +68,7 @@ impl Settings {
         let network = CoordinateMlp {
             layers,
             octaves: self.octaves,
+            grid,
             skip: self.skip,
             sharpness: SHARPNESS,
             kernels: Kernels::default(),

@@ -3,5 +3,6 @@
 
 mod coordinate_mlp;
 mod elementwise;
+mod grid_encoding;
 mod losses;
 mod rendering;

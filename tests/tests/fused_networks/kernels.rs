@@ -1,6 +1,7 @@
 //! The kernels on every instruction set of this machine, and with any number of
 //! threads.
 
+use neat_tensor::kernels::cpu::grid::GridShape;
 use neat_tensor::kernels::cpu::layers::LayerShape;
 use neat_tensor::kernels::cpu::relu_network::{PartShape, ReluNetwork, ReluShape};
 use neat_tensor::kernels::cpu::softplus_network::{
@@ -38,16 +39,35 @@ fn count(layers: &[LayerShape]) -> usize {
 
 /// Everything that a softplus network computes, one list after the other.
 fn softplus_results(arch: Arch, rows: usize, full: usize, keep: bool) -> Vec<Vec<f32>> {
-    let mut layers = layers(&[ENCODED, 21, 19, 40, 5]);
-    layers[2].inputs += ENCODED;
+    // One dense and one hashed grid, whose cube does not hold all points.
+    let grid = GridShape::new(&[4, 9], 2, 256, 1.5);
+    let mut results = network_results(arch, rows, full, keep, None);
+    results.extend(network_results(arch, rows, full, keep, Some(grid)));
+    results
+}
+
+fn network_results(
+    arch: Arch,
+    rows: usize,
+    full: usize,
+    keep: bool,
+    grid: Option<GridShape>,
+) -> Vec<Vec<f32>> {
+    let encoded = ENCODED + grid.as_ref().map_or(0, GridShape::width);
+    let mut layers = layers(&[encoded, 21, 19, 40, 5]);
+    layers[2].inputs += encoded;
+    let table = grid
+        .as_ref()
+        .map_or(0, |grid| grid.entries() * grid.features);
     let shape = SoftplusShape {
         layers,
         octaves: OCTAVES,
+        grid,
         skip: Some(2),
         sharpness: 20.0,
     };
     let parameters = random(count(&shape.layers), 1, 0.3);
-    let network = SoftplusNetwork::new(arch, &shape, &parameters);
+    let network = SoftplusNetwork::new(arch, &shape, &parameters, random(table, 6, 0.3));
     let points = random(3 * rows, 2, 1.0);
     let (output, tape) = network.forward(&points[..3 * full], None, true, keep);
     let adjoint = SoftplusAdjoint {
@@ -55,7 +75,7 @@ fn softplus_results(arch: Arch, rows: usize, full: usize, keep: bool) -> Vec<Vec
         gradient: &random(3 * full, 4, 1.0),
         others: &random(4 * full, 5, 1.0),
     };
-    let (of_parameters, of_points) = network.backward(&points, None, adjoint, tape, true);
+    let gradient = network.backward(&points, None, adjoint, tape, true);
 
     // The same rows, known from a pass over twice as many.
     let twice = [&points[..], &points[..]].concat();
@@ -68,13 +88,14 @@ fn softplus_results(arch: Arch, rows: usize, full: usize, keep: bool) -> Vec<Vec
     let known_output = network
         .forward(&points[..3 * full], Some(known), true, false)
         .0;
-    let known_gradient = network
-        .backward(&points, Some(known), adjoint, None, false)
-        .0;
+    let known_gradient = network.backward(&points, Some(known), adjoint, None, false);
+    assert_eq!(known_gradient.points, None);
+    let of_table = gradient.table.unwrap_or_default();
     // Slopes of known rows come from the values, with another rounding.
     for (actual, truth) in [
         (&known_output.gradient, &output.gradient),
-        (&known_gradient, &of_parameters),
+        (&known_gradient.parameters, &gradient.parameters),
+        (&known_gradient.table.unwrap_or_default(), &of_table),
     ] {
         assert_relatively_close("known rows", &widen(actual), &widen(truth), 2e-5);
     }
@@ -93,8 +114,9 @@ fn softplus_results(arch: Arch, rows: usize, full: usize, keep: bool) -> Vec<Vec
         output.first,
         output.gradient,
         output.others,
-        of_parameters,
-        of_points.expect("asked for"),
+        gradient.parameters,
+        of_table,
+        gradient.points.expect("asked for"),
     ]
 }
 

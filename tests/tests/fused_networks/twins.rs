@@ -1,14 +1,14 @@
 //! The fused operations in float32 on each CPU backend against plain tensor
 //! operations in float64.
 
-use burn::module::Module;
+use burn::module::{Module, Param};
 use burn::tensor::{DType, Device, Tensor, TensorData};
 use neat_tensor::linear::LinearInit;
 use neat_tensor::parameters::{load_parameters, named_parameters};
 use neat_tensor::random::{Purpose, stream};
 use neat_tensor::{
-    CoordinateMlp, Field, FieldQuery, Kernels, KnownRows, Linear, Plain, PositionalEncoding,
-    ReluMlp, SampleInputs,
+    CoordinateMlp, Field, FieldQuery, GridConfig, GridEncoding, Kernels, KnownRows, Linear, Plain,
+    PositionalEncoding, ReluMlp, SampleInputs,
 };
 use neat_tests::backends::{flex, on_each_cpu_backend};
 use neat_tests::comparison::assert_relatively_close;
@@ -25,6 +25,8 @@ const OUTPUTS: usize = 5;
 #[derive(Clone, Copy, Debug)]
 struct Case {
     octaves: usize,
+    /// Levels and features of learned grids.
+    grid: Option<(usize, usize)>,
     skip: Option<usize>,
     weight_norm: bool,
     sharpness: f64,
@@ -34,10 +36,11 @@ struct Case {
     others: bool,
 }
 
-const CASES: [Case; 6] = [
+const CASES: [Case; 9] = [
     // One row; widths below and beside any vector's.
     Case {
         octaves: 0,
+        grid: None,
         skip: None,
         weight_norm: false,
         sharpness: 100.0,
@@ -48,6 +51,7 @@ const CASES: [Case; 6] = [
     },
     Case {
         octaves: 2,
+        grid: None,
         skip: Some(1),
         weight_norm: true,
         sharpness: 100.0,
@@ -58,6 +62,7 @@ const CASES: [Case; 6] = [
     },
     Case {
         octaves: 6,
+        grid: None,
         skip: Some(2),
         weight_norm: false,
         sharpness: 10.0,
@@ -69,6 +74,7 @@ const CASES: [Case; 6] = [
     // Some rows in full, some not.
     Case {
         octaves: 3,
+        grid: None,
         skip: None,
         weight_norm: false,
         sharpness: 100.0,
@@ -79,6 +85,7 @@ const CASES: [Case; 6] = [
     },
     Case {
         octaves: 1,
+        grid: None,
         skip: Some(1),
         weight_norm: true,
         sharpness: 30.0,
@@ -90,6 +97,7 @@ const CASES: [Case; 6] = [
     // Angles beyond what a short range reduction can do.
     Case {
         octaves: 16,
+        grid: None,
         skip: None,
         weight_norm: false,
         sharpness: 100.0,
@@ -98,14 +106,49 @@ const CASES: [Case; 6] = [
         light_rows: 0,
         others: true,
     },
+    // Learned grids, beside sines and alone, of all and of some rows.
+    Case {
+        octaves: 0,
+        grid: Some((3, 2)),
+        skip: None,
+        weight_norm: false,
+        sharpness: 20.0,
+        hidden: [24, 33, 16],
+        rows: 130,
+        light_rows: 0,
+        others: true,
+    },
+    Case {
+        octaves: 2,
+        grid: Some((2, 4)),
+        skip: Some(2),
+        weight_norm: true,
+        sharpness: 20.0,
+        hidden: [17, 33, 40],
+        rows: 97,
+        light_rows: 40,
+        others: false,
+    },
+    Case {
+        octaves: 1,
+        grid: Some((1, 8)),
+        skip: Some(1),
+        weight_norm: false,
+        sharpness: 20.0,
+        hidden: [40, 20, 60],
+        rows: 50,
+        light_rows: 49,
+        others: true,
+    },
 ];
 
 impl Case {
     fn network(&self, device: &Device) -> CoordinateMlp {
-        let encoded = PositionalEncoding {
+        let grid = self.grid(device);
+        let sines = PositionalEncoding {
             octaves: self.octaves,
-        }
-        .output_width(3);
+        };
+        let encoded = sines.output_width(3) + grid.as_ref().map_or(0, |grid| grid.shape.width());
         let mut rng = stream(3, Purpose::Weights, 0);
         let mut inputs = encoded;
         let layers = self
@@ -126,10 +169,31 @@ impl Case {
         CoordinateMlp {
             layers,
             octaves: self.octaves,
+            grid,
             skip: self.skip,
             sharpness: self.sharpness,
             kernels: Kernels::default(),
         }
+    }
+
+    /// Grids with entries of the size of their sums, the finest hashed.
+    fn grid(&self, device: &Device) -> Option<GridEncoding> {
+        let (levels, features) = self.grid?;
+        let config = GridConfig {
+            levels,
+            features,
+            log2_entries: 8,
+            coarsest: 3,
+            finest: 13,
+        };
+        let shape = config.shape(1.5);
+        let values = normal(shape.entries() * features, 4);
+        let values: Vec<f32> = values.into_iter().map(|x| 0.3 * x as f32).collect();
+        let table = TensorData::new(values, [shape.entries(), features]);
+        Some(GridEncoding {
+            table: Param::from_data(table, device),
+            shape,
+        })
     }
 
     /// Float32 numbers, so that both sides see the same.

@@ -13,6 +13,7 @@ pub mod arena;
 pub mod block;
 pub mod density;
 pub mod gemm;
+pub mod grid;
 mod kept;
 pub mod layers;
 pub mod relu_network;

@@ -1,6 +1,7 @@
 //! One block backwards: up through the adjoint of the reverse sweep, down through
 //! the adjoint of the forward pass.
 
+use super::block_encoding::{BlockEncoding, EncodingAdjoint};
 use super::block_forward::BlockTape;
 use super::{Known, POINT, SoftplusNetwork};
 use crate::kernels::cpu::arena::Arena;
@@ -23,12 +24,14 @@ pub(super) struct BlockJob<'a> {
     pub tape: Option<&'a mut [f32]>,
     /// Where the adjoint of the points goes.
     pub of_points: Option<&'a mut [f32]>,
+    /// Where that of the grid's features goes.
+    pub of_grid: Option<&'a mut [f32]>,
 }
 
 /// What both ways share.
 struct BlockPass<'a> {
     tape: BlockTape<'a>,
-    encoding: &'a mut [f32],
+    encoding: BlockEncoding<'a>,
     /// A matrix for concatenations.
     joined: &'a mut [f32],
     /// `s_l`, of all layers once the way up is done.
@@ -46,17 +49,17 @@ impl SoftplusNetwork {
     ) {
         let shape = &self.shape;
         let recompute = job.tape.is_none();
+        let derivatives = job.gradient.is_some() || job.of_points.is_some();
         let mut pass = BlockPass {
             tape: match job.tape {
                 Some(tape) => shape.cut_tape(&mut Arena::new(tape)),
                 None => shape.cut_tape(arena),
             },
-            encoding: arena.take(BLOCK_ROWS * padded(shape.encoded())),
+            encoding: self.encode(job.points, derivatives, arena),
             joined: arena.take(BLOCK_ROWS * widest(&shape.layers)),
             slopes: Vec::new(),
             through: Vec::new(),
         };
-        self.encode(job.points, pass.encoding);
         if recompute {
             let BlockPass {
                 tape,
@@ -65,7 +68,7 @@ impl SoftplusNetwork {
                 ..
             } = &mut pass;
             let slopes = match job.known {
-                None => self.activations(tape, encoding, joined, true, arena),
+                None => self.activations(tape, encoding.values, joined, true, arena),
                 Some(known) => {
                     self.recall(known, &mut tape.h);
                     self.slopes(&tape.h, arena)
@@ -85,9 +88,18 @@ impl SoftplusNetwork {
             first: job.first,
             others: job.others,
         };
-        let to_encoding = self.downwards(y, &mut pass, job.of_points.is_some(), sum, arena);
+        let wanted = job.of_points.is_some() || job.of_grid.is_some();
+        let to_encoding = self.downwards(y, &mut pass, wanted, sum, arena);
+        let adjoint = EncodingAdjoint {
+            encoding: to_encoding,
+            sweep: pass.tape.g_encoding,
+            gradient: job.gradient,
+        };
+        if let Some(of_grid) = job.of_grid {
+            self.to_grid(&adjoint, job.points.len() / POINT, of_grid);
+        }
         if let Some(of_points) = job.of_points {
-            self.to_points(&pass, to_encoding, job.gradient, of_points);
+            self.to_points(&pass.encoding, &adjoint, job.points, of_points);
         }
     }
 
@@ -112,14 +124,7 @@ impl SoftplusNetwork {
         let of_encoding = padded(shape.encoded());
         // ḡ_E, the adjoint of `g_encoding`.
         let tangent = arena.take(BLOCK_ROWS * of_encoding);
-        tangent.fill(0.0);
-        for ((tangent, encoding), n) in tangent
-            .chunks_exact_mut(of_encoding)
-            .zip(encoding.chunks_exact(of_encoding))
-            .zip(gradient.chunks_exact(POINT))
-        {
-            block::push_forward(encoding, n, shape.octaves, tangent);
-        }
+        self.push_forward(encoding, gradient, tangent);
         // p̄_l, then ū_l and ḡ_l.
         let p = arena.take(BLOCK_ROWS * widest(&shape.layers));
         let up = arena.take(BLOCK_ROWS * widest(&shape.layers));
@@ -178,12 +183,12 @@ impl SoftplusNetwork {
     }
 
     /// The adjoint of the forward pass: weight gradients, and what reaches the
-    /// encoding, all of it only where `to_points`.
+    /// encoding, all of it only where it is wanted.
     fn downwards<'a>(
         &self,
         adjoint_of: Outputs<'_>,
         pass: &mut BlockPass<'_>,
-        to_points: bool,
+        wanted: bool,
         sum: &mut WeightGradient<'_>,
         arena: &mut Arena<'a>,
     ) -> &'a [f32] {
@@ -230,12 +235,12 @@ impl SoftplusNetwork {
             let z = &mut adjoint[..BLOCK_ROWS * width];
             block::scale_and_add(arch, z, slopes[l], through.get(l).map(|t| &**t));
             block::add_column_sums(arch, z, width, sum.bias(l));
-            let (input, stride) = self.input(l, &tape.h, encoding, joined);
+            let (input, stride) = self.input(l, &tape.h, encoding.values, joined);
             let of_weight = sum.weight(l);
             add_outer_products(
                 arch, BLOCK_ROWS, z, width, outputs, input, stride, of_weight,
             );
-            if l == 0 && !to_points {
+            if l == 0 && !wanted {
                 break;
             }
             let weight = &self.packed.backward[l];
@@ -251,27 +256,6 @@ impl SoftplusNetwork {
             }
         }
         to_encoding
-    }
-
-    /// The adjoint of the points, from those of the encoding and of the gradient.
-    fn to_points(
-        &self,
-        pass: &BlockPass<'_>,
-        to_encoding: &[f32],
-        gradient: Option<&[f32]>,
-        of_points: &mut [f32],
-    ) {
-        let octaves = self.shape.octaves;
-        let stride = padded(self.shape.encoded());
-        for (r, out) in of_points.chunks_exact_mut(POINT).enumerate() {
-            let at = r * stride..(r + 1) * stride;
-            let encoding = &pass.encoding[at.clone()];
-            block::add_pull_back(encoding, &to_encoding[at.clone()], POINT, octaves, out);
-            if let Some(gradient) = gradient {
-                let n = &gradient[r * POINT..(r + 1) * POINT];
-                block::add_curvature(encoding, &pass.tape.g_encoding[at], n, octaves, out);
-            }
-        }
     }
 }
 

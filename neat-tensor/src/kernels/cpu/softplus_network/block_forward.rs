@@ -1,6 +1,6 @@
 //! One block forwards: activations of all layers, and the reverse sweep.
 
-use super::{Known, POINT, SoftplusNetwork, SoftplusShape};
+use super::{Known, SoftplusNetwork, SoftplusShape};
 use crate::kernels::cpu::arena::Arena;
 use crate::kernels::cpu::gemm::multiply;
 use crate::kernels::cpu::layers::{cut_block, widest};
@@ -117,26 +117,6 @@ impl SoftplusNetwork {
         }
     }
 
-    /// The encoding of a block's points; rows beyond them repeat the origin.
-    pub(super) fn encode(&self, points: &[f32], encoding: &mut [f32]) {
-        let mut block = [0.0; BLOCK_ROWS * POINT];
-        block[..points.len()].copy_from_slice(points);
-        let stride = padded(self.shape.encoded());
-        block::encode(
-            self.arch,
-            BLOCK_ROWS,
-            &block,
-            POINT,
-            self.shape.octaves,
-            encoding,
-            stride,
-            0,
-        );
-        for row in encoding.chunks_exact_mut(stride) {
-            row[self.shape.encoded()..].fill(0.0);
-        }
-    }
-
     pub(super) fn block_forward(
         &self,
         points: &[f32],
@@ -147,12 +127,13 @@ impl SoftplusNetwork {
     ) {
         let shape = &self.shape;
         let (arch, hidden) = (self.arch, shape.hidden());
-        let rows = points.len() / POINT;
-        let encoding = arena.take(BLOCK_ROWS * padded(shape.encoded()));
+        let encoding = self.encode(points, wanted.gradient.is_some(), arena);
         let joined = arena.take(BLOCK_ROWS * widest(&shape.layers));
-        self.encode(points, encoding);
         let slopes = match known {
-            None => self.activations(tape, encoding, joined, wanted.gradient.is_some(), arena),
+            None => {
+                let slopes = wanted.gradient.is_some();
+                self.activations(tape, encoding.values, joined, slopes, arena)
+            }
             Some(known) => {
                 self.recall(known, &mut tape.h);
                 self.slopes(&tape.h, arena)
@@ -200,15 +181,7 @@ impl SoftplusNetwork {
             return;
         };
         self.sweep(tape, &slopes, joined, arena);
-        let stride = padded(shape.encoded());
-        for ((out, encoding), g) in gradient
-            .chunks_exact_mut(POINT)
-            .zip(encoding.chunks_exact(stride))
-            .zip(tape.g_encoding.chunks_exact(stride))
-            .take(rows)
-        {
-            block::add_pull_back(encoding, g, POINT, shape.octaves, out);
-        }
+        self.pull_back(&encoding, tape.g_encoding, gradient);
     }
 
     /// Fills `h` of the tape; gives the slopes of all layers where `slopes`.

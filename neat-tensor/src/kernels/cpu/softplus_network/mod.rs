@@ -16,6 +16,7 @@
 //! through the adjoint of the forward pass.
 
 mod block_backward;
+mod block_encoding;
 mod block_forward;
 
 use block_backward::BlockJob;
@@ -23,11 +24,13 @@ use block_forward::{BlockTape, Wanted};
 
 use super::arena::{Arena, Pooled, with_arena};
 use super::gemm::Panels;
+use super::grid::GridShape;
 use super::layers::{LayerShape, PackedLayers, block_size, cut_block, per_block, widest};
 use super::weight_gradient::sum_over_blocks;
 use super::{BLOCK_ROWS, padded};
 use pulp::Arch;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Coordinates of a point.
 const POINT: usize = 3;
@@ -39,6 +42,8 @@ pub struct SoftplusShape {
     pub layers: Vec<LayerShape>,
     /// Frequencies of the encoding of the point.
     pub octaves: usize,
+    /// Learned grids whose features follow the sines in the encoding, if any.
+    pub grid: Option<GridShape>,
     /// Index of the layer whose input is `[h, encoding] / √2`, if any.
     pub skip: Option<usize>,
     /// Sharpness β of the softplus.
@@ -51,6 +56,8 @@ pub struct SoftplusNetwork {
     shape: SoftplusShape,
     arch: Arch,
     packed: PackedLayers,
+    /// The grid's table, `[entries, features]`; empty without one.
+    table: Vec<f32>,
     /// The first output's column of the last layer, as right operand.
     first_forward: Panels,
     /// … its row, as right operand of one-column left operands.
@@ -99,6 +106,17 @@ pub struct SoftplusAdjoint<'a> {
     pub others: &'a [f32],
 }
 
+/// What a backward pass says.
+#[derive(Debug)]
+pub struct SoftplusGradient {
+    /// Of the parameters, in the order of [`SoftplusNetwork::new`].
+    pub parameters: Vec<f32>,
+    /// Of the grid's table, if there is one.
+    pub table: Option<Vec<f32>>,
+    /// Of the points `[N, 3]`, where asked for.
+    pub points: Option<Vec<f32>>,
+}
+
 /// Activations of a forward pass, block after block.
 #[derive(Debug)]
 pub struct Tape(Pooled);
@@ -122,8 +140,17 @@ impl SoftplusShape {
         &self.layers[..self.hidden()]
     }
 
-    fn encoded(&self) -> usize {
+    /// Columns of the encoding without the grid's features.
+    fn waves(&self) -> usize {
         POINT * (1 + 2 * self.octaves)
+    }
+
+    fn grid_width(&self) -> usize {
+        self.grid.as_ref().map_or(0, GridShape::width)
+    }
+
+    fn encoded(&self) -> usize {
+        self.waves() + self.grid_width()
     }
 
     /// Numbers of a block's activations.
@@ -142,7 +169,8 @@ impl SoftplusShape {
         let (hidden, widest) = (self.hidden(), widest(&self.layers));
         // Slopes and second-order terms of all layers, encoding and its adjoints,
         // and a handful of matrices of the widest layer; a tape where none is kept.
-        BLOCK_ROWS * ((2 * hidden + 6) * widest + 4 * padded(self.encoded())) + self.block_tape()
+        let encodings = 4 * padded(self.encoded()) + POINT * self.grid_width();
+        BLOCK_ROWS * ((2 * hidden + 6) * widest + encodings) + self.block_tape()
     }
 
     /// Bytes that the tape of `rows` rows takes.
@@ -158,11 +186,18 @@ impl SoftplusShape {
 
 impl SoftplusNetwork {
     /// Packs `parameters`: of each layer the weight `[outputs, inputs]`, row-major,
-    /// then the bias.
+    /// then the bias. `table` `[entries, features]` is that of the grid, if there is one.
     ///
     /// # Panics
     /// If they do not fit the shape.
-    pub fn new(arch: Arch, shape: &SoftplusShape, parameters: &[f32]) -> Self {
+    pub fn new(arch: Arch, shape: &SoftplusShape, parameters: &[f32], table: Vec<f32>) -> Self {
+        if let Some(grid) = &shape.grid {
+            assert_eq!(
+                table.len(),
+                grid.entries() * grid.features,
+                "SoftplusNetwork::new: the table does not fit the grid"
+            );
+        }
         let packed = PackedLayers::new(arch, &shape.layers, parameters);
         let last = shape.layers[shape.hidden()];
         let first_row = &parameters[parameters.len() - last.parameters()..][..last.inputs];
@@ -172,6 +207,7 @@ impl SoftplusNetwork {
             shape: shape.clone(),
             arch,
             packed,
+            table,
             first_forward: Panels::new(arch, last.inputs, 1, |k, _| first_row[k]),
             first_backward: Panels::new(arch, 1, last.inputs, |_, c| first_row[c]),
             first_row: padded_row,
@@ -274,8 +310,7 @@ impl SoftplusNetwork {
         self.shape.layers[self.shape.hidden()].outputs - 1
     }
 
-    /// The gradient of `Σ output · adjoint` with respect to the parameters, in the
-    /// order of [`Self::new`], and with respect to the points `[N, 3]` where
+    /// The gradient of `Σ output · adjoint`, with respect to the points where
     /// `to_points`. The tape of the first `H` rows, and known rows, spare computing
     /// them again.
     pub fn backward(
@@ -285,7 +320,7 @@ impl SoftplusNetwork {
         adjoint: SoftplusAdjoint<'_>,
         tape: Option<Tape>,
         to_points: bool,
-    ) -> (Vec<f32>, Option<Vec<f32>>) {
+    ) -> SoftplusGradient {
         let rows = points.len() / POINT;
         let heavy = adjoint.gradient.len() / POINT;
         let mut tape = tape.map(|Tape(tape)| tape);
@@ -306,8 +341,12 @@ impl SoftplusNetwork {
             to_point_blocks.extend(tail.chunks_mut(BLOCK_ROWS * POINT).map(Some));
         }
         let mut to_point_blocks = to_point_blocks.into_iter();
-        let jobs: Vec<BlockJob<'_>> = blocks_of(0, heavy)
-            .chain(blocks_of(heavy, rows))
+        let ranges: Vec<Range<usize>> = blocks_of(0, heavy).chain(blocks_of(heavy, rows)).collect();
+        let of_grid_block = 2 * BLOCK_ROWS * self.shape.grid_width();
+        let mut of_grid = Pooled::take(ranges.len() * of_grid_block);
+        let mut to_grid_blocks = of_grid.as_mut_slice().chunks_mut(of_grid_block.max(1));
+        let jobs: Vec<BlockJob<'_>> = ranges
+            .iter()
             .map(|range| BlockJob {
                 points: &points[range.start * POINT..range.end * POINT],
                 known: known.map(|known| known.block(range.start, range.len())),
@@ -320,6 +359,7 @@ impl SoftplusNetwork {
                 }),
                 tape: tapes.as_mut().and_then(Iterator::next),
                 of_points: to_point_blocks.next().flatten(),
+                of_grid: to_grid_blocks.next(),
             })
             .collect();
         let sum = sum_over_blocks(&self.shape.layers, jobs, |job, sum| {
@@ -327,6 +367,10 @@ impl SoftplusNetwork {
                 self.block_backward(job, sum, arena);
             });
         });
-        (sum, to_points.then_some(of_points))
+        SoftplusGradient {
+            parameters: sum,
+            table: self.table_gradient(points, adjoint.gradient, &ranges, of_grid.as_slice()),
+            points: to_points.then_some(of_points),
+        }
     }
 }
