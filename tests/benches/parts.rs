@@ -15,13 +15,13 @@ use neat_core::LineSegment2;
 use neat_core::assignment::assign;
 use neat_field::attraction_region::AttractionRegions;
 use neat_pipeline::config::Preset;
-use neat_sdf::RayBundle;
 use neat_sdf::ray_sampler::Deterministic;
+use neat_sdf::{PointEncoding, RayBundle};
 use neat_tensor::host::host_vec;
-use neat_tensor::{CoordinateMlp, Field, FieldQuery, Plain};
+use neat_tensor::{CoordinateMlp, Field, FieldQuery, GridConfig, Plain};
 use neat_tests::finite_differences::normal;
 use neat_train::flops::{StepFlops, StepRows};
-use neat_train::model::NeatModel;
+use neat_train::model::{ModelConfig, NeatModel};
 use rayon::prelude::*;
 
 const PRESETS: [Preset; 2] = [Preset::Fast, Preset::PaperAbc];
@@ -47,9 +47,35 @@ fn yardstick(bencher: Bencher) {
         .bench_local(|| a.clone().matmul(a.clone()));
 }
 
-/// The distance network of a preset.
+/// Distance networks.
 mod network {
     use super::*;
+
+    #[derive(Clone, Copy, Debug)]
+    enum Network {
+        Fast,
+        /// The fast preset's with learned grids, one layer and no sines.
+        Grid,
+        PaperAbc,
+    }
+
+    const NETWORKS: [Network; 3] = [Network::Fast, Network::Grid, Network::PaperAbc];
+
+    impl Network {
+        fn config(self) -> ModelConfig {
+            let preset = match self {
+                Self::Fast | Self::Grid => Preset::Fast,
+                Self::PaperAbc => Preset::PaperAbc,
+            };
+            let mut config = preset.config().model;
+            if let Self::Grid = self {
+                config.implicit.encoding = PointEncoding::Grid(GridConfig::default());
+                config.implicit.octaves = 0;
+                config.implicit.hidden_layers = 1;
+            }
+            config
+        }
+    }
 
     struct Setting {
         mlp: CoordinateMlp,
@@ -57,12 +83,12 @@ mod network {
         flops: StepFlops,
     }
 
-    fn setting(preset: Preset) -> Setting {
-        let rows = match preset {
-            Preset::Fast => 3072,
-            _ => 12_288,
+    fn setting(network: Network) -> Setting {
+        let rows = match network {
+            Network::Fast | Network::Grid => 3072,
+            Network::PaperAbc => 12_288,
         };
-        let config = preset.config().model;
+        let config = network.config();
         let device = Device::flex().autodiff();
         let counted = StepRows {
             sampler: rows,
@@ -71,7 +97,7 @@ mod network {
         };
         Setting {
             mlp: NeatModel::new(&config, 1.0, 0, &device)
-                .expect("a preset")
+                .expect("sizes that go together")
                 .implicit_network
                 .mlp,
             points: matrix(rows, 3, &device),
@@ -97,51 +123,51 @@ mod network {
         divan::black_box(loss.backward());
     }
 
-    #[divan::bench(args = PRESETS, sample_count = 10, sample_size = 1)]
-    fn distance_fused(bencher: Bencher, preset: Preset) {
-        let Setting { mlp, points, flops } = setting(preset);
-        let network = mlp.on_host().expect("a CPU backend");
+    #[divan::bench(args = NETWORKS, sample_count = 10, sample_size = 1)]
+    fn distance_fused(bencher: Bencher, network: Network) {
+        let Setting { mlp, points, flops } = setting(network);
+        let on_host = mlp.on_host().expect("a CPU backend");
         let points = host_vec(points);
         bencher
             .counter(items(flops.sampler))
-            .bench_local(|| network.first(&points));
+            .bench_local(|| on_host.first(&points));
     }
 
-    #[divan::bench(args = PRESETS, sample_count = 3, sample_size = 1)]
-    fn distance_plain(bencher: Bencher, preset: Preset) {
-        let Setting { mlp, points, flops } = setting(preset);
+    #[divan::bench(args = NETWORKS, sample_count = 3, sample_size = 1)]
+    fn distance_plain(bencher: Bencher, network: Network) {
+        let Setting { mlp, points, flops } = setting(network);
         bencher
             .counter(items(flops.sampler))
             .bench_local(|| mlp.forward(points.clone()).narrow(1, 0, 1));
     }
 
-    #[divan::bench(args = PRESETS, sample_count = 10, sample_size = 1)]
-    fn gradient_fused(bencher: Bencher, preset: Preset) {
-        let Setting { mlp, points, flops } = setting(preset);
+    #[divan::bench(args = NETWORKS, sample_count = 10, sample_size = 1)]
+    fn gradient_fused(bencher: Bencher, network: Network) {
+        let Setting { mlp, points, flops } = setting(network);
         bencher
             .counter(items(flops.forward))
             .bench_local(|| mlp.field(points.clone(), query()));
     }
 
-    #[divan::bench(args = PRESETS, sample_count = 3, sample_size = 1)]
-    fn gradient_plain(bencher: Bencher, preset: Preset) {
-        let Setting { mlp, points, flops } = setting(preset);
+    #[divan::bench(args = NETWORKS, sample_count = 3, sample_size = 1)]
+    fn gradient_plain(bencher: Bencher, network: Network) {
+        let Setting { mlp, points, flops } = setting(network);
         bencher
             .counter(items(flops.forward))
             .bench_local(|| mlp.field_by(&Plain, points.clone(), query()));
     }
 
-    #[divan::bench(args = PRESETS, sample_count = 10, sample_size = 1)]
-    fn training_fused(bencher: Bencher, preset: Preset) {
-        let Setting { mlp, points, flops } = setting(preset);
+    #[divan::bench(args = NETWORKS, sample_count = 10, sample_size = 1)]
+    fn training_fused(bencher: Bencher, network: Network) {
+        let Setting { mlp, points, flops } = setting(network);
         bencher
             .counter(items(flops.forward + flops.backward))
             .bench_local(|| backward(mlp.field(points.clone(), query())));
     }
 
-    #[divan::bench(args = PRESETS, sample_count = 3, sample_size = 1)]
-    fn training_plain(bencher: Bencher, preset: Preset) {
-        let Setting { mlp, points, flops } = setting(preset);
+    #[divan::bench(args = NETWORKS, sample_count = 3, sample_size = 1)]
+    fn training_plain(bencher: Bencher, network: Network) {
+        let Setting { mlp, points, flops } = setting(network);
         bencher
             .counter(items(flops.forward + flops.backward))
             .bench_local(|| backward(mlp.field_by(&Plain, points.clone(), query())));
