@@ -31,7 +31,7 @@ pub struct GridConfig {
 }
 
 impl Default for GridConfig {
-    /// Of six sizes in short runs on two scenes the one with the best renderings
+    /// Of five sizes in short runs on two scenes the one with the best renderings
     /// (docs/performance.md).
     fn default() -> Self {
         Self {

@@ -176,6 +176,7 @@ mod tests {
             "{junctions}"
         );
         let grid = refusal(|config| {
+            config.model.implicit.skip_layer = 0;
             config.model.implicit.encoding = PointEncoding::Grid(GridConfig {
                 levels: 32,
                 features: 8,
