@@ -49,7 +49,14 @@ impl Place {
     /// The weights of near and far side, per axis.
     #[inline(always)]
     pub fn sides(&self) -> [[Lane; 2]; POINT] {
-        self.far.map(|far| [far.map(|far| 1.0 - far), far])
+        let mut sides = [[[0.0; LANES]; 2]; POINT];
+        for axis in 0..POINT {
+            for r in 0..LANES {
+                sides[axis][0][r] = 1.0 - self.far[axis][r];
+            }
+            sides[axis][1] = self.far[axis];
+        }
+        sides
     }
 }
 
@@ -60,7 +67,8 @@ fn corners(level: &GridLevel, cell: &[[u32; LANES]; POINT]) -> [[u32; LANES]; CO
         None => {
             let side = level.cells + 1;
             for (c, corner) in corners.iter_mut().enumerate() {
-                let [i, j, k] = sides_of(c).map(|side| side as u32);
+                let [i, j, k] = sides_of(c);
+                let (i, j, k) = (i as u32, j as u32, k as u32);
                 for r in 0..LANES {
                     let [x, y, z] = [cell[0][r] + i, cell[1][r] + j, cell[2][r] + k];
                     corner[r] = (z * side + y) * side + x;
@@ -69,7 +77,8 @@ fn corners(level: &GridLevel, cell: &[[u32; LANES]; POINT]) -> [[u32; LANES]; CO
         }
         Some(mask) => {
             for (c, corner) in corners.iter_mut().enumerate() {
-                let [i, j, k] = sides_of(c).map(|side| side as u32);
+                let [i, j, k] = sides_of(c);
+                let (i, j, k) = (i as u32, j as u32, k as u32);
                 for r in 0..LANES {
                     let y = (cell[1][r] + j).wrapping_mul(HASH[0]);
                     let z = (cell[2][r] + k).wrapping_mul(HASH[1]);

@@ -145,7 +145,7 @@ impl<const F: usize> Scatter<'_, F> {
         for (r, feature) in of_features[..points.len()].iter().enumerate() {
             for c in 0..CORNERS {
                 let weight = weights[c][r];
-                self.add(place.corners[c][r], |f| weight * feature[f]);
+                self.add(place.corners[c][r], weight, feature);
             }
         }
     }
@@ -174,17 +174,18 @@ impl<const F: usize> Scatter<'_, F> {
             for c in 0..CORNERS {
                 let (weight, change) = (weights[c][r], changes[c][r]);
                 let corner = place.corners[c][r];
-                self.add(corner, |f| weight * feature[f] + change * sweep[f]);
+                self.add(corner, weight, feature);
+                self.add(corner, change, sweep);
             }
         }
     }
 
-    /// Adds to an entry, if it is one of these.
+    /// Adds `factor` times `value` to an entry, if it is one of these.
     #[inline(always)]
-    fn add(&mut self, corner: u32, value: impl Fn(usize) -> f32) {
+    fn add(&mut self, corner: u32, factor: f32, value: &[f32; F]) {
         if let Some(entry) = self.out.get_mut((corner as usize).wrapping_sub(self.first)) {
             for f in 0..F {
-                entry[f] += value(f);
+                entry[f] += factor * value[f];
             }
         }
     }
