@@ -6,7 +6,7 @@
 //! what is interpolated is continuous. Outside the grids everything is as at their
 //! border.
 //!
-//! Points are taken [`LANES`] at a time: places, weights and interpolation are then
+//! Points are taken `LANES` at a time: places, weights and interpolation are then
 //! vectors along the points, and only the entries of the table are read one by one.
 
 mod curvature;
