@@ -12,6 +12,11 @@ use rayon::prelude::*;
 /// Explanations whose scores differ less are equally good: the simpler holds.
 const EQUALLY: f64 = 0.95;
 
+/// Factors of focal lengths that are tried: 7 % between them, 1 among them.
+pub(crate) fn focal_factors() -> impl Iterator<Item = f64> {
+    (-14..=14).map(|step| 1.07_f64.powi(step))
+}
+
 impl Diagnosis<'_> {
     pub fn try_out(
         &self,
@@ -96,16 +101,12 @@ impl Diagnosis<'_> {
 
     /// The factor of the focal lengths that explains most.
     fn best_focal(&self, cameras: &[Camera], trusted: &[bool]) -> Candidate {
-        const STEPS: i32 = 14;
-        const STEP: f64 = 1.07;
         // In another unit, such as millimetres, they are anything: a normal lens is looked for.
         let start = match field_of_view(&cameras[0]) {
             angle if is_usual(angle) => 1.0,
             _ => f64::from(cameras[0].width) / cameras[0].intrinsics.fx,
         };
-        let scales: Vec<f64> = (-STEPS..=STEPS)
-            .map(|step| start * STEP.powi(step))
-            .collect();
+        let scales: Vec<f64> = focal_factors().map(|factor| start * factor).collect();
         self.best_along(&scales, Hypothesis::FocalScale, cameras, trusted)
     }
 

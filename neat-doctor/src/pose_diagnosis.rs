@@ -79,9 +79,8 @@ impl Limits {
 }
 
 fn in_frame_of_files(scene: &Scene, camera: Camera) -> Camera {
-    let frame = &scene.original_from_world;
     Camera {
-        center_in_world: frame.scale * camera.center_in_world + frame.translation,
+        center_in_world: scene.original_from_world.apply(&camera.center_in_world),
         ..camera
     }
 }

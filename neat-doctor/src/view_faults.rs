@@ -1,6 +1,7 @@
 //! Why the poses of single views do not fit their images.
 
 use crate::agreement::Agreement;
+use crate::explanations::focal_factors;
 use crate::hypothesis::Hypothesis;
 use crate::pose_diagnosis::Diagnosis;
 use neat_core::Camera;
@@ -12,10 +13,6 @@ pub(crate) enum ViewFault {
     /// Its camera alone is to be changed like this.
     Camera(Hypothesis),
 }
-
-/// Factors of the focal length of one view; 7 % between them, as for all views.
-const FOCAL_STEPS: i32 = 14;
-const FOCAL_STEP: f64 = 1.07;
 
 impl Diagnosis<'_> {
     /// What would make the image of a bad view fit at least half as well as those of the
@@ -46,8 +43,8 @@ impl Diagnosis<'_> {
             (ViewFault::PoseOf(other), camera)
         });
         let turned = (1..4).map(Hypothesis::TurnedImages);
-        let focal = (-FOCAL_STEPS..=FOCAL_STEPS).filter(|step| *step != 0);
-        let focal = focal.map(|step| Hypothesis::FocalScale(FOCAL_STEP.powi(step)));
+        let focal = focal_factors().filter(|factor| *factor != 1.0);
+        let focal = focal.map(Hypothesis::FocalScale);
         let changed = turned.chain(focal).map(|hypothesis| {
             let camera = hypothesis.cameras(&[own], &[""])[0];
             (ViewFault::Camera(hypothesis), camera)

@@ -3,7 +3,7 @@
 //! These are plain tensor operations: the readable twin of [`crate::kernels::cpu::grid`],
 //! which says what is interpolated how.
 
-use crate::kernels::cpu::grid::{GridLevel, GridShape, HASH};
+use crate::kernels::cpu::grid::{GridLevel, GridShape, HASH, sides_of};
 use crate::linear::NetworkSizeError;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Int, Tensor, TensorData};
@@ -229,9 +229,4 @@ fn corners(level: &GridLevel, cell: Tensor<2>) -> Vec<Tensor<1, Int>> {
         entry.add_scalar(level.first as i64)
     };
     (0..8).map(corner).collect()
-}
-
-/// On which side of each axis corner `c` lies: 0 near, 1 far.
-fn sides_of(c: usize) -> [usize; 3] {
-    [c & 1, c >> 1 & 1, c >> 2]
 }

@@ -15,6 +15,7 @@ mod place;
 mod scatter;
 mod shape;
 
+pub(crate) use place::sides_of;
 pub use scatter::GridAdjoint;
 pub(crate) use shape::HASH;
 pub use shape::{GridLevel, GridShape};

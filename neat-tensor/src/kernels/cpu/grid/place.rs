@@ -92,6 +92,6 @@ fn corners(level: &GridLevel, cell: &[[u32; LANES]; POINT]) -> [[u32; LANES]; CO
 
 /// On which side of each axis corner `c` lies: 0 near, 1 far.
 #[inline(always)]
-pub(super) fn sides_of(c: usize) -> [usize; POINT] {
+pub(crate) fn sides_of(c: usize) -> [usize; POINT] {
     [c & 1, c >> 1 & 1, c >> 2]
 }

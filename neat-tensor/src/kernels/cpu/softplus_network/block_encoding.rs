@@ -39,14 +39,14 @@ impl SoftplusNetwork {
         block[..points.len()].copy_from_slice(points);
         let (arch, octaves, stride) = (self.arch, shape.octaves, padded(shape.encoded()));
         let values = arena.take(BLOCK_ROWS * stride);
-        let derivatives = BLOCK_ROWS * POINT * if derivatives { shape.grid_width() } else { 0 };
-        let jacobian = arena.take(derivatives);
+        let features = if derivatives { shape.grid_width() } else { 0 };
+        let jacobian = arena.take(BLOCK_ROWS * POINT * features);
         block::encode(arch, BLOCK_ROWS, &block, POINT, octaves, values, stride, 0);
         for row in values.chunks_exact_mut(stride) {
             row[shape.encoded()..].fill(0.0);
         }
         if let Some(grid) = &shape.grid {
-            let wanted = (derivatives > 0).then_some(&mut *jacobian);
+            let wanted = (features > 0).then_some(&mut *jacobian);
             let at = shape.waves();
             grid.encode(arch, &block, &self.table, values, stride, at, wanted);
         }
