@@ -67,10 +67,8 @@ pub fn segments(map: &GrayImage) -> Vec<LineSegment2> {
     lines.thin();
     lines.cut_corners();
     let mut segments = Vec::new();
-    for chain in lines.chains() {
-        split(&chain, &mut segments);
-    }
-    segments.retain(|segment| segment.length() >= MIN_LENGTH);
+    let width = lines.width;
+    lines.for_each_chain(|chain| split(chain, width, &mut segments));
     segments
 }
 
@@ -95,36 +93,49 @@ impl Mask {
         NEIGHBORS.map(|[x, y]| index.wrapping_add_signed(y * self.width as isize + x))
     }
 
-    fn indices(&self) -> Vec<usize> {
-        (0..self.set.len())
-            .filter(|&index| self.set[index])
-            .collect()
-    }
-
-    /// Thins lines to one pixel.
+    /// Thins lines to one pixel. Only what has a neighbour that is not set can go: the inside of
+    /// what is wide is left alone until its border has come that far.
     fn thin(&mut self) {
-        let mut candidates = self.indices();
+        let mut border: Vec<usize> = (0..self.set.len())
+            .filter(|&index| self.set[index] && self.is_at_border(index))
+            .collect();
         for _ in 0..MAX_THINNING {
-            let before = candidates.len();
+            let mut changed = false;
             for first_pass in [true, false] {
-                let removed: Vec<usize> = (candidates.iter().copied())
+                let removed: Vec<usize> = (border.iter().copied())
                     .filter(|&index| self.is_removable(index, first_pass))
                     .collect();
+                changed |= !removed.is_empty();
+                // What has had such a neighbour before is in the list already.
+                let mut bared: Vec<usize> = (removed.iter())
+                    .flat_map(|&index| self.neighbors(index))
+                    .filter(|&index| self.set[index] && !self.is_at_border(index))
+                    .collect();
+                bared.sort_unstable();
+                bared.dedup();
                 for index in removed {
                     self.set[index] = false;
                 }
-                candidates.retain(|&index| self.set[index]);
+                border.retain(|&index| self.set[index]);
+                border.extend(bared);
             }
-            if candidates.len() == before {
+            if !changed {
                 return;
             }
         }
     }
 
+    fn is_at_border(&self, index: usize) -> bool {
+        !self.neighbors(index).iter().all(|&at| self.set[at])
+    }
+
     /// Takes the corners out of staircases, which thinning leaves: they have three
     /// neighbours like a branch, but what they join touches without them.
     fn cut_corners(&mut self) {
-        for index in self.indices() {
+        for index in 0..self.set.len() {
+            if !self.set[index] {
+                continue;
+            }
             let around = self.neighbors(index).map(|neighbor| self.set[neighbor]);
             // Two sides that touch each other, and nothing on the other side.
             let is_corner = (0..8).step_by(2).any(|side| {
@@ -153,38 +164,33 @@ impl Mask {
         (2..=6).contains(&count) && rises == 1 && open
     }
 
-    /// The lines as chains of pixel positions: from ends and branches first, then
-    /// what is left, which is closed.
-    fn chains(mut self) -> Vec<Vec<Vector2<f64>>> {
-        let indices = self.indices();
-        let mut nodes = vec![false; self.set.len()];
-        for &index in &indices {
-            let around = self.neighbors(index);
-            nodes[index] = around.iter().filter(|&&at| self.set[at]).count() != 2;
-        }
-        let mut chains = Vec::new();
-        for &start in indices.iter().filter(|&&index| nodes[index]) {
+    /// Tells the lines as chains of pixels, one after the other: from ends and branches first,
+    /// then what is left, which is closed.
+    fn for_each_chain(mut self, mut tell: impl FnMut(&[usize])) {
+        let is_node = |index: usize| {
+            let set = |at: &usize| self.set[*at];
+            set(&index) && self.neighbors(index).iter().filter(|at| set(at)).count() != 2
+        };
+        let nodes: Vec<bool> = (0..self.set.len()).map(is_node).collect();
+        for start in 0..self.set.len() {
+            if !nodes[start] {
+                continue;
+            }
             for next in self.neighbors(start) {
                 if self.set[next] && !nodes[next] {
-                    chains.push(self.walk(start, next, &nodes));
+                    tell(&self.walk(start, next, &nodes));
                 }
             }
         }
-        for &start in &indices {
+        for start in 0..self.set.len() {
             if self.set[start] && !nodes[start] {
                 self.set[start] = false;
                 let mut around = self.neighbors(start).into_iter();
-                let next = around.find(|&next| self.set[next]);
-                chains.extend(next.map(|next| self.walk(start, next, &nodes)));
+                if let Some(next) = around.find(|&next| self.set[next]) {
+                    tell(&self.walk(start, next, &nodes));
+                }
             }
         }
-        let width = self.width;
-        let position =
-            |index: usize| Vector2::new((index % width) as f64 - 1.0, (index / width) as f64 - 1.0);
-        chains
-            .into_iter()
-            .map(|chain| chain.into_iter().map(position).collect())
-            .collect()
     }
 
     /// Follows and erases a line from `start` over `next` to the next node.
@@ -212,24 +218,27 @@ impl Mask {
     }
 }
 
-/// Splits a chain into straight pieces, in order.
-fn split(chain: &[Vector2<f64>], segments: &mut Vec<LineSegment2>) {
+/// Splits a chain into straight pieces, in order, and keeps those that are long enough.
+fn split(chain: &[usize], width: usize, segments: &mut Vec<LineSegment2>) {
+    let position =
+        |index: usize| Vector2::new((index % width) as f64 - 1.0, (index / width) as f64 - 1.0);
     // A stack, not recursion: a file must not decide how deep it goes.
     let mut pieces = vec![chain];
     while let Some(piece) = pieces.pop() {
-        let [first, .., last] = piece else {
+        let &[first, .., last] = piece else {
             continue;
         };
-        let chord = LineSegment2::new(*first, *last);
+        let chord = LineSegment2::new(position(first), position(last));
         let farthest = (piece.iter().enumerate())
-            .map(|(index, point)| (chord.distance_to_point(point), index))
+            .map(|(at, &index)| (chord.distance_to_point(&position(index)), at))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         match farthest {
-            Some((distance, index)) if distance > STRAIGHT => {
-                pieces.push(&piece[index..]);
-                pieces.push(&piece[..=index]);
+            Some((distance, at)) if distance > STRAIGHT => {
+                pieces.push(&piece[at..]);
+                pieces.push(&piece[..=at]);
             }
-            _ => segments.push(chord),
+            _ if chord.length() >= MIN_LENGTH => segments.push(chord),
+            _ => {}
         }
     }
 }
@@ -289,6 +298,34 @@ mod tests {
             let length: f64 = found.iter().map(LineSegment2::length).sum();
             assert!(length > 0.9 * line.length(), "{found:?}");
         }
+    }
+
+    /// As published: every pixel is asked in every pass.
+    fn thinned_plainly(mask: &mut Mask) {
+        for _ in 0..MAX_THINNING {
+            for first_pass in [true, false] {
+                let removed: Vec<usize> = (0..mask.set.len())
+                    .filter(|&index| mask.set[index] && mask.is_removable(index, first_pass))
+                    .collect();
+                for index in removed {
+                    mask.set[index] = false;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn asking_the_border_alone_thins_alike() {
+        let mut map = GrayImage::new(150, 150);
+        draw(&mut map, [20.0, 30.0], [120.0, 50.0], 9.0);
+        draw(&mut map, [30.0, 110.0], [120.0, 100.0], 90.0);
+        draw(&mut map, [70.0, 0.0], [75.0, 149.0], 2.0);
+        let mask = || Mask::new(&map, |value| value > 0);
+        let (mut thinned, mut plainly) = (mask(), mask());
+        thinned.thin();
+        thinned_plainly(&mut plainly);
+        assert_eq!(thinned.set, plainly.set);
+        assert_ne!(thinned.set, mask().set);
     }
 
     #[test]
