@@ -6,7 +6,7 @@
 //! manifest.json       what ran, where, on which inputs, and how long
 //! metrics.jsonl       one line of losses every few steps
 //! junctions.jsonl     where the global junctions were, fifty times over the training
-//! checkpoints/        the last ones and the best, step-NNNNNNNN.safetensors
+//! checkpoints/        the last ones, step-NNNNNNNN.safetensors
 //! wireframe.json      junctions and edges, in the frame of the user's files
 //! wireframe.obj, .ply the same for other programs
 //! wireframe.png       a picture of it
@@ -27,7 +27,6 @@ use crate::manifest::Manifest;
 use crate::plan::{Plan, PlanError};
 use neat_core::{SceneError, file};
 use neat_tensor::checkpoint::{Checkpoint, CheckpointError};
-use neat_train::AVERAGE_LOSS;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -416,8 +415,9 @@ impl RunDir {
         self.root.join(FAILURE)
     }
 
-    /// Writes the checkpoint of a step and removes all but the last `kept` and the one
-    /// with the smallest average loss.
+    /// Writes the checkpoint of a step and removes all but the last `kept`. None stays for
+    /// its loss: what a run weighs changes with its steps, and losses of different steps do
+    /// not compare.
     ///
     /// # Errors
     /// If the disk is full or the folder cannot be written; earlier checkpoints
@@ -440,36 +440,10 @@ impl RunDir {
         checkpoint.write(&path)?;
         let mut old = self.checkpoints()?;
         old.truncate(old.len().saturating_sub(kept.max(1)));
-        if !old.is_empty() {
-            let best = self.best_checkpoint()?;
-            for (_, path) in old {
-                if best.as_ref() != Some(&path) {
-                    ignore_missing(fs::remove_file(&path), &path)?;
-                }
-            }
+        for (_, path) in old {
+            ignore_missing(fs::remove_file(&path), &path)?;
         }
         Ok(path)
-    }
-
-    /// The checkpoint with the smallest average loss, the first of several; `None`
-    /// where no checkpoint tells its loss.
-    ///
-    /// # Errors
-    /// If the folder cannot be read.
-    pub fn best_checkpoint(&self) -> Result<Option<PathBuf>, RunDirError> {
-        let loss = |path: &Path| -> Option<f64> {
-            let metadata = Checkpoint::read_metadata(path).ok()?;
-            metadata.get(AVERAGE_LOSS)?.parse().ok()
-        };
-        let mut best: Option<(f64, PathBuf)> = None;
-        for (_, path) in self.checkpoints()? {
-            if let Some(loss) = loss(&path)
-                && best.as_ref().is_none_or(|(least, _)| loss < *least)
-            {
-                best = Some((loss, path));
-            }
-        }
-        Ok(best.map(|(_, path)| path))
     }
 
     /// Reads the last checkpoint that is not damaged; `None` if there is no
@@ -685,7 +659,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_checkpoints_and_the_best_stay() {
+    fn the_last_checkpoints_stay_whatever_their_losses_are() {
         let dir = tempfile::tempdir().unwrap();
         let (run, _lock) = RunDir::create(dir.path(), Existing::Refuse).unwrap();
         assert!(matches!(
@@ -697,12 +671,12 @@ mod tests {
         for (iteration, loss) in losses {
             let mut checkpoint = Checkpoint::default();
             let metadata = &mut checkpoint.metadata;
-            metadata.insert(AVERAGE_LOSS.to_owned(), loss.to_string());
+            metadata.insert("average_loss".to_owned(), loss.to_string());
             let path = run.write_checkpoint(iteration, &checkpoint, 2).unwrap();
             assert_eq!(run.latest_checkpoint().unwrap(), path);
         }
         let kept: Vec<u64> = run.checkpoints().unwrap().iter().map(|c| c.0).collect();
-        assert_eq!(kept, [50, 500, 100_000_000]);
+        assert_eq!(kept, [500, 100_000_000]);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use neat_tensor::checkpoint::Checkpoint;
 pub(crate) const LEARNING_RATE_SCALE: &str = "learning_rate_scale";
 
 /// Key of a checkpoint's metadata: the loss, averaged over the last steps.
-pub const AVERAGE_LOSS: &str = "average_loss";
+pub(crate) const AVERAGE_LOSS: &str = "average_loss";
 
 pub(crate) fn metadata<T: std::str::FromStr>(
     checkpoint: &Checkpoint,

@@ -94,8 +94,8 @@ pub struct TrainConfig {
     /// A checkpoint is also written after so many seconds without one.
     #[serde(default = "default_checkpoint_seconds")]
     pub checkpoint_seconds: f64,
-    /// So many of the last checkpoints stay on disk, besides the one with the smallest
-    /// loss: one to continue from, and others in case that it turns out to be damaged.
+    /// So many of the last checkpoints stay on disk: one to continue from, and others in case
+    /// that it turns out to be damaged.
     #[serde(default = "default_kept_checkpoints")]
     pub kept_checkpoints: usize,
 }

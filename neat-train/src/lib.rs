@@ -36,7 +36,6 @@ pub mod trainer;
 mod training_data;
 mod validation;
 
-pub use checkpoint_metadata::AVERAGE_LOSS;
 pub use error::TrainError;
 pub use field::{SurfaceGrid, TrainedField};
 pub use losses::{LOSS_TERMS, StepInput};
