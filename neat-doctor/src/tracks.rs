@@ -201,6 +201,11 @@ impl Nearest {
 }
 
 impl Track {
+    #[cfg(test)]
+    pub fn new(sightings: [Sighting; 3]) -> Self {
+        Self(sightings)
+    }
+
     /// The views that see the point.
     pub fn views(&self) -> [usize; 3] {
         self.0.map(|sighting| sighting.view)
