@@ -75,6 +75,7 @@ pub mod synthetic;
 mod undistortion;
 mod view_image;
 mod view_name;
+mod visual_hull;
 mod wireframe2d;
 mod wireframe3d;
 

@@ -5,7 +5,7 @@
 //! world so that its origin is the centre of this sphere, and
 //! [`crate::Scene::original_from_world`] leads back.
 
-use crate::{Camera, SparsePoint};
+use crate::{Camera, Ray, SparsePoint};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -239,26 +239,13 @@ fn median(mut values: Vec<f64>) -> f64 {
 /// Around the point nearest to the optical axes, as large as the cameras that look
 /// at it see. `None` where no point is looked at, as by parallel cameras.
 pub(crate) fn from_cameras(cameras: &[Camera]) -> Option<Ball> {
-    let mut weights = vec![1.0; cameras.len()];
-    let mut center = Vector3::zeros();
-    // Cameras that look elsewhere lose their say.
-    for _ in 0..10 {
-        center = nearest_to_axes(cameras, &weights)?;
-        let distances: Vec<f64> = (cameras.iter())
-            .map(|camera| {
-                (center - camera.center_in_world)
-                    .cross(&camera.forward())
-                    .norm()
-            })
-            .collect();
-        let scale = median(distances.clone());
-        if scale <= 0.0 {
-            break;
-        }
-        for (weight, distance) in weights.iter_mut().zip(distances) {
-            *weight = 1.0 / (1.0 + (distance / scale).powi(2));
-        }
-    }
+    let axes: Vec<Ray> = (cameras.iter())
+        .map(|camera| Ray {
+            origin: camera.center_in_world,
+            direction: camera.forward(),
+        })
+        .collect();
+    let center = met_by_most(&axes)?;
     let mut radii: Vec<f64> = (cameras.iter())
         .filter_map(|camera| {
             let to_center = center - camera.center_in_world;
@@ -275,19 +262,39 @@ pub(crate) fn from_cameras(cameras: &[Camera]) -> Option<Ball> {
     Some((center, BALL_MARGIN * radii[radii.len() / 4]))
 }
 
-/// Axes must differ in direction by more than this for their nearest point to
+/// The point that most of the rays pass near. `None` where they are parallel.
+pub(crate) fn met_by_most(rays: &[Ray]) -> Option<Vector3<f64>> {
+    let mut weights = vec![1.0; rays.len()];
+    let mut center = Vector3::zeros();
+    // Rays that lead elsewhere lose their say.
+    for _ in 0..10 {
+        center = nearest_to(rays, &weights)?;
+        let distances: Vec<f64> = (rays.iter())
+            .map(|ray| (center - ray.origin).cross(&ray.direction).norm())
+            .collect();
+        let scale = median(distances.clone());
+        if scale <= 0.0 {
+            break;
+        }
+        for (weight, distance) in weights.iter_mut().zip(distances) {
+            *weight = 1.0 / (1.0 + (distance / scale).powi(2));
+        }
+    }
+    Some(center)
+}
+
+/// Rays must differ in direction by more than this for their nearest point to
 /// mean something: the smallest eigenvalue of Σ w (1 − d dᵀ) over Σ w.
 const MIN_SPREAD: f64 = 1e-3;
 
-/// The point with the least weighted sum of squared distances to the axes.
-fn nearest_to_axes(cameras: &[Camera], weights: &[f64]) -> Option<Vector3<f64>> {
+/// The point with the least weighted sum of squared distances to the rays.
+fn nearest_to(rays: &[Ray], weights: &[f64]) -> Option<Vector3<f64>> {
     let mut matrix = Matrix3::zeros();
     let mut right = Vector3::zeros();
-    for (camera, &weight) in cameras.iter().zip(weights) {
-        let forward = camera.forward();
-        let across = weight * (Matrix3::identity() - forward * forward.transpose());
+    for (ray, &weight) in rays.iter().zip(weights) {
+        let across = weight * (Matrix3::identity() - ray.direction * ray.direction.transpose());
         matrix += across;
-        right += across * camera.center_in_world;
+        right += across * ray.origin;
     }
     let spread = matrix.symmetric_eigenvalues().min();
     if spread.is_nan() || spread <= MIN_SPREAD * weights.iter().sum::<f64>() {
@@ -296,94 +303,14 @@ fn nearest_to_axes(cameras: &[Camera], weights: &[f64]) -> Option<Vector3<f64>> 
     matrix.cholesky().map(|cholesky| cholesky.solve(&right))
 }
 
-/// Where a view shows the object: a coarse grid of its image.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Mask {
-    /// Cells per row and per column.
-    pub size: (usize, usize),
-    /// Row by row; whether the cell shows something of the object.
-    pub inside: Vec<bool>,
-}
-
-impl Mask {
-    /// Whether the mask covers the projection of `point`; `None` where the camera
-    /// does not see it.
-    fn covers(&self, camera: &Camera, point: &Vector3<f64>) -> Option<bool> {
-        let projection = camera.project(point);
-        let cell = |x: f64, pixels: u32, cells: usize| {
-            let share = x / f64::from(pixels);
-            (0.0..1.0)
-                .contains(&share)
-                .then(|| ((share * cells as f64) as usize).min(cells - 1))
-        };
-        let column = cell(projection.pixel.x, camera.width, self.size.0)?;
-        let row = cell(projection.pixel.y, camera.height, self.size.1)?;
-        (projection.depth > 0.0).then(|| self.inside[row * self.size.0 + column])
-    }
-}
-
-/// Cells of the visual hull along each axis.
-const HULL_CELLS: usize = 48;
-/// A point belongs to the hull if so many of the views that see it show it within
-/// their masks.
-const HULL_SHARE: f64 = 0.95;
-/// Networks and grids want some empty space around the object.
-const HULL_MARGIN: f64 = 1.25;
-
-/// Around the visual hull: what lies within the masks of all views that see it.
-/// `None` where that is nothing.
-pub(crate) fn from_masks(cameras: &[Camera], masks: &[Mask]) -> Option<Ball> {
-    let (center, radius) = from_cameras(cameras)?;
-    // First coarsely in all that is seen, then finely in what is left.
-    let (center, radius) = hull_ball(cameras, masks, center, 1.5 * radius)?;
-    let (center, radius) = hull_ball(cameras, masks, center, 1.2 * radius)?;
-    Some((center, HULL_MARGIN * radius))
-}
-
-/// A ball around the cells of the hull in the cube around `center`.
-fn hull_ball(
-    cameras: &[Camera],
-    masks: &[Mask],
-    center: Vector3<f64>,
-    half_side: f64,
-) -> Option<Ball> {
-    let cell = 2.0 * half_side / HULL_CELLS as f64;
-    let at = |index: usize| (index as f64 + 0.5) * cell - half_side;
-    let mut hull = Vec::new();
-    for index in 0..HULL_CELLS.pow(3) {
-        let [i, j, k] = [0, 1, 2].map(|axis| index / HULL_CELLS.pow(axis) % HULL_CELLS);
-        let point = center + Vector3::new(at(i), at(j), at(k));
-        let (mut seen, mut covered) = (0, 0);
-        for (camera, mask) in cameras.iter().zip(masks) {
-            if let Some(inside) = mask.covers(camera, &point) {
-                seen += 1;
-                covered += usize::from(inside);
-            }
-        }
-        if 2 * seen >= cameras.len() && covered as f64 >= HULL_SHARE * seen as f64 {
-            hull.push(point);
-        }
-    }
-    let first = *hull.first()?;
-    let low = hull.iter().fold(first, |low, point| low.inf(point));
-    let high = hull.iter().fold(first, |high, point| high.sup(point));
-    let middle = (low + high) / 2.0;
-    let reach = hull
-        .iter()
-        .map(|point| (point - middle).norm())
-        .fold(0.0, f64::max);
-    // Half the diagonal of a cell: points stand for cells.
-    Some((middle, reach + cell * 3f64.sqrt() / 2.0))
-}
-
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::Intrinsics;
     use nalgebra::{Matrix4, Rotation3};
 
     /// A camera at `position` that looks at `target`.
-    fn camera(position: Vector3<f64>, target: Vector3<f64>) -> Camera {
+    pub fn camera(position: Vector3<f64>, target: Vector3<f64>) -> Camera {
         let forward = (target - position).normalize();
         let right = Vector3::z().cross(&forward).normalize();
         let rotation = Matrix3::from_columns(&[right, forward.cross(&right), forward]);
@@ -401,7 +328,7 @@ mod tests {
 
     /// Cameras around `target` at distance 5: half of the smaller side over the
     /// focal length is 3/4, sine 3/5.
-    fn ring(target: Vector3<f64>, count: usize) -> Vec<Camera> {
+    pub fn ring(target: Vector3<f64>, count: usize) -> Vec<Camera> {
         (0..count)
             .map(|index| {
                 let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), index as f64);
@@ -502,37 +429,6 @@ mod tests {
         assert_eq!(from_points(&points[..MIN_POINTS - 1]), None);
         // Points in one place have no extent.
         assert_eq!(from_points(&vec![point(center); 50]), None);
-    }
-
-    #[test]
-    fn the_hull_of_masks_holds_the_object() {
-        let cameras = ring(Vector3::new(0.3, -0.2, 0.1), 10);
-        let object = Vector3::new(0.6, 0.1, 0.0);
-        let masks: Vec<Mask> = (cameras.iter())
-            .map(|camera| {
-                let inside = (0..75 * 100).map(|index| {
-                    let pixel = [(index % 75) as f64, (index / 75) as f64].map(|x| 2.0 * x + 1.0);
-                    let ray = camera.ray_through(&pixel.into());
-                    (object - ray.origin).cross(&ray.direction).norm() < 0.7
-                });
-                Mask {
-                    size: (75, 100),
-                    inside: inside.collect(),
-                }
-            })
-            .collect();
-        let (center, radius) = from_masks(&cameras, &masks).unwrap();
-        assert!((center - object).norm() < 0.2, "{center}");
-        assert!((0.7..1.2).contains(&radius), "{radius}");
-
-        let nothing = vec![
-            Mask {
-                size: (1, 1),
-                inside: vec![false],
-            };
-            cameras.len()
-        ];
-        assert_eq!(from_masks(&cameras, &nothing), None);
     }
 
     #[test]

@@ -6,7 +6,7 @@
 
 use super::images;
 use super::poses::PosedImage;
-use crate::scene_sphere::Mask;
+use crate::visual_hull::Mask;
 use crate::{MemoryLimit, SceneError, file, hawp_json::file_stem, image_file};
 use image::{GrayImage, imageops};
 use std::path::{Path, PathBuf};

@@ -2,9 +2,10 @@
 
 use super::masks::{self, MaskFiles};
 use crate::scene_sphere::{
-    Ball, SceneSphere, SphereChoice, SphereSource, from_cameras, from_masks, from_points,
-    is_centered, visible_radius,
+    Ball, SceneSphere, SphereChoice, SphereSource, from_cameras, from_points, is_centered,
+    visible_radius,
 };
+use crate::visual_hull::from_masks;
 use crate::{Camera, SceneError, Similarity, SparsePoint};
 use nalgebra::Vector3;
 use std::path::Path;
