@@ -2,12 +2,14 @@
 //! (§4.3): refine, gather lines, vote, attract, check visibility.
 
 mod attraction;
+mod image_refinement;
 mod junction_refinement;
 mod junction_voting;
 mod neat_lines;
 mod visibility;
 
 pub use attraction::{AttractionConfig, attract, attracted_ends};
+pub use image_refinement::ImageRefinementConfig;
 pub use junction_refinement::{
     JunctionRefinementConfig, RefinedJunction, RefinementError, refine_junctions,
 };
@@ -17,6 +19,7 @@ pub use visibility::{VisibilityConfig, seeing_views, squared_reprojection_distan
 
 use crate::used_junctions::UsedJunctions;
 use crate::{SignedDistance, ViewObservation, Wireframe3d};
+use image_refinement::refine_by_images;
 use nalgebra::Vector3;
 use neat_core::assignment::AssignmentError;
 use rayon::prelude::*;
@@ -36,6 +39,8 @@ pub struct PaperBackEndConfig {
     pub junction_refinement: JunctionRefinementConfig,
     /// Lines and junctions → junctions that views agree on.
     pub junction_voting: JunctionVotingConfig,
+    /// Lines and junctions → junctions where the images show them.
+    pub image_refinement: ImageRefinementConfig,
     /// Lines and junctions → edges.
     pub attraction: AttractionConfig,
     /// Edges → edges that the images show.
@@ -51,6 +56,7 @@ impl Default for PaperBackEndConfig {
             neat_lines: NeatLineConfig::default(),
             junction_refinement: JunctionRefinementConfig::default(),
             junction_voting: JunctionVotingConfig::default(),
+            image_refinement: ImageRefinementConfig::default(),
             attraction: AttractionConfig::default(),
             visibility: VisibilityConfig::default(),
             keep_isolated_junctions: true,
@@ -89,7 +95,8 @@ pub struct PaperWireframe {
     /// Distinct junctions, sorted by x, y and z; distinct edges `[i, j]` with
     /// `i ≤ j`, sorted.
     pub wireframe: Wireframe3d,
-    /// Votes of each junction.
+    /// Votes of each junction; with [`ImageRefinementConfig::enabled`] the number of 2D
+    /// segments that observe it.
     pub junction_votes: Vec<usize>,
     /// In how many views each edge is seen.
     pub visible_views: Vec<usize>,
@@ -170,19 +177,23 @@ impl PaperBackEndConfig {
             .map(|(view, rays)| neat_lines(view, rays, &self.neat_lines))
             .collect();
         let votes = vote_for_junctions(&refined, &lines_by_view, &self.junction_voting)?;
-
-        let kept = distinct_and_sorted(
+        let by_images = self.image_refinement.enabled;
+        let kept = if by_images {
+            let config = &self.image_refinement;
+            refine_by_images(refined.clone(), views, &lines_by_view, config)
+        } else {
             votes
                 .iter()
                 .filter(|v| v.votes >= self.junction_voting.min_votes)
                 .map(|v| (refined[v.junction], v.votes))
-                .collect(),
-        );
-        let (positions, junction_votes): (Vec<_>, Vec<_>) = kept.into_iter().unzip();
+                .collect()
+        };
+        let (positions, junction_votes): (Vec<_>, Vec<_>) =
+            distinct_and_sorted(kept).into_iter().unzip();
         let supported: Vec<_> = lines_by_view
             .iter()
             .flatten()
-            .filter(|line| line.is_supported(&self.neat_lines))
+            .filter(|line| by_images || line.is_supported(&self.neat_lines))
             .map(|line| line.segment)
             .collect();
         let attracted = Wireframe3d {
