@@ -2,7 +2,9 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use neat_tensor::{PositionalEncoding, ReluMlp, SampleInputs};
+use neat_tensor::{
+    GridEncoding, NetworkSizeError, PointEncoding, PositionalEncoding, ReluMlp, SampleInputs,
+};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +19,8 @@ pub struct AttractionNetworkConfig {
     /// Frequencies of the encoding of the point; 0 gives the raw point, as
     /// published.
     pub octaves: usize,
+    /// What follows these sines in the encoding of the point.
+    pub encoding: PointEncoding,
     /// Whether the raw viewing direction is an input (paper table 2).
     pub view_direction: bool,
     /// Whether the layers are weight-normalised.
@@ -32,6 +36,7 @@ impl Default for AttractionNetworkConfig {
             hidden_layers: 4,
             width: 256,
             octaves: 0,
+            encoding: PointEncoding::Sine,
             view_direction: true,
             weight_norm: true,
             initial_scale: 1.0,
@@ -44,6 +49,8 @@ impl Default for AttractionNetworkConfig {
 pub struct AttractionNetwork {
     /// The perceptron; its outputs are offsets from the point.
     pub mlp: ReluMlp,
+    /// Learned grids whose features follow those of the distance, if any.
+    pub grid: Option<GridEncoding>,
     /// Frequencies of the encoding of the point.
     #[module(skip)]
     pub octaves: usize,
@@ -53,13 +60,23 @@ pub struct AttractionNetwork {
 }
 
 impl AttractionNetworkConfig {
-    /// A network for `features` wide features.
-    pub fn init(&self, features: usize, rng: &mut impl Rng, device: &Device) -> AttractionNetwork {
+    /// A network for `features` wide features, in a scene of radius `scene_radius`.
+    ///
+    /// # Errors
+    /// If there can be no such encoding.
+    pub fn init(
+        &self,
+        features: usize,
+        scene_radius: f64,
+        rng: &mut impl Rng,
+        device: &Device,
+    ) -> Result<AttractionNetwork, NetworkSizeError> {
         let encoding = PositionalEncoding {
             octaves: self.octaves,
         };
         let view = if self.view_direction { 3 } else { 0 };
-        let mut widths = vec![encoding.output_width(3) + view + 3 + features];
+        let point = encoding.output_width(3) + self.encoding.width();
+        let mut widths = vec![point + view + 3 + features];
         widths.extend(vec![self.width; self.hidden_layers]);
         widths.push(6);
         let mut mlp = ReluMlp::new(&widths, self.weight_norm, rng, device);
@@ -68,11 +85,12 @@ impl AttractionNetworkConfig {
         {
             mlp.layers.push(last.scaled(self.initial_scale));
         }
-        AttractionNetwork {
+        Ok(AttractionNetwork {
             mlp,
+            grid: self.encoding.init(scene_radius, rng, device)?,
             octaves: self.octaves,
             view_direction: self.view_direction,
-        }
+        })
     }
 }
 
@@ -89,6 +107,10 @@ impl AttractionNetwork {
             ray_parts.push((3, 3, PositionalEncoding { octaves: 0 }));
         }
         let points = rays.clone().narrow(1, 0, 3);
+        let features = match &self.grid {
+            Some(grid) => grid.append(&self.mlp.kernels, features, points.clone()),
+            None => features,
+        };
         let offsets = self.mlp.forward_samples(SampleInputs {
             rays,
             ray_parts,

@@ -54,8 +54,14 @@ pub fn estimate(config: &Config, scene: &Scene, speed: f64) -> Estimate {
     let image_bytes: u64 = in_memory.map(|view| view.image.byte_len()).sum();
     let rays = config.train.rays;
     let at_once = config.train.ray_chunk.map_or(rays, |chunk| chunk.min(rays));
-    let grid = config.model.implicit.encoding.grid();
-    let grid_bytes = grid.map_or(0.0, |grid| grid.parameters() as f64) * BYTES_PER_GRID_NUMBER;
+    let model = &config.model;
+    let grids = [
+        &model.implicit.encoding,
+        &model.rendering.encoding,
+        &model.attraction.encoding,
+    ];
+    let in_grids: usize = grids.map(|encoding| encoding.parameters()).iter().sum();
+    let grid_bytes = in_grids as f64 * BYTES_PER_GRID_NUMBER;
     Estimate {
         seconds: config.train.steps as f64 * flops / (speed * 1e9 * share),
         bytes: BASE_BYTES

@@ -2,7 +2,7 @@
 
 mod config;
 
-pub use config::{ImplicitNetworkConfig, PointEncoding};
+pub use config::ImplicitNetworkConfig;
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};

@@ -31,8 +31,6 @@ pub mod rendering_network;
 pub mod volume_rendering;
 
 pub use density::{DensityConfig, LaplaceDensity};
-pub use implicit_network::{
-    Distances, ImplicitNetwork, ImplicitNetworkConfig, ImplicitOutput, PointEncoding,
-};
+pub use implicit_network::{Distances, ImplicitNetwork, ImplicitNetworkConfig, ImplicitOutput};
 pub use ray_sampler::{DeviceSamples, RayBundle, RaySampler, RaySamplerConfig, RaySamples};
 pub use rendering_network::{RenderingNetwork, RenderingNetworkConfig};

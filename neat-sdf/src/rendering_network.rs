@@ -2,7 +2,9 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, activation};
-use neat_tensor::{PositionalEncoding, ReluMlp, SampleInputs};
+use neat_tensor::{
+    GridEncoding, NetworkSizeError, PointEncoding, PositionalEncoding, ReluMlp, SampleInputs,
+};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +18,8 @@ pub struct RenderingNetworkConfig {
     pub width: usize,
     /// Frequencies of the encoding of the viewing direction.
     pub view_octaves: usize,
+    /// What the point has beside its coordinates.
+    pub encoding: PointEncoding,
     /// Whether the layers are weight-normalised.
     pub weight_norm: bool,
 }
@@ -27,6 +31,7 @@ impl Default for RenderingNetworkConfig {
             hidden_layers: 4,
             width: 256,
             view_octaves: 4,
+            encoding: PointEncoding::Sine,
             weight_norm: true,
         }
     }
@@ -37,24 +42,36 @@ impl Default for RenderingNetworkConfig {
 pub struct RenderingNetwork {
     /// The perceptron.
     pub mlp: ReluMlp,
+    /// Learned grids whose features follow those of the distance, if any.
+    pub grid: Option<GridEncoding>,
     /// Frequencies of the encoding of the viewing direction.
     #[module(skip)]
     pub view_octaves: usize,
 }
 
 impl RenderingNetworkConfig {
-    /// A network for `features` wide features.
-    pub fn init(&self, features: usize, rng: &mut impl Rng, device: &Device) -> RenderingNetwork {
+    /// A network for `features` wide features, in a scene of radius `scene_radius`.
+    ///
+    /// # Errors
+    /// If there can be no such encoding.
+    pub fn init(
+        &self,
+        features: usize,
+        scene_radius: f64,
+        rng: &mut impl Rng,
+        device: &Device,
+    ) -> Result<RenderingNetwork, NetworkSizeError> {
         let view = PositionalEncoding {
             octaves: self.view_octaves,
         };
-        let mut widths = vec![3 + view.output_width(3) + 3 + features];
+        let mut widths = vec![3 + view.output_width(3) + 3 + features + self.encoding.width()];
         widths.extend(vec![self.width; self.hidden_layers]);
         widths.push(3);
-        RenderingNetwork {
+        Ok(RenderingNetwork {
             mlp: ReluMlp::new(&widths, self.weight_norm, rng, device),
+            grid: self.encoding.init(scene_radius, rng, device)?,
             view_octaves: self.view_octaves,
-        }
+        })
     }
 }
 
@@ -64,6 +81,13 @@ impl RenderingNetwork {
     pub fn forward(&self, rays: Tensor<2>, gradients: Tensor<2>, features: Tensor<2>) -> Tensor<2> {
         let view = PositionalEncoding {
             octaves: self.view_octaves,
+        };
+        let features = match &self.grid {
+            Some(grid) => {
+                let points = rays.clone().narrow(1, 0, 3);
+                grid.append(&self.mlp.kernels, features, points)
+            }
+            None => features,
         };
         activation::sigmoid(self.mlp.forward_samples(SampleInputs {
             rays,

@@ -1,6 +1,7 @@
 //! The CPU's side of [`NeatBackend`].
 
 use crate::fused::{self, ReluRequest, SoftplusRequest};
+use crate::grid_encoding::GridEncoding;
 use crate::kernels::cpu::KeptMemory;
 use crate::kernels::cpu::relu_network::{PartShape, ReluShape};
 use crate::kernels::cpu::softplus_network::SoftplusShape;
@@ -36,6 +37,10 @@ impl NeatBackend for Cpu {
 
     fn works_on_host(&self) -> bool {
         true
+    }
+
+    fn encode_grid(&self, grid: &GridEncoding, x: Tensor<2>) -> Tensor<2> {
+        fused::grid_features(x, grid.table.val(), &grid.shape)
     }
 
     fn distance_network(

@@ -6,6 +6,9 @@
 #![allow(deprecated)] // ndarray is still one of the backends that neat promises
 
 mod derivatives;
+mod grid_features;
+
+pub(crate) use grid_features::grid_features;
 
 use crate::kernels::cpu::relu_network::{self, ReluNetwork, ReluShape};
 use crate::kernels::cpu::softplus_network::{
@@ -16,6 +19,7 @@ use burn::backend::tensor::{Device as BackendDevice, FloatTensor};
 use burn::backend::{Backend, TensorMetadata, backend_extension};
 use burn::tensor::{Tensor, TensorData};
 use pulp::Arch;
+use std::borrow::Cow;
 
 /// What is asked of a signed distance network.
 #[derive(Clone, Debug)]
@@ -77,6 +81,33 @@ pub trait FusedNetworks: Backend {
         request: ReluRequest,
     ) -> FloatTensor<Self>;
 }
+
+/// A CPU backend, whose tensors lie in the host's memory.
+pub trait HostMemory: Backend {
+    /// The numbers of a float32 tensor in the order of its axes; a copy only where they do
+    /// not lie in that order, or the backend does not show them.
+    fn values(tensor: &FloatTensor<Self>) -> Cow<'_, [f32]> {
+        let data = read::<Self>(tensor.clone());
+        let values = data.try_into_vec();
+        Cow::Owned(values.expect("fused: tensors are float32 here"))
+    }
+}
+
+#[cfg(feature = "flex")]
+impl HostMemory for burn::backend::Flex {
+    fn values(tensor: &FloatTensor<Self>) -> Cow<'_, [f32]> {
+        match tensor.as_slice() {
+            Some(values) => Cow::Borrowed(values),
+            None => {
+                let values = tensor.clone().into_data().try_into_vec();
+                Cow::Owned(values.expect("fused: tensors are float32 here"))
+            }
+        }
+    }
+}
+
+#[cfg(feature = "ndarray")]
+impl HostMemory for burn::backend::NdArray {}
 
 /// The host's copy of a tensor of a CPU backend.
 fn read<B: Backend>(tensor: FloatTensor<B>) -> TensorData {

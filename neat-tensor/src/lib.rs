@@ -38,6 +38,7 @@ pub mod kernels;
 pub mod linear;
 mod neat_backend;
 pub mod parameters;
+mod point_encoding;
 pub mod random;
 mod relu_mlp;
 pub mod sampling;
@@ -54,4 +55,5 @@ pub use linear::{Linear, NetworkSizeError};
 pub use neat_backend::{
     AdamNumbers, DistanceNetwork, Field, FieldQuery, NeatBackend, Plain, SampleInputs,
 };
+pub use point_encoding::PointEncoding;
 pub use relu_mlp::ReluMlp;

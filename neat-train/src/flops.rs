@@ -7,7 +7,7 @@
 //! twice.
 
 use crate::model::ModelConfig;
-use neat_tensor::{GridConfig, PositionalEncoding};
+use neat_tensor::PositionalEncoding;
 use serde::Serialize;
 
 /// Rows that went through the networks in one iteration.
@@ -89,22 +89,27 @@ impl StepFlops {
         let product = |size: usize| 2.0 * size as f64;
         // Each feature of a grid lies between eight corners, and so does its derivative
         // along each axis.
-        let grid_width = implicit.encoding.grid().map_or(0, GridConfig::width);
-        let interpolated = product(8 * grid_width);
+        let grid_width = implicit.encoding.width();
+        let interpolation = |width: usize| product(8 * width);
+        let interpolated = interpolation(grid_width);
         let distance = product(hidden + implicit.width) + interpolated;
         let features = product(implicit.width * implicit.features);
         let sweep = product(hidden) + 3.0 * interpolated;
-        // First layers alone pass a gradient to part of their inputs.
-        let perceptron =
-            |inputs: usize, trained: usize, width: usize, layers: usize, out: usize| {
-                let deep = (layers - 1) * width * width + width * out;
-                let forward = product(inputs * width + deep);
-                (forward, 2.0 * forward - product((inputs - trained) * width))
-            };
-        let trained = 3 + implicit.features;
+        // First layers alone pass a gradient to part of their inputs: to gradients,
+        // features and grids, which then pass it to their table.
+        let perceptron = |rays: usize, grid: usize, width: usize, layers: usize, out: usize| {
+            let inputs = rays + 3 + implicit.features + grid;
+            let deep = (layers - 1) * width * width + width * out;
+            let forward = product(inputs * width + deep);
+            let backward = 2.0 * forward - product(rays * width);
+            (
+                forward + interpolation(grid),
+                backward + interpolation(grid),
+            )
+        };
         let radiance = perceptron(
-            3 + encoded(model.rendering.view_octaves) + trained,
-            trained,
+            3 + encoded(model.rendering.view_octaves),
+            model.rendering.encoding.width(),
             model.rendering.width,
             model.rendering.hidden_layers,
             3,
@@ -115,8 +120,8 @@ impl StepFlops {
             0
         };
         let attraction = perceptron(
-            encoded(model.attraction.octaves) + view + trained,
-            trained,
+            encoded(model.attraction.octaves) + view,
+            model.attraction.encoding.width(),
             model.attraction.width,
             model.attraction.hidden_layers,
             6,
@@ -142,6 +147,7 @@ impl StepFlops {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use neat_tensor::{GridConfig, PointEncoding};
 
     #[test]
     fn a_paper_size_sample_takes_what_the_design_says() {
@@ -168,13 +174,40 @@ mod tests {
         let mut model = ModelConfig::default();
         model.implicit.skip_layer = 0;
         let sines = StepFlops::count(&model, &rows).sampler;
-        model.implicit.encoding = neat_sdf::PointEncoding::Grid(GridConfig {
-            levels: 5,
-            features: 4,
-            ..GridConfig::default()
-        });
+        model.implicit.encoding = grid();
         let columns = 20.0;
         let more = 2.0 * columns * (256.0 + 8.0);
         assert_eq!(StepFlops::count(&model, &rows).sampler - sines, more);
+    }
+
+    #[test]
+    fn grids_of_segments_and_colours_count_where_these_are_evaluated() {
+        let rows = StepRows {
+            full: 3,
+            segment: 1,
+            ..StepRows::default()
+        };
+        let sines = StepFlops::count(&ModelConfig::default(), &rows);
+        let mut model = ModelConfig::default();
+        let columns = 20.0;
+        let more = 2.0 * columns * (256.0 + 8.0);
+        model.attraction.encoding = grid();
+        let segments = StepFlops::count(&model, &rows);
+        assert_eq!(segments.forward - sines.forward, more);
+        assert_eq!(
+            segments.backward - sines.backward,
+            more + 2.0 * columns * 256.0
+        );
+        model.rendering.encoding = grid();
+        let colours = StepFlops::count(&model, &rows);
+        assert_eq!(colours.forward - segments.forward, 3.0 * more);
+    }
+
+    fn grid() -> PointEncoding {
+        PointEncoding::Grid(GridConfig {
+            levels: 5,
+            features: 4,
+            ..GridConfig::default()
+        })
     }
 }

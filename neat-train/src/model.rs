@@ -65,8 +65,13 @@ impl NeatModel {
         let features = config.implicit.features;
         let model = Self {
             implicit_network: config.implicit.init(scene_radius, &mut rng, device)?,
-            rendering_network: config.rendering.init(features, &mut rng, device),
-            attraction_network: config.attraction.init(features, &mut rng, device),
+            rendering_network: (config.rendering).init(features, scene_radius, &mut rng, device)?,
+            attraction_network: (config.attraction).init(
+                features,
+                scene_radius,
+                &mut rng,
+                device,
+            )?,
             density: config.density.init(device),
             perceiver: config.perceiver.init(&mut rng, device)?,
         };

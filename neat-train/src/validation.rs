@@ -3,7 +3,6 @@
 use crate::config::{BatchViews, TrainingConfig};
 use crate::error::TrainError;
 use neat_sdf::RaySamplerConfig;
-use neat_tensor::GridConfig;
 
 /// Most samples of a step: their arrays on the host take some 50 bytes each, and
 /// their indices are 32 bits wide.
@@ -28,6 +27,8 @@ impl TrainingConfig {
         let refuse = |reason: &str| Err(TrainError::Config(reason.to_owned()));
         let (implicit, train) = (&self.model.implicit, &self.train);
         implicit.validate()?;
+        self.model.rendering.encoding.validate()?;
+        self.model.attraction.encoding.validate()?;
         if implicit.octaves > 24 || self.model.attraction.octaves > 24 {
             return refuse("more than 24 octaves exceed what float32 resolves");
         }
@@ -112,7 +113,17 @@ fn sizes(config: &TrainingConfig) -> Vec<(&'static str, usize, usize)> {
         ("model.implicit.width", implicit.width, MAX_WIDTH),
         (
             "the size of the grids of model.implicit.encoding",
-            (implicit.encoding.grid()).map_or(0, GridConfig::parameters),
+            implicit.encoding.parameters(),
+            MAX_GRID_NUMBERS,
+        ),
+        (
+            "the size of the grids of model.rendering.encoding",
+            rendering.encoding.parameters(),
+            MAX_GRID_NUMBERS,
+        ),
+        (
+            "the size of the grids of model.attraction.encoding",
+            attraction.encoding.parameters(),
             MAX_GRID_NUMBERS,
         ),
         ("model.implicit.features", implicit.features, MAX_WIDTH),
@@ -140,7 +151,7 @@ fn sizes(config: &TrainingConfig) -> Vec<(&'static str, usize, usize)> {
 mod tests {
     use super::*;
     use neat_gjp::JunctionCount;
-    use neat_sdf::PointEncoding;
+    use neat_tensor::{GridConfig, PointEncoding};
 
     fn refusal(change: impl Fn(&mut TrainingConfig)) -> String {
         let mut config = TrainingConfig::default();
@@ -175,16 +186,40 @@ mod tests {
             junctions.contains("model.perceiver.junctions"),
             "{junctions}"
         );
+        let huge = PointEncoding::Grid(GridConfig {
+            levels: 32,
+            features: 8,
+            log2_entries: 20,
+            coarsest: 256,
+            finest: 2048,
+        });
         let grid = refusal(|config| {
             config.model.implicit.skip_layer = 0;
-            config.model.implicit.encoding = PointEncoding::Grid(GridConfig {
-                levels: 32,
-                features: 8,
-                log2_entries: 20,
-                coarsest: 256,
-                finest: 2048,
-            });
+            config.model.implicit.encoding = huge.clone();
         });
         assert!(grid.contains("grids of model.implicit.encoding"), "{grid}");
+        let grid = refusal(|config| config.model.rendering.encoding = huge.clone());
+        assert!(grid.contains("grids of model.rendering.encoding"), "{grid}");
+        let grid = refusal(|config| config.model.attraction.encoding = huge.clone());
+        assert!(
+            grid.contains("grids of model.attraction.encoding"),
+            "{grid}"
+        );
+    }
+
+    #[test]
+    fn grids_that_cannot_be_are_refused_in_every_network() {
+        let odd = PointEncoding::Grid(GridConfig {
+            features: 3,
+            ..GridConfig::default()
+        });
+        let changes: [fn(&mut TrainingConfig, PointEncoding); 2] = [
+            |config, odd| config.model.rendering.encoding = odd,
+            |config, odd| config.model.attraction.encoding = odd,
+        ];
+        for change in changes {
+            let refused = refusal(|config| change(config, odd.clone()));
+            assert!(refused.contains("1, 2, 4 or 8 features"), "{refused}");
+        }
     }
 }

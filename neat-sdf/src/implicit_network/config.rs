@@ -3,7 +3,7 @@
 use super::ImplicitNetwork;
 use burn::tensor::Device;
 use neat_tensor::linear::{Linear, LinearInit};
-use neat_tensor::{CoordinateMlp, GridConfig, Kernels, NetworkSizeError, PositionalEncoding};
+use neat_tensor::{CoordinateMlp, Kernels, NetworkSizeError, PointEncoding, PositionalEncoding};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -40,27 +40,6 @@ pub struct ImplicitNetworkConfig {
     pub bounding_sphere_slope: f64,
 }
 
-/// What the encoding of a point has beyond coordinates and sines.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
-pub enum PointEncoding {
-    /// Nothing, as published.
-    #[default]
-    Sine,
-    /// Features of learned grids over the cube around the scene ball.
-    Grid(GridConfig),
-}
-
-impl PointEncoding {
-    /// The grids, if any.
-    pub fn grid(&self) -> Option<&GridConfig> {
-        match self {
-            Self::Sine => None,
-            Self::Grid(grid) => Some(grid),
-        }
-    }
-}
-
 impl Default for ImplicitNetworkConfig {
     /// As published: 8 × 256 with 6 octaves, skip into layer 4.
     fn default() -> Self {
@@ -86,9 +65,7 @@ impl ImplicitNetworkConfig {
     /// If there is no hidden layer, or a skip layer comes too late or leaves the layer
     /// before it without outputs.
     pub fn validate(&self) -> Result<(), NetworkSizeError> {
-        if let Some(grid) = self.encoding.grid() {
-            grid.validate()?;
-        }
+        self.encoding.validate()?;
         Err(NetworkSizeError(
             if self.hidden_layers == 0 || self.width == 0 {
                 "model.implicit needs at least one hidden layer and a width above 0"
@@ -107,7 +84,7 @@ impl ImplicitNetworkConfig {
         let sines = PositionalEncoding {
             octaves: self.octaves,
         };
-        sines.output_width(3) + self.encoding.grid().map_or(0, GridConfig::width)
+        sines.output_width(3) + self.encoding.width()
     }
 
     /// A network that approximates a sphere (geometric initialisation, SAL,
@@ -155,13 +132,11 @@ impl ImplicitNetworkConfig {
                 device,
             ));
         }
-        let grid = self.encoding.grid();
-        let grid = grid.map(|grid| grid.init(scene_radius, rng, device));
         Ok(ImplicitNetwork {
             mlp: CoordinateMlp {
                 layers,
                 octaves: self.octaves,
-                grid: grid.transpose()?,
+                grid: self.encoding.init(scene_radius, rng, device)?,
                 skip: Some(self.skip_layer).filter(|l| *l > 0),
                 sharpness: SOFTPLUS_SHARPNESS,
                 kernels: Kernels::default(),
@@ -203,6 +178,7 @@ impl ImplicitNetworkConfig {
 mod tests {
     use super::*;
     use burn::tensor::Tensor;
+    use neat_tensor::GridConfig;
     use neat_tensor::random::{Purpose, stream};
 
     fn with_grid() -> ImplicitNetworkConfig {

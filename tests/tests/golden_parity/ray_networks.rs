@@ -81,7 +81,9 @@ fn radiance() {
         let truth = golden.numbers("f64.view_embedding");
         assert_relatively_close("view encoding", &numbers(encoded), &truth, OUTPUT_TOLERANCE);
 
-        let untrained = config.init(FEATURES, &mut stream(0, Purpose::Weights, 0), &device);
+        let untrained = config
+            .init(FEATURES, 1.0, &mut stream(0, Purpose::Weights, 0), &device)
+            .expect("no grids");
         let case = Case {
             network: "rendering",
             output: "rgb",
@@ -105,7 +107,9 @@ fn attraction() {
             width: 32,
             ..AttractionNetworkConfig::default()
         };
-        let untrained = config.init(FEATURES, &mut stream(0, Purpose::Weights, 0), &device);
+        let untrained = config
+            .init(FEATURES, 1.0, &mut stream(0, Purpose::Weights, 0), &device)
+            .expect("no grids");
         let case = Case {
             network: "attraction",
             output: "lines3d",

@@ -11,6 +11,7 @@
 
 mod curvature;
 mod encode;
+mod features;
 mod place;
 mod scatter;
 mod shape;
