@@ -133,7 +133,7 @@ pub enum BackEnd {
     /// Section 4.3 of the paper.
     Paper,
     /// Lines that the 2D segments propose and the edgels of all images choose. The field has
-    /// no part in it.
+    /// no part in it unless [`Partners::Field`] asks it.
     #[default]
     Assembler,
 }
@@ -166,6 +166,17 @@ impl fmt::Display for FieldUse {
     }
 }
 
+/// What says which 2D segments of two views may show one edge.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Partners {
+    /// Epipolar geometry: all that the poses allow.
+    #[default]
+    Epipolar,
+    /// The field: those whose rendered segments lie near each other in space.
+    Field,
+}
+
 /// What a wireframe is drawn on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -184,10 +195,13 @@ pub struct DistillConfig {
     /// What assembles the wireframe.
     #[serde(default)]
     pub back_end: BackEnd,
-    /// Whether a field is trained; `auto`: only for a back end that asks it. Without one
+    /// Whether a field is trained; `auto`: only where something asks it. Without one
     /// there is nothing to render, and no mesh.
     #[serde(default)]
     pub field: Choice<FieldUse>,
+    /// What says to the assembler which 2D segments of two views may show one edge.
+    #[serde(default)]
+    pub partners: Partners,
     /// What the wireframe is drawn on in `overlays/`.
     #[serde(default)]
     pub overlay: OverlayGround,

@@ -1,31 +1,32 @@
 //! From the images, or a trained field (paper §4.3), to the wireframe.
 
+mod rendered_segments;
 mod thin_regions;
 
-use crate::config::{BackEnd, Config};
+use crate::config::{BackEnd, Config, Partners};
 use crate::event::{Decision, POSES};
 use crate::plan::Plan;
-use nalgebra::Vector3;
-use neat_core::{EdgelMap, LineSegment3, Scene, SceneError, Wireframe3d};
+use neat_core::{EdgelMap, Scene, SceneError, Wireframe3d};
 use neat_detect::{DetectorConfig, edgel_maps};
-use neat_sdf::RayBundle;
-use neat_tensor::host::host_vec;
 use neat_train::TrainedField;
 use neat_wireframe::assemble::{AssembleReport, Assembled, assemble_with_progress};
 use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::kinds::{EdgeKinds, curved_chains, edge_kinds, fill_kinds, junction_types};
 use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
-use neat_wireframe::paper::{PaperBackEndCounts, PaperBackEndError, SupportedSegment};
+use neat_wireframe::paper::{NeatLine, PaperBackEndCounts, PaperBackEndError, neat_lines};
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SignedDistance, ViewObservation};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
-use thin_regions::Query;
+pub use rendered_segments::support_point;
+use rendered_segments::rendered_segments;
 pub use thin_regions::paper_regions;
 
-/// Rays per rendering call: bounds the memory.
-const RAY_CHUNK: usize = 2048;
+/// Rays that tell the NEAT line of a 2D segment, in the mean, where partners are sought: a
+/// mean of so many is as good as one of all, which are some 200.
+const RAYS_PER_LINE: usize = 64;
 
 /// Who listens to the progress wants the distillation to end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -50,6 +51,9 @@ pub enum DistillError {
     /// A back end that asks the field, and none was trained.
     #[error("the {0} back end asks the field, and none was trained")]
     NoField(BackEnd),
+    /// Partners are sought by the field, and none was trained.
+    #[error("distill.partners = field asks the field, and none was trained")]
+    NoFieldForPartners,
     /// The wireframe has a point that is no point.
     #[error("the wireframe is not valid")]
     Invalid(#[from] WireframeFlaw),
@@ -188,7 +192,11 @@ pub fn distill(
         }
         // A learned surface is too coarse to hide edges behind.
         BackEnd::Assembler => {
-            let built = assembled(scene, config, &views, scene_radius, progress)?;
+            let asked = match config.distill.partners {
+                Partners::Epipolar => None,
+                Partners::Field => Some(field.ok_or(DistillError::NoFieldForPartners)?),
+            };
+            let built = assembled(scene, asked, config, &views, scene_radius, progress)?;
             let steps = built.report;
             refined_scene =
                 (built.refined_cameras).map(|cameras| scene.clone().with_cameras(&cameras));
@@ -213,25 +221,53 @@ pub fn distill(
     })
 }
 
-/// The assembler, which asks the images and not the field.
+/// The assembler, which asks the images; and the field for partners, if that is given.
 fn assembled(
     scene: &Scene,
+    field: Option<&TrainedField>,
     config: &Config,
     views: &[ViewObservation],
     scene_radius: f64,
     progress: OnProgress<'_>,
 ) -> Result<Assembled, DistillError> {
-    let edgels = edgels(scene, &config.detect, &mut |share| progress(0.3 * share))?;
-    let on_progress = &mut |share| match progress(0.3 + 0.6 * share) {
+    let lines = match field {
+        None => None,
+        Some(field) => Some(field_lines(scene, field, config, views, &mut |share| {
+            progress(0.3 * share)
+        })?),
+    };
+    let begun = if lines.is_some() { 0.3 } else { 0.0 };
+    let rest = 0.9 - begun;
+    let edgels = edgels(scene, &config.detect, &mut |share| {
+        progress(begun + rest / 3.0 * share)
+    })?;
+    let on_progress = &mut |share| match progress(begun + rest * (1.0 + 2.0 * share) / 3.0) {
         Ok(()) => ControlFlow::Continue(()),
         Err(Cancelled) => ControlFlow::Break(()),
     };
     let config = &config.distill.assembler;
-    let built = assemble_with_progress(views, &edgels, scene_radius, config, on_progress);
+    let lines = lines.as_deref();
+    let built = assemble_with_progress(views, &edgels, lines, scene_radius, config, on_progress);
     match built {
         ControlFlow::Continue(built) => Ok(built),
         ControlFlow::Break(()) => Err(Cancelled.into()),
     }
+}
+
+/// The NEAT lines of all views.
+fn field_lines(
+    scene: &Scene,
+    field: &TrainedField,
+    config: &Config,
+    views: &[ViewObservation],
+    progress: OnProgress<'_>,
+) -> Result<Vec<Vec<NeatLine>>, Cancelled> {
+    let rays = rendered_segments(scene, field, config, RAYS_PER_LINE, progress)?;
+    let config = &config.distill.paper.neat_lines;
+    let lines = views.par_iter().zip(&rays);
+    Ok(lines
+        .map(|(view, rays)| neat_lines(view, rays, config))
+        .collect())
 }
 
 /// The edgels of all images.
@@ -266,42 +302,6 @@ pub fn agreement(scene: &Scene, config: &Config, wireframe: &Wireframe3d) -> Opt
     Some(evidence)
 }
 
-/// One rendered ray.
-struct RenderedRay {
-    segment: LineSegment3,
-    /// Rendered point `Σ w x`.
-    point: Vector3<f64>,
-}
-
-fn render_rays(field: &TrainedField, rays: &RayBundle) -> Vec<RenderedRay> {
-    let mut rendered = Vec::with_capacity(rays.len());
-    for start in (0..rays.len()).step_by(RAY_CHUNK) {
-        let end = (start + RAY_CHUNK).min(rays.len());
-        let chunk = RayBundle {
-            origins: rays.origins[start..end].to_vec(),
-            directions: rays.directions[start..end].to_vec(),
-        };
-        let samples = field.samples(&chunk);
-        let rendering = field.render(&chunk, &samples, false);
-        let ends = host_vec(rendering.segments.expect("segments of all rays"));
-        let weights = host_vec(rendering.weights);
-        for (ray, ends) in ends.chunks_exact(6).enumerate() {
-            let range = ray * samples.per_ray..(ray + 1) * samples.per_ray;
-            let mut point = Vector3::zeros();
-            for i in range {
-                let weight = f64::from(weights[i]);
-                point += Vector3::from(chunk.point(ray, samples.z[i])).map(f64::from) * weight;
-            }
-            let end = |k: usize| Vector3::new(ends[k], ends[k + 1], ends[k + 2]).map(f64::from);
-            rendered.push(RenderedRay {
-                segment: LineSegment3::new(end(0), end(3)),
-                point,
-            });
-        }
-    }
-    rendered
-}
-
 /// The paper's back end, which takes every ray of the thin regions.
 fn paper(
     scene: &Scene,
@@ -310,50 +310,13 @@ fn paper(
     views: &[ViewObservation],
     progress: OnProgress<'_>,
 ) -> Result<(Wireframe3d, BackEndReport), DistillError> {
-    let mut rays_by_view = Vec::with_capacity(views.len());
-    for (index, view) in scene.views.iter().enumerate() {
-        let regions = paper_regions(&view.wireframe, scene.pixel_center, config);
-        let query = Query::new(&view.camera, scene.pixel_center, &regions);
-        let rendered = render_rays(field, &query.rays);
-        let points: Vec<[f32; 3]> = rendered
-            .iter()
-            .map(|r| r.point.map(|c| c as f32).into())
-            .collect();
-        let surface = field.distances_and_gradients(&points);
-        let rays = rendered
-            .iter()
-            .zip(surface)
-            .enumerate()
-            .map(|(i, (ray, (_, gradient)))| SupportedSegment {
-                segment: ray.segment,
-                support_point: support_point(
-                    &Vector3::from(query.feet.origins[i]).map(f64::from),
-                    &Vector3::from(query.feet.directions[i]).map(f64::from),
-                    &ray.point,
-                    &Vector3::from(gradient).map(f64::from),
-                ),
-            })
-            .collect();
-        rays_by_view.push(rays);
-        progress(0.95 * (index + 1) as f64 / views.len() as f64)?;
-    }
+    let rays = rendered_segments(scene, field, config, usize::MAX, &mut |share| {
+        progress(0.95 * share)
+    })?;
     let paper = &config.distill.paper;
-    let built = paper.run(&field.junctions(), views, &rays_by_view, field)?;
+    let built = paper.run(&field.junctions(), views, &rays, field)?;
     let report = BackEndReport::Paper {
         steps: built.counts,
     };
     Ok((built.wireframe, report))
-}
-
-/// Where the ray through the foot meets the tangent plane at the rendered point
-/// (published `l3d`; denominators are kept 1e-6 off zero, as there).
-pub fn support_point(
-    origin: &Vector3<f64>,
-    direction: &Vector3<f64>,
-    point: &Vector3<f64>,
-    gradient: &Vector3<f64>,
-) -> Vector3<f64> {
-    let along = direction.dot(gradient);
-    let guard = if along < 0.0 { -1e-6 } else { 1e-6 };
-    origin + direction * ((point - origin).dot(gradient) / (along + guard))
 }

@@ -95,7 +95,7 @@ impl From<PlanError> for PipelineError {
             PlanError::Scene(error) => Self::Scene(error),
             PlanError::Config(error) => Self::Train(error),
             PlanError::Detector(error) => Self::Detector(error),
-            PlanError::Open(_) | PlanError::NoField(_) => {
+            PlanError::Open(_) | PlanError::NoField(_) | PlanError::NoFieldForPartners => {
                 Self::Train(TrainError::Config(error.to_string()))
             }
         }

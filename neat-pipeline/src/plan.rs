@@ -12,7 +12,9 @@ mod without_effect;
 pub use step_memory::{bytes_per_ray, rows_of_step};
 pub(crate) use without_effect::{Given, NO_FIELD, changes_of_presets, settings_without_effect};
 
-use crate::config::{BackEnd, Background, Choice, Config, DistillConfig, FieldUse};
+use crate::config::{
+    BackEnd, Background, Choice, Config, DistillConfig, FieldUse, Partners,
+};
 use crate::event::Decision;
 use neat_core::{MemoryLimit, Scene, SceneError};
 use neat_detect::DetectorConfigError;
@@ -49,6 +51,11 @@ pub enum PlanError {
         "distill.back_end = {0} asks the field: leave out distill.field = none, or take distill.back_end = assembler"
     )]
     NoField(BackEnd),
+    /// Partners are sought by the field, and no field.
+    #[error(
+        "distill.partners = field asks the field: leave out distill.field = none, or take distill.partners = epipolar"
+    )]
+    NoFieldForPartners,
     /// A value that a scene decides is still open.
     #[error("{0} is open: a scene has to decide it")]
     Open(&'static str),
@@ -112,13 +119,16 @@ impl Plan {
     }
 }
 
-/// Whether a field is trained: by default for a back end that asks it.
+/// Whether a field is trained: by default where something asks it.
 pub(crate) fn settle_field_use(asked: &DistillConfig) -> Result<FieldUse, PlanError> {
-    match (asked.field, asked.back_end) {
-        (Choice::Auto, BackEnd::Assembler) => Ok(FieldUse::None),
-        (Choice::Auto, BackEnd::Paper) => Ok(FieldUse::Trained),
-        (Choice::Given(FieldUse::None), BackEnd::Paper) => Err(PlanError::NoField(asked.back_end)),
-        (Choice::Given(field), _) => Ok(field),
+    let asks = asked.back_end == BackEnd::Paper;
+    let partners = !asks && asked.partners == Partners::Field;
+    match asked.field {
+        Choice::Auto if asks || partners => Ok(FieldUse::Trained),
+        Choice::Auto => Ok(FieldUse::None),
+        Choice::Given(FieldUse::None) if asks => Err(PlanError::NoField(asked.back_end)),
+        Choice::Given(FieldUse::None) if partners => Err(PlanError::NoFieldForPartners),
+        Choice::Given(field) => Ok(field),
     }
 }
 

@@ -28,6 +28,8 @@ pub enum Preset {
     /// CPU.
     #[default]
     Fast,
+    /// The method whole: a field with learned grids says which 2D segments show one edge.
+    Neat,
     /// Larger networks and more rays on top of `fast`: a surface and renderings of
     /// large scenes that can be used, in minutes on a CPU.
     Balanced,
@@ -35,16 +37,17 @@ pub enum Preset {
 
 /// A name that is no preset's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown preset `{0}`; use one of paper-abc, paper-dtu, paper-blendedmvs, fast, balanced")]
+#[error("unknown preset `{0}`; use one of paper-abc, paper-dtu, paper-blendedmvs, fast, neat, balanced")]
 pub struct UnknownPreset(String);
 
 impl Preset {
     /// Every preset.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::PaperAbc,
         Self::PaperDtu,
         Self::PaperBlendedmvs,
         Self::Fast,
+        Self::Neat,
         Self::Balanced,
     ];
 
@@ -55,6 +58,7 @@ impl Preset {
             Self::PaperDtu => "paper-dtu",
             Self::PaperBlendedmvs => "paper-blendedmvs",
             Self::Fast => "fast",
+            Self::Neat => "neat",
             Self::Balanced => "balanced",
         }
     }
@@ -69,6 +73,7 @@ impl Preset {
             Self::PaperDtu => &[PAPER, include_str!("../../presets/paper-dtu.toml")],
             Self::PaperBlendedmvs => &[PAPER, include_str!("../../presets/paper-blendedmvs.toml")],
             Self::Fast => &[FAST],
+            Self::Neat => &[FAST, include_str!("../../presets/neat.toml")],
             Self::Balanced => &[FAST, include_str!("../../presets/balanced.toml")],
         }
     }
@@ -120,7 +125,8 @@ impl FromStr for Preset {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Choice, FieldUse, apply_overrides};
+    use crate::config::{Choice, FieldUse, Partners, apply_overrides};
+    use crate::plan::settle_field_use;
     use neat_gjp::JunctionCount;
     use neat_tensor::Kernels;
     use neat_train::config::TrainingConfig;
@@ -196,6 +202,15 @@ mod tests {
         assert_eq!(balanced.distill.field, Choice::Given(FieldUse::Trained));
         assert_eq!(balanced.train.loss, fast.train.loss);
         assert_eq!(balanced.train.adam, fast.train.adam);
+    }
+
+    #[test]
+    fn the_neat_preset_asks_its_field_for_partners() {
+        let config = Preset::Neat.config();
+        assert_eq!(config.distill.partners, Partners::Field);
+        assert_eq!(config.distill.field, Choice::Auto);
+        assert_eq!(settle_field_use(&config.distill).unwrap(), FieldUse::Trained);
+        assert!(config.model.attraction.encoding.grid().is_some());
     }
 
     #[test]

@@ -35,13 +35,18 @@ pub(super) struct Query {
 }
 
 impl Query {
-    /// Through all pixels of `regions`, in their order.
-    pub fn new(camera: &Camera, pixel_center: f64, regions: &AttractionRegions) -> Self {
+    /// Through every `step`-th pixel of `regions`, in their order.
+    pub fn new(
+        camera: &Camera,
+        pixel_center: f64,
+        regions: &AttractionRegions,
+        step: usize,
+    ) -> Self {
         let mut query = Self {
             rays: RayBundle::default(),
             feet: RayBundle::default(),
         };
-        for (pixel, foot) in regions.pixels.iter().zip(&regions.feet) {
+        for (pixel, foot) in regions.pixels.iter().zip(&regions.feet).step_by(step) {
             push_ray(
                 &mut query.rays,
                 camera,

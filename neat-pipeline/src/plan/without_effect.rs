@@ -1,7 +1,7 @@
 //! Settings that a person has changed and that do nothing.
 
 use super::Plan;
-use crate::config::{BackEnd, Background, Config, Difference, Preset, differences};
+use crate::config::{BackEnd, Background, Config, Difference, Partners, Preset, differences};
 use crate::event::{Warning, WarningKind};
 
 /// What a person has changed: in what `asked` differs from the preset nearest to it.
@@ -59,7 +59,20 @@ fn only_trains(key: &str) -> bool {
 /// How the keys of settings begin that do nothing, and why.
 fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)> {
     let mut idle = match plan.back_end() {
-        BackEnd::Paper => vec![("distill.assembler.", PAPER_RUNS)],
+        BackEnd::Paper => vec![
+            ("distill.assembler.", PAPER_RUNS),
+            ("distill.partners", PAPER_RUNS),
+        ],
+        BackEnd::Assembler if plan.config().distill.partners == Partners::Field => {
+            let keys = [
+                "distill.paper.junction",
+                "distill.paper.image_refinement.",
+                "distill.paper.attraction.",
+                "distill.paper.visibility.",
+                "distill.paper.keep_isolated_junctions",
+            ];
+            keys.map(|key| (key, ASSEMBLER_RUNS)).to_vec()
+        }
         BackEnd::Assembler => vec![("distill.paper.", ASSEMBLER_RUNS)],
     };
     if !plan.trains() && !given.trained {

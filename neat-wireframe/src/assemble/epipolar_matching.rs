@@ -49,6 +49,24 @@ struct Arc {
     ends: [f64; 2],
 }
 
+impl Arc {
+    fn turned(self, angle: f64) -> Self {
+        Self {
+            low: self.low + angle,
+            ends: self.ends.map(|end| end + angle),
+            ..self
+        }
+    }
+}
+
+/// A segment whose partners are sought.
+struct Seed<'a> {
+    rays: &'a [Vector3<f64>; 2],
+    arc: Arc,
+    /// Where its ends may lie along their rays.
+    depth_ranges: [[f64; 2]; 2],
+}
+
 /// The pencil of planes around a baseline.
 struct Pencil {
     axes: [Vector3<f64>; 2],
@@ -117,14 +135,7 @@ impl<'a> ViewPair<'a> {
             let Some(arc) = pencil.arc(&prepared.rays) else {
                 continue;
             };
-            arcs.extend([-TAU, 0.0, TAU].map(|turn| {
-                let turned = Arc {
-                    low: arc.low + turn,
-                    ends: arc.ends.map(|end| end + turn),
-                    ..arc
-                };
-                (turned, segment)
-            }));
+            arcs.extend([-TAU, 0.0, TAU].map(|turn| (arc.turned(turn), segment)));
         }
         arcs.sort_by(|(a, i), (b, j)| a.low.total_cmp(&b.low).then(i.cmp(j)));
         Some(Self {
@@ -136,6 +147,11 @@ impl<'a> ViewPair<'a> {
         })
     }
 
+    /// Which of the view's neighbours the second view is.
+    pub(super) fn slot(&self) -> usize {
+        self.slot
+    }
+
     /// Appends the partners of a segment of the first view whose hypotheses lie
     /// within the ball of radius `ball_radius` around the origin.
     pub(super) fn append_matches(
@@ -144,18 +160,10 @@ impl<'a> ViewPair<'a> {
         ball_radius: f64,
         matches: &mut Vec<LineMatch>,
     ) {
-        let rays = &self.view.segments[segment].rays;
-        let center = &self.view.camera.center_in_world;
-        let Some(arc) = self.pencil.arc(rays) else {
+        let Some(seed) = self.seed(segment, ball_radius) else {
             return;
         };
-        let Some(depth_ranges) = Option::zip(
-            ball_interval(center, &rays[0], ball_radius),
-            ball_interval(center, &rays[1], ball_radius),
-        ) else {
-            return;
-        };
-        let depth_ranges = [depth_ranges.0, depth_ranges.1];
+        let arc = &seed.arc;
         let min_overlap = MIN_OVERLAP.clamp(LEAST_OVERLAP, 1.0);
         // A longer arc could not overlap by its share.
         let lowest = arc.low - arc.length * (1.0 / min_overlap - 1.0);
@@ -170,21 +178,53 @@ impl<'a> ViewPair<'a> {
             if common < min_overlap * arc.length.max(other.length) {
                 continue;
             }
-            if let Some(found) = self.triangulate(rays, &arc, *partner, other, &depth_ranges) {
-                matches.push(found);
-            }
+            matches.extend(self.triangulate(&seed, *partner, other));
         }
+    }
+
+    /// Appends `partners`, which something else than the epipolar geometry has found.
+    pub(super) fn append_partners(
+        &self,
+        segment: usize,
+        partners: &[usize],
+        ball_radius: f64,
+        matches: &mut Vec<LineMatch>,
+    ) {
+        let Some(seed) = self.seed(segment, ball_radius) else {
+            return;
+        };
+        for partner in partners {
+            let Some(arc) = self.pencil.arc(&self.other.segments[*partner].rays) else {
+                continue;
+            };
+            let turned = arc.turned(wrapped(arc.low - seed.arc.low) - (arc.low - seed.arc.low));
+            matches.extend(self.triangulate(&seed, *partner, &turned));
+        }
+    }
+
+    fn seed(&self, segment: usize, ball_radius: f64) -> Option<Seed<'_>> {
+        let rays = &self.view.segments[segment].rays;
+        let center = &self.view.camera.center_in_world;
+        let [start, end] = rays.map(|ray| ball_interval(center, &ray, ball_radius));
+        Some(Seed {
+            rays,
+            arc: self.pencil.arc(rays)?,
+            depth_ranges: [start?, end?],
+        })
     }
 
     /// Cuts the rays of the segment's ends with the partner's plane.
     fn triangulate(
         &self,
-        rays: &[Vector3<f64>; 2],
-        arc: &Arc,
+        seed: &Seed<'_>,
         partner: usize,
         partner_arc: &Arc,
-        depth_ranges: &[[f64; 2]; 2],
     ) -> Option<LineMatch> {
+        let Seed {
+            rays,
+            arc,
+            depth_ranges,
+        } = seed;
         let prepared = &self.other.segments[partner];
         let normal = &prepared.plane_normal;
         let center = &self.view.camera.center_in_world;

@@ -7,6 +7,7 @@
 //! agreement is a reprojection test.
 
 use super::epipolar_matching::{LineMatch, ViewPair};
+use super::field_partners::FieldLines;
 use super::view_segments::{PreparedView, SegmentId};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -54,10 +55,12 @@ pub(super) struct Hypothesis {
 /// The best hypotheses of every segment of every view, best first.
 pub(super) type Alternatives = Vec<Vec<Vec<Hypothesis>>>;
 
-/// Matches and scores all segments.
+/// Matches and scores all segments: partners are those that the field knows, or else all
+/// that the epipolar geometry allows.
 pub(super) fn score_hypotheses(
     views: &[PreparedView],
     neighbours: &[Vec<usize>],
+    field: Option<&FieldLines>,
     ball_radius: f64,
     min_views: usize,
     scoring: &Scoring,
@@ -76,7 +79,13 @@ pub(super) fn score_hypotheses(
                 .map(|segment| {
                     let mut matches = Vec::new();
                     for pair in &pairs {
-                        pair.append_matches(segment, ball_radius, &mut matches);
+                        let Some(field) = field else {
+                            pair.append_matches(segment, ball_radius, &mut matches);
+                            continue;
+                        };
+                        let of = SegmentId { view: i, segment };
+                        let partners = field.partners(of, neighbours[i][pair.slot()]);
+                        pair.append_partners(segment, &partners, ball_radius, &mut matches);
                     }
                     Scorer::new(matches, &neighbours[i], scoring).best(min_views)
                 })

@@ -123,7 +123,7 @@ pub fn line3d(
         alternatives: 1,
     };
     let alternatives =
-        score_hypotheses(&views, &neighbours, config.ball_margin, min_views, &scoring);
+        score_hypotheses(&views, &neighbours, None, config.ball_margin, min_views, &scoring);
     let positioned: Vec<Positioned> = (alternatives.into_iter().enumerate())
         .flat_map(|(view, lists)| {
             let best = lists.into_iter().enumerate();

@@ -3,7 +3,7 @@
 //!
 //! The 2D segments propose lines in space, matched across views by the epipolar geometry
 //! (Hofer, Maurer and Bischof, *Efficient 3D scene abstraction using line segments*,
-//! Line3D++, 2017). The images decide: the line that they speak for most is fitted to the
+//! Line3D++, 2017), or by a field that says which of them show one edge. The images decide: the line that they speak for most is fitted to the
 //! edgels of all views at once, takes them, and the next one is chosen by those that are
 //! left. Lines that bend are curves, and those that move aside from view to view are outlines
 //! of round things. Ends that meet become corners, all corners are fitted to the edgels
@@ -25,6 +25,7 @@ mod edge_completion;
 mod edge_cutting;
 mod edge_samples;
 mod epipolar_matching;
+mod field_partners;
 mod free_ends;
 mod graph_fitting;
 mod graph_segmentation;
@@ -55,12 +56,14 @@ pub use line3d::{Line3dConfig, Line3dSegment, SegmentSupport, line3d, wireframe_
 pub use progress::OnProgress;
 pub use report::{AssembleReport, Assembled};
 
+use crate::paper::NeatLine;
 use crate::{ViewObservation, Wireframe3d};
 use collinear_pieces::merge_pieces;
 use corners::find_corners;
 use edge_completion::complete_edges;
 use edge_cutting::{cut_edges, in_order};
 use edge_samples::Images;
+use field_partners::FieldLines;
 use free_ends::move_free_ends;
 use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Scoring, score_hypotheses};
@@ -106,22 +109,30 @@ pub fn assemble(
     config: &AssembleConfig,
 ) -> Assembled {
     let go_on = &mut |_| ControlFlow::Continue(());
-    match assemble_with_progress(observations, edgels, scene_radius, config, go_on) {
+    match assemble_with_progress(observations, edgels, None, scene_radius, config, go_on) {
         ControlFlow::Continue(assembled) => assembled,
         ControlFlow::Break(()) => Assembled::default(),
     }
 }
 
 /// [`assemble`], which ends as soon as `progress` says so.
+///
+/// With `field_lines`, the NEAT lines of each view, 2D segments are partners if these lie
+/// near each other, and are not matched otherwise.
 pub fn assemble_with_progress(
     observations: &[ViewObservation],
     edgels: &[EdgelMap],
+    field_lines: Option<&[Vec<NeatLine>]>,
     scene_radius: f64,
     config: &AssembleConfig,
     progress: OnProgress<'_>,
 ) -> ControlFlow<(), Assembled> {
     let usable = scene_radius.is_normal() && scene_radius > 0.0;
-    if !usable || !(edgels.is_empty() || edgels.len() == observations.len()) {
+    let fits = |views: usize| views == observations.len();
+    if !usable
+        || !(edgels.is_empty() || fits(edgels.len()))
+        || !field_lines.is_none_or(|lines| fits(lines.len()))
+    {
         return ControlFlow::Continue(Assembled::default());
     }
     let _span = tracing::debug_span!("assemble", views = observations.len()).entered();
@@ -141,7 +152,15 @@ pub fn assemble_with_progress(
     let neighbours = neighbours::neighbours(&views, config.ball_margin, config.neighbours);
     let scoring = Scoring::default();
     let margin = config.ball_margin;
-    let alternatives = score_hypotheses(&views, &neighbours, margin, MIN_VIEWS, &scoring);
+    let field = field_lines.map(|lines| FieldLines::new(&views, lines, scene_radius.recip()));
+    let alternatives = score_hypotheses(
+        &views,
+        &neighbours,
+        field.as_ref(),
+        margin,
+        MIN_VIEWS,
+        &scoring,
+    );
     progress(PROPOSED)?;
     let mut report = AssembleReport {
         usable_views: views
