@@ -160,7 +160,7 @@ struct Cap {
 pub struct Distances {
     network: ImplicitNetwork,
     device: Device,
-    prepared: OnceLock<Option<SoftplusNetwork>>,
+    prepared: OnceLock<Option<SoftplusNetwork<'static>>>,
 }
 
 /// Points per call of a device: bounds the memory of a query.
@@ -186,7 +186,7 @@ impl Distances {
             .collect()
     }
 
-    fn on_host(&self) -> Option<&SoftplusNetwork> {
+    fn on_host(&self) -> Option<&SoftplusNetwork<'static>> {
         let prepared = self.prepared.get_or_init(|| self.network.mlp.on_host());
         prepared.as_ref()
     }

@@ -122,7 +122,7 @@ impl CoordinateMlp {
 
     /// The network on the host, for queries without gradients: where it computes
     /// on the CPU in float32.
-    pub fn on_host(&self) -> Option<SoftplusNetwork> {
+    pub fn on_host(&self) -> Option<SoftplusNetwork<'static>> {
         let parameters = flat_parameters(&self.layers).detach();
         if !self.kernels.of(&parameters).works_on_host() {
             return None;
@@ -143,7 +143,7 @@ impl CoordinateMlp {
 
     /// A pass of `network`, which is this one [`Self::on_host`], over `points` `[N · 3]`,
     /// where there is room to keep it.
-    pub fn known_pass(&self, network: &SoftplusNetwork, points: &[f32]) -> Option<KnownPass> {
+    pub fn known_pass(&self, network: &SoftplusNetwork<'_>, points: &[f32]) -> Option<KnownPass> {
         KnownPass::run(network, points, self.kernels.memory())
     }
 

@@ -135,24 +135,23 @@ fn write<B: Backend>(
 pub type SoftplusTensors<B> = (FloatTensor<B>, FloatTensor<B>, Option<FloatTensor<B>>);
 
 /// The network of `[parameters, table]`.
-fn network_of<B: Backend>(shape: &SoftplusShape, learned: [FloatTensor<B>; 2]) -> SoftplusNetwork {
-    let [parameters, table] = learned.map(read::<B>);
-    let table = table
-        .try_into_vec()
-        .expect("fused: networks are float32 here");
-    SoftplusNetwork::new(Arch::new(), shape, slice(&parameters), table)
+fn network_of<'t, B: HostMemory>(
+    shape: &SoftplusShape,
+    [parameters, table]: &'t [FloatTensor<B>; 2],
+) -> SoftplusNetwork<'t> {
+    SoftplusNetwork::new(Arch::new(), shape, &B::values(parameters), B::values(table))
 }
 
-fn softplus_forward<B: Backend>(
-    points: FloatTensor<B>,
-    learned: [FloatTensor<B>; 2],
+fn softplus_forward<B: HostMemory>(
+    points: &FloatTensor<B>,
+    learned: &[FloatTensor<B>; 2],
     request: &SoftplusRequest,
     keep: bool,
 ) -> (SoftplusTensors<B>, Option<softplus_network::Tape>) {
     let device = points.device();
-    let points = read::<B>(points);
+    let points = B::values(points);
     let network = network_of::<B>(&request.shape, learned);
-    let (full, light) = slice(&points).split_at(3 * request.full_rows);
+    let (full, light) = points.split_at(3 * request.full_rows);
     let known = request.known.as_ref().map(KnownRows::as_known);
     let (output, tape) = network.forward(full, known, request.others, keep);
     let SoftplusOutput {
@@ -179,18 +178,17 @@ fn softplus_forward<B: Backend>(
     (tensors, tape)
 }
 
-fn relu_forward<B: Backend>(
-    inputs: [FloatTensor<B>; 3],
-    parameters: FloatTensor<B>,
+fn relu_forward<B: HostMemory>(
+    inputs: &[FloatTensor<B>; 3],
+    parameters: &FloatTensor<B>,
     shape: &ReluShape,
     keep: bool,
 ) -> (FloatTensor<B>, Option<relu_network::Tape>) {
     let device = inputs[0].device();
     let rows = inputs[0].shape()[0];
-    let inputs = inputs.map(read::<B>);
-    let parameters = read::<B>(parameters);
-    let network = ReluNetwork::new(Arch::new(), shape, slice(&parameters));
-    let inputs = inputs.each_ref().map(slice);
+    let network = ReluNetwork::new(Arch::new(), shape, &B::values(parameters));
+    let inputs = inputs.each_ref().map(B::values);
+    let inputs = inputs.each_ref().map(|values| &**values);
     let (out, tape) = network.forward(rows, &inputs, keep);
     (write::<B>(out, [rows, shape.outputs()], &device), tape)
 }
@@ -204,7 +202,7 @@ macro_rules! on_the_host {
                 table: FloatTensor<Self>,
                 request: SoftplusRequest,
             ) -> SoftplusTensors<Self> {
-                softplus_forward::<Self>(points, [parameters, table], &request, false).0
+                softplus_forward::<Self>(&points, &[parameters, table], &request, false).0
             }
 
             fn relu_network(
@@ -215,7 +213,7 @@ macro_rules! on_the_host {
                 request: ReluRequest,
             ) -> FloatTensor<Self> {
                 let inputs = [inputs, gradients, features];
-                relu_forward::<Self>(inputs, parameters, &request.shape, false).0
+                relu_forward::<Self>(&inputs, &parameters, &request.shape, false).0
             }
         }
     };

@@ -3,7 +3,7 @@
 use crate::backend::is_on_host;
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
-use burn::tensor::{DType, Tensor, TensorData};
+use burn::tensor::{DType, Tensor, TensorCreationOptions, TensorData};
 use std::collections::BTreeMap;
 
 /// Follows a module's fields down to its parameters and names them
@@ -93,7 +93,7 @@ pub fn named_gradients<M: Module>(
 }
 
 struct FiniteGradients<'a> {
-    gradients: &'a GradientsParams,
+    gradients: &'a mut GradientsParams,
     finite: bool,
     /// Sums of gradients that lie on a device, which no NaN and no infinity leaves
     /// finite.
@@ -102,11 +102,14 @@ struct FiniteGradients<'a> {
 
 impl ModuleVisitor for FiniteGradients<'_> {
     fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<D>>) {
-        let Some(gradient) = self.gradients.get::<D>(param.id) else {
+        // Taken out, a gradient is nobody else's, and looking at its values copies none.
+        let Some(gradient) = self.gradients.remove::<D>(param.id) else {
             return;
         };
-        if !is_on_host(&gradient.device()) {
-            self.sums.push(gradient.sum());
+        let device = gradient.device();
+        if !is_on_host(&device) {
+            self.sums.push(gradient.clone().sum());
+            self.gradients.register(param.id, gradient);
             return;
         }
         // On the host a look at every value costs less than one tensor operation.
@@ -115,6 +118,8 @@ impl ModuleVisitor for FiniteGradients<'_> {
             Ok(values) => values.iter().fold(true, |finite, x| finite & x.is_finite()),
             Err(_) => data.iter::<f64>().all(f64::is_finite),
         };
+        let options = TensorCreationOptions::new(device).with_dtype(data.dtype());
+        (self.gradients).register(param.id, Tensor::<D>::from_data(data, options));
     }
 }
 
@@ -129,7 +134,7 @@ pub struct GradientCheck {
 
 impl GradientCheck {
     /// Looks at the gradients of `module`, without waiting for a device.
-    pub fn of<M: Module>(module: &M, gradients: &GradientsParams) -> Self {
+    pub fn of<M: Module>(module: &M, gradients: &mut GradientsParams) -> Self {
         let mut visitor = FiniteGradients {
             gradients,
             finite: true,
@@ -205,7 +210,7 @@ impl ModuleMapper for Writer {
         let dtype = self.dtype;
         param.map(|old| {
             let dtype = dtype.unwrap_or(old.dtype());
-            let options = burn::tensor::TensorCreationOptions::new(old.device()).with_dtype(dtype);
+            let options = TensorCreationOptions::new(old.device()).with_dtype(dtype);
             Tensor::from_data(data, options).set_require_grad(old.is_require_grad())
         })
     }

@@ -83,6 +83,10 @@ pub struct TrainConfig {
     pub adam: AdamConfig,
     /// Learning rate of the networks at the start.
     pub learning_rate: f64,
+    /// Learning rate of the tables of learned grids, as a multiple of that of the networks:
+    /// of an entry only the points in a few cells speak.
+    #[serde(default = "default_grid_learning_rate")]
+    pub grid_learning_rate: f64,
     /// Learning rate of the junction latents and their decoder at the start.
     pub junction_learning_rate: f64,
     /// Factor by which the learning rates fall, exponentially, over all steps.
@@ -98,6 +102,10 @@ pub struct TrainConfig {
     /// that it turns out to be damaged.
     #[serde(default = "default_kept_checkpoints")]
     pub kept_checkpoints: usize,
+}
+
+fn default_grid_learning_rate() -> f64 {
+    1.0
 }
 
 fn default_checkpoint_seconds() -> f64 {
@@ -129,6 +137,7 @@ impl Default for TrainConfig {
             junction_interval: 1,
             adam: AdamConfig::default(),
             learning_rate: 5e-4,
+            grid_learning_rate: default_grid_learning_rate(),
             junction_learning_rate: 5e-4,
             learning_rate_decay: 0.1,
             warm_up_steps: 0,

@@ -224,6 +224,8 @@ impl Trainer {
         let rate = |name: &str| {
             if name.starts_with("perceiver.") {
                 junctions
+            } else if name.ends_with("grid.table") {
+                networks * train.grid_learning_rate
             } else {
                 networks
             }

@@ -63,8 +63,15 @@ impl TrainingConfig {
         if self.scene_radius.is_some_and(|r| !positive(r)) {
             return refuse("data.scene_radius must be positive");
         }
-        if !positive(train.learning_rate) || !positive(train.learning_rate_decay) {
-            return refuse("train.learning_rate and learning_rate_decay must be positive");
+        let rates = [
+            train.learning_rate,
+            train.grid_learning_rate,
+            train.learning_rate_decay,
+        ];
+        if !rates.into_iter().all(positive) {
+            return refuse(
+                "train.learning_rate, grid_learning_rate and learning_rate_decay must be positive",
+            );
         }
         if train.views == BatchViews::All
             && (train.loss.junction_2d > 0.0 || train.matching.weight_2d > 0.0)

@@ -18,8 +18,8 @@ fn finite_for(x: [f32; 3], device: &Device) -> bool {
     };
     let layer = Linear::new(&init, 3, 2, false, device);
     let output = layer.forward(Tensor::from_data([x], device));
-    let gradients = GradientsParams::from_grads(output.sum().backward(), &layer);
-    GradientCheck::of(&layer, &gradients).all_finite()
+    let mut gradients = GradientsParams::from_grads(output.sum().backward(), &layer);
+    GradientCheck::of(&layer, &mut gradients).all_finite()
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Derivatives of the operations in `fused.rs`, by hand-written backward passes.
 
 use super::{
-    FusedNetworks, ReluRequest, SoftplusRequest, SoftplusTensors, network_of, read, relu_forward,
-    slice, softplus_forward, write,
+    FusedNetworks, HostMemory, ReluRequest, SoftplusRequest, SoftplusTensors, network_of, read,
+    relu_forward, slice, softplus_forward, write,
 };
 use crate::kernels::cpu::relu_network::{self, ReluNetwork, ReluShape};
 use crate::kernels::cpu::softplus_network::{self, SoftplusAdjoint};
@@ -40,7 +40,7 @@ struct SoftplusState<B: Backend> {
     tape: Tape<softplus_network::Tape>,
 }
 
-impl<B: Backend> Backward<B, 3> for SoftplusOp {
+impl<B: HostMemory> Backward<B, 3> for SoftplusOp {
     type State = SoftplusState<B>;
 
     fn backward(
@@ -58,10 +58,9 @@ impl<B: Backend> Backward<B, 3> for SoftplusOp {
         } = ops.state;
         let device = points.device();
         gradients.consume::<B>(&ops.node);
-        let points = read::<B>(points);
-        let points = slice(&points);
+        let points = B::values(&points);
         let rows = points.len() / 3;
-        let network = network_of::<B>(&request.shape, learned);
+        let network = network_of::<B>(&request.shape, &learned);
         let adjoints = std::mem::take(&mut *lock(&adjoints));
         // An output that nothing depends on has left none.
         let [first, gradient] = [(0, rows), (1, 3 * request.full_rows)].map(|(i, len)| {
@@ -76,7 +75,7 @@ impl<B: Backend> Backward<B, 3> for SoftplusOp {
         };
         let [of_points, of_parameters, of_table] = ops.parents.map(|node| Some(node?.id));
         let gradient = network.backward(
-            points,
+            &points,
             request.known.as_ref().map(KnownRows::as_known),
             adjoint,
             tape.take(),
@@ -166,7 +165,7 @@ struct ReluState<B: Backend> {
     tape: Tape<relu_network::Tape>,
 }
 
-impl<B: Backend> Backward<B, 4> for ReluOp {
+impl<B: HostMemory> Backward<B, 4> for ReluOp {
     type State = ReluState<B>;
 
     fn backward(
@@ -183,16 +182,16 @@ impl<B: Backend> Backward<B, 4> for ReluOp {
         } = ops.state;
         let device = inputs[0].device();
         let rows = inputs[0].shape()[0];
-        let adjoint = read::<B>(gradients.consume::<B>(&ops.node));
-        let (inputs, parameters) = (inputs.map(read::<B>), read::<B>(parameters));
-        let network = ReluNetwork::new(Arch::new(), &shape, slice(&parameters));
+        let adjoint = gradients.consume::<B>(&ops.node);
+        let inputs = inputs.each_ref().map(B::values);
+        let network = ReluNetwork::new(Arch::new(), &shape, &B::values(&parameters));
         let [inputs_node, gradients_node, features_node, of_parameters] =
             ops.parents.map(|node| Some(node?.id));
         let nodes = [inputs_node, gradients_node, features_node];
         let (to_parameters, to_inputs) = network.backward(
             rows,
-            &inputs.each_ref().map(slice),
-            slice(&adjoint),
+            &inputs.each_ref().map(|values| &**values),
+            &B::values(&adjoint),
             tape.take(),
             &nodes.each_ref().map(Option::is_some),
         );
@@ -206,7 +205,7 @@ impl<B: Backend> Backward<B, 4> for ReluOp {
     }
 }
 
-impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodiff<B, C> {
+impl<B: HostMemory + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodiff<B, C> {
     fn softplus_network(
         points: FloatTensor<Self>,
         parameters: FloatTensor<Self>,
@@ -221,12 +220,8 @@ impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodi
         let (operation, values) = match SoftplusOp.prepare::<C>(nodes).compute_bound().stateful() {
             OpsKind::Tracked(prepared) => {
                 let booking = (request.memory).book(request.shape.tape_bytes(request.full_rows));
-                let (values, tape) = softplus_forward::<B>(
-                    points.clone(),
-                    learned.clone(),
-                    &request,
-                    booking.is_some(),
-                );
+                let (values, tape) =
+                    softplus_forward::<B>(&points, &learned, &request, booking.is_some());
                 let state = SoftplusState {
                     points,
                     learned,
@@ -268,8 +263,7 @@ impl<B: Backend + FusedNetworks, C: CheckpointStrategy> FusedNetworks for Autodi
                 let inputs = [inputs, gradients, features];
                 let booking = memory.book(shape.tape_bytes(inputs[0].shape()[0]));
                 let keep = booking.is_some();
-                let (out, tape) =
-                    relu_forward::<B>(inputs.clone(), parameters.clone(), &shape, keep);
+                let (out, tape) = relu_forward::<B>(&inputs, &parameters, &shape, keep);
                 let state = ReluState {
                     inputs,
                     parameters,

@@ -303,8 +303,8 @@ fn at_once(
     let loss = step_loss(step.model, input, step.beta(device), step.train, device)?;
     let forward = start.elapsed() - loss.assignment;
     let start = Instant::now();
-    let gradients = GradientsParams::from_grads(loss.total.backward(), step.model);
-    let check = GradientCheck::of(step.model, &gradients);
+    let mut gradients = GradientsParams::from_grads(loss.total.backward(), step.model);
+    let check = GradientCheck::of(step.model, &mut gradients);
     // Of a device, everything is read at once when the step is over.
     let mut transfer = Transfer::default();
     let terms = transfer.add(loss.terms.inner());

@@ -83,7 +83,7 @@ pub(super) fn in_passes(
             sum.add(loss);
         }
     }
-    let (gradients, backward) = sum.finish();
+    let (mut gradients, backward) = sum.finish();
     losses.total = losses.weighted_sum(&config.loss);
     Ok(StepOutcome {
         losses,
@@ -92,7 +92,7 @@ pub(super) fn in_passes(
         rows,
         targets,
         beta: None,
-        finite: GradientCheck::of(model, &gradients).all_finite(),
+        finite: GradientCheck::of(model, &mut gradients).all_finite(),
         gradients,
         timings: StepTimings {
             forward: start.elapsed().saturating_sub(assignment + backward),

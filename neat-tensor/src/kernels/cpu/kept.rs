@@ -80,7 +80,7 @@ pub struct KnownPass {
 
 impl KnownPass {
     /// Runs the pass over `points` `[N · 3]`, unless there is no room to keep it.
-    pub fn run(network: &SoftplusNetwork, points: &[f32], memory: &KeptMemory) -> Option<Self> {
+    pub fn run(network: &SoftplusNetwork<'_>, points: &[f32], memory: &KeptMemory) -> Option<Self> {
         let bytes = network.shape().first_pass_bytes(points.len() / 3);
         let booking = memory.book(bytes)?;
         Some(Self {

@@ -40,7 +40,7 @@ struct BlockPass<'a> {
     through: Vec<&'a mut [f32]>,
 }
 
-impl SoftplusNetwork {
+impl SoftplusNetwork<'_> {
     pub(super) fn block_backward(
         &self,
         job: BlockJob<'_>,

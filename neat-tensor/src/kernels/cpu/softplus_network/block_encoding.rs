@@ -25,7 +25,7 @@ pub(super) struct EncodingAdjoint<'a> {
     pub gradient: Option<&'a [f32]>,
 }
 
-impl SoftplusNetwork {
+impl SoftplusNetwork<'_> {
     /// The encoding of a block's points, with its derivatives where wanted; rows beyond
     /// them repeat the origin.
     pub(super) fn encode<'a>(

@@ -35,7 +35,7 @@ impl SoftplusShape {
     }
 }
 
-impl SoftplusNetwork {
+impl SoftplusNetwork<'_> {
     pub(super) fn block_first(
         &self,
         points: &[f32],

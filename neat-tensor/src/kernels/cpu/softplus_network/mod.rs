@@ -30,6 +30,7 @@ use super::weight_gradient::sum_over_blocks;
 use super::{BLOCK_ROWS, padded};
 use pulp::Arch;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// Coordinates of a point.
@@ -52,12 +53,12 @@ pub struct SoftplusShape {
 
 /// A network with its weights packed.
 #[derive(Debug)]
-pub struct SoftplusNetwork {
+pub struct SoftplusNetwork<'t> {
     shape: SoftplusShape,
     arch: Arch,
     packed: PackedLayers,
     /// The grid's table, `[entries, features]`; empty without one.
-    table: Vec<f32>,
+    table: Cow<'t, [f32]>,
     /// The first output's column of the last layer, as right operand.
     first_forward: Panels,
     /// … its row, as right operand of one-column left operands.
@@ -184,13 +185,19 @@ impl SoftplusShape {
     }
 }
 
-impl SoftplusNetwork {
+impl<'t> SoftplusNetwork<'t> {
     /// Packs `parameters`: of each layer the weight `[outputs, inputs]`, row-major,
     /// then the bias. `table` `[entries, features]` is that of the grid, if there is one.
     ///
     /// # Panics
     /// If they do not fit the shape.
-    pub fn new(arch: Arch, shape: &SoftplusShape, parameters: &[f32], table: Vec<f32>) -> Self {
+    pub fn new(
+        arch: Arch,
+        shape: &SoftplusShape,
+        parameters: &[f32],
+        table: impl Into<Cow<'t, [f32]>>,
+    ) -> Self {
+        let table = table.into();
         if let Some(grid) = &shape.grid {
             assert_eq!(
                 table.len(),
