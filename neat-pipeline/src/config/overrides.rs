@@ -231,17 +231,26 @@ mod tests {
     #[test]
     fn an_encoding_is_chosen_and_sized() {
         let fast = crate::config::Preset::Fast.config();
-        let encoding = "model.implicit.encoding";
-        let kind = format!("{encoding}.kind=grid");
-        let levels = format!("{encoding}.levels=5");
-        let config = apply_overrides(&fast, &[kind, levels]).unwrap();
-        let grid = config.model.implicit.encoding.grid().expect("chosen");
-        assert_eq!(grid.levels, 5);
-        // As a run's folder keeps it.
-        let text = toml::to_string(&config).unwrap();
-        assert_eq!(toml::from_str::<Config>(&text).unwrap(), config);
-        let unknown = format!("{encoding}.levels=5");
-        apply_overrides(&fast, &[unknown]).unwrap_err();
+        for network in ["implicit", "rendering", "attraction"] {
+            let encoding = format!("model.{network}.encoding");
+            let kind = format!("{encoding}.kind=grid");
+            let levels = format!("{encoding}.levels=5");
+            let config = apply_overrides(&fast, &[kind, levels.clone()]).unwrap();
+            let model = &config.model;
+            let chosen = [
+                ("implicit", &model.implicit.encoding),
+                ("rendering", &model.rendering.encoding),
+                ("attraction", &model.attraction.encoding),
+            ];
+            for (name, encoding) in chosen {
+                let levels = encoding.grid().map(|grid| grid.levels);
+                assert_eq!(levels, (name == network).then_some(5), "{name}");
+            }
+            // As a run's folder keeps it.
+            let text = toml::to_string(&config).unwrap();
+            assert_eq!(toml::from_str::<Config>(&text).unwrap(), config);
+            apply_overrides(&fast, &[levels]).unwrap_err();
+        }
     }
 
     #[test]
