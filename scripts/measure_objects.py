@@ -4,6 +4,7 @@
     scripts/measure_objects.py DATA OUT                        seeds 0, 1 and 2, all views
     scripts/measure_objects.py DATA OUT --views 50,25,12       fewer views
     scripts/measure_objects.py DATA OUT --set KEY=VALUE        with another setting
+    scripts/measure_objects.py DATA OUT --preset neat          with another preset
 
 DATA holds one folder per object, with gt_wireframe.json; those without straight edges are
 left out. HAWP's 2D wireframes are not used, except with --hawp. OUT keeps every run, so that
@@ -29,6 +30,7 @@ def arguments():
     parser.add_argument("--seeds", default="0,1,2")
     parser.add_argument("--views", default="", help="numbers of views, with commas")
     parser.add_argument("--hawp", action="store_true", help="use HAWP's wireframes")
+    parser.add_argument("--preset", default="fast", help="what the runs start from")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--threshold", type=float, default=0.01)
     return parser.parse_args()
@@ -52,7 +54,7 @@ def without_hawp(scene, out):
 
 
 def run_arguments(options, views):
-    arguments = ["--no-doctor", *settings(options.set)]
+    arguments = ["--no-doctor", "--preset", options.preset, *settings(options.set)]
     if views:
         arguments += ["--max-views", int(views)]
     return arguments

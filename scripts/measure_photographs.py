@@ -3,6 +3,7 @@
 
     scripts/measure_photographs.py DATA OUT                  seeds 0, 1 and 2
     scripts/measure_photographs.py DATA OUT --set KEY=VALUE  with another setting
+    scripts/measure_photographs.py DATA OUT --preset neat    with another preset
 
 DATA holds one folder per scene, with images, a COLMAP model and truth/. *Structure* is what
 `neat export --only structure` leaves. The baseline of
@@ -28,6 +29,7 @@ def arguments():
     parser.add_argument("--neat", default="target/release/neat", help="the program")
     parser.add_argument("--scenes", help="names of folders, with commas; all with truth/")
     parser.add_argument("--seeds", default="0,1,2")
+    parser.add_argument("--preset", default="fast", help="what the runs start from")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--no-rivals", action="store_true", help="neat alone")
     return parser.parse_args()
@@ -77,7 +79,7 @@ def measure(options):
         runs = []
         for seed in options.seeds.split(","):
             run = options.out / "runs" / scene.name / f"seed-{seed}"
-            arguments = ["--no-cache", *settings(options.set)]
+            arguments = ["--no-cache", "--preset", options.preset, *settings(options.set)]
             manifest = reconstruct(options.neat, scene, run, seed, *arguments)
             seconds = sum(manifest["seconds"].values())
             scores = evaluate(options, scene, run / "wireframe.json")

@@ -106,8 +106,8 @@ impl BackEndReport {
         })
     }
 
-    /// Why there is no edge, by what the steps found.
-    pub fn why_empty(&self) -> String {
+    /// Why there is no edge, by what the steps found with these `partners`.
+    pub fn why_empty(&self, partners: Partners) -> String {
         let found = match self {
             Self::Paper { .. } => {
                 return "the field shows none: train longer, or give --preset balanced".to_owned();
@@ -124,6 +124,8 @@ impl BackEndReport {
                 "there is no 2D segment in {} views: {LOOK}",
                 found.usable_views
             )
+        } else if found.segments_with_hypotheses == 0 && partners == Partners::Field {
+            format!("{segments} the field puts none near one of another view: train longer")
         } else if found.segments_with_hypotheses == 0 {
             format!(
                 "{segments} none has a partner in another view within the scene sphere: the \

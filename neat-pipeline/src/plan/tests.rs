@@ -165,4 +165,10 @@ fn what_is_open_or_contradicts_itself_is_no_plan() {
     config.distill.field = Choice::Given(FieldUse::None);
     let error = Plan::new(config).unwrap_err().to_string();
     assert!(error.contains("distill.back_end = paper asks"), "{error}");
+    let mut config = Preset::Neat.config();
+    config.distill.field = Choice::Given(FieldUse::None);
+    let error = Plan::new(config.clone()).unwrap_err().to_string();
+    assert!(error.contains("distill.partners = field asks"), "{error}");
+    config.distill.partners = Partners::Epipolar;
+    assert!(!Plan::new(config).unwrap().trains());
 }

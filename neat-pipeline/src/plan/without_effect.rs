@@ -158,6 +158,18 @@ mod tests {
         assert!(without_effect[0].starts_with("detect.min_score"));
         let paper = [&sets[..], &["distill.back_end=paper", black]].concat();
         assert_eq!(told(&paper).len(), 2);
+        // A field that seeks partners is asked for its NEAT lines, and for nothing else.
+        let partners = [
+            "distill.partners=field",
+            black,
+            "model.perceiver.junctions=64",
+            "distill.paper.neat_lines.max_squared_reprojection=50.0",
+        ];
+        assert!(told(&partners).is_empty());
+        let votes = [&partners[..], &["distill.paper.visibility.min_views=3"]].concat();
+        assert!(told(&votes)[0].ends_with(ASSEMBLER_RUNS));
+        let paper = ["distill.back_end=paper", black, "distill.partners=field"];
+        assert!(told(&paper)[0].ends_with(PAPER_RUNS));
         let sets = [
             "train.steps=5".to_owned(),
             "train.sampler.lookups=32".to_owned(),

@@ -82,7 +82,8 @@ impl Session<'_> {
             self.tell(Event::Decided(moved));
         }
         if distilled.wireframe.edges.is_empty() {
-            let why = distilled.report.why_empty();
+            let partners = self.plan.config().distill.partners;
+            let why = distilled.report.why_empty(partners);
             self.warn(
                 WarningKind::NoEdges,
                 format!("the wireframe has no edges: {why}"),

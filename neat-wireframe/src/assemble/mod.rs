@@ -100,7 +100,7 @@ const CONTINUED: f64 = 0.75;
 ///   lies.
 ///
 /// The result is empty where nothing can be built: too few usable views, a radius that is
-/// not a positive number, edgels of another number of views. It does not depend on the
+/// not a positive number, edgels or lines of another number of views. It does not depend on the
 /// number of threads.
 pub fn assemble(
     observations: &[ViewObservation],

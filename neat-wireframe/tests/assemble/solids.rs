@@ -1,11 +1,16 @@
 //! Solids with noisy, incomplete and false detections.
 
 use crate::scores::scores_within;
-use neat_core::EdgelMap;
+use nalgebra::Vector3;
+use neat_core::{EdgelMap, LineSegment3};
 use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
 use neat_detect::{DetectorConfig, edgel_map};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble};
+use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble, assemble_with_progress};
+use neat_wireframe::paper::NeatLine;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::ops::ControlFlow;
 
 fn scene(solid: Solid, seed: u64) -> SyntheticData {
     let config = SyntheticScene {
@@ -51,6 +56,53 @@ fn a_box_comes_back_exactly() {
     assert_eq!(result.wireframe.junctions.len(), 8);
     assert_eq!(result.wireframe.edges.len(), 12);
     assert_eq!(precision_and_recall(&data, &result), (1.0, 1.0));
+}
+
+/// NEAT lines of a field that puts every 2D segment up to `error` aside.
+fn field_lines(data: &SyntheticData, views: &[ViewObservation], error: f64) -> Vec<Vec<NeatLine>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let mut aside = || Vector3::from_fn(|_, _| rng.random_range(-error..error));
+    let mut line = |view: &ViewObservation, segment_in_view: usize| {
+        let detected = view.segments[segment_in_view].segment;
+        // The true edge that the segment is nearest to.
+        let edges = data.truth.segments();
+        let seen = |edge: &LineSegment3| edge.map(|end| view.camera.project(end).pixel);
+        let distance = |edge: &LineSegment3| detected.unordered_squared_end_distance(&seen(edge));
+        let nearest = edges.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let edge = nearest.unwrap();
+        NeatLine {
+            segment_in_view,
+            segment: LineSegment3::new(edge.start + aside(), edge.end + aside()),
+            rays: 1,
+            support_distance: 0.0,
+        }
+    };
+    let mut lines_of = |view: &ViewObservation| {
+        let segments = 0..view.segments.len();
+        segments.map(|segment| line(view, segment)).collect()
+    };
+    views.iter().map(&mut lines_of).collect()
+}
+
+#[test]
+fn partners_of_an_inexact_field_give_the_exact_box() {
+    let data = scene(Solid::Box, 3);
+    let views = ViewObservation::from_scene(&data.scene, 0.05);
+    let radius = data.scene.sphere_radius;
+    let config = AssembleConfig::default();
+    let with = |lines: &[Vec<NeatLine>]| {
+        let go_on = &mut |_| ControlFlow::Continue(());
+        match assemble_with_progress(&views, &[], Some(lines), radius, &config, go_on) {
+            ControlFlow::Continue(assembled) => assembled,
+            ControlFlow::Break(()) => unreachable!("nobody breaks"),
+        }
+    };
+    let result = with(&field_lines(&data, &views, 0.05 * radius));
+    assert_eq!(precision_and_recall(&data, &result), (1.0, 1.0));
+    // Segments that the field does not know have no partner, whatever the poses allow.
+    let unknown = vec![Vec::new(); views.len()];
+    assert!(with(&unknown).wireframe.edges.is_empty());
+    assert_eq!(with(&unknown[1..]), Assembled::default());
 }
 
 #[test]
