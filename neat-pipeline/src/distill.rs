@@ -18,10 +18,10 @@ use neat_wireframe::paper::{NeatLine, PaperBackEndCounts, PaperBackEndError, nea
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SignedDistance, ViewObservation};
 use rayon::prelude::*;
+use rendered_segments::rendered_segments;
+pub use rendered_segments::support_point;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
-pub use rendered_segments::support_point;
-use rendered_segments::rendered_segments;
 pub use thin_regions::paper_regions;
 
 /// Rays that tell the NEAT line of a 2D segment, in the mean, where partners are sought: a

@@ -12,9 +12,7 @@ mod without_effect;
 pub use step_memory::{bytes_per_ray, rows_of_step};
 pub(crate) use without_effect::{Given, NO_FIELD, changes_of_presets, settings_without_effect};
 
-use crate::config::{
-    BackEnd, Background, Choice, Config, DistillConfig, FieldUse, Partners,
-};
+use crate::config::{BackEnd, Background, Choice, Config, DistillConfig, FieldUse, Partners};
 use crate::event::Decision;
 use neat_core::{MemoryLimit, Scene, SceneError};
 use neat_detect::DetectorConfigError;

@@ -37,7 +37,9 @@ pub enum Preset {
 
 /// A name that is no preset's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown preset `{0}`; use one of paper-abc, paper-dtu, paper-blendedmvs, fast, neat, balanced")]
+#[error(
+    "unknown preset `{0}`; use one of paper-abc, paper-dtu, paper-blendedmvs, fast, neat, balanced"
+)]
 pub struct UnknownPreset(String);
 
 impl Preset {
@@ -209,7 +211,10 @@ mod tests {
         let config = Preset::Neat.config();
         assert_eq!(config.distill.partners, Partners::Field);
         assert_eq!(config.distill.field, Choice::Auto);
-        assert_eq!(settle_field_use(&config.distill).unwrap(), FieldUse::Trained);
+        assert_eq!(
+            settle_field_use(&config.distill).unwrap(),
+            FieldUse::Trained
+        );
         assert!(config.model.attraction.encoding.grid().is_some());
     }
 

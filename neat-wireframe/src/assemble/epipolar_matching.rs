@@ -214,12 +214,7 @@ impl<'a> ViewPair<'a> {
     }
 
     /// Cuts the rays of the segment's ends with the partner's plane.
-    fn triangulate(
-        &self,
-        seed: &Seed<'_>,
-        partner: usize,
-        partner_arc: &Arc,
-    ) -> Option<LineMatch> {
+    fn triangulate(&self, seed: &Seed<'_>, partner: usize, partner_arc: &Arc) -> Option<LineMatch> {
         let Seed {
             rays,
             arc,

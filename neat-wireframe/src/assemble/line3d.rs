@@ -122,8 +122,14 @@ pub fn line3d(
         tolerance_in_pixels: 2.0 * config.sigma_in_pixels,
         alternatives: 1,
     };
-    let alternatives =
-        score_hypotheses(&views, &neighbours, None, config.ball_margin, min_views, &scoring);
+    let alternatives = score_hypotheses(
+        &views,
+        &neighbours,
+        None,
+        config.ball_margin,
+        min_views,
+        &scoring,
+    );
     let positioned: Vec<Positioned> = (alternatives.into_iter().enumerate())
         .flat_map(|(view, lists)| {
             let best = lists.into_iter().enumerate();

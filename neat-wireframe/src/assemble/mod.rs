@@ -66,7 +66,7 @@ use edge_samples::Images;
 use field_partners::FieldLines;
 use free_ends::move_free_ends;
 use graph_fitting::{fit_edges, fit_graph};
-use hypothesis_scoring::{Scoring, score_hypotheses};
+use hypothesis_scoring::{Alternatives, Scoring, score_hypotheses};
 use line_continuation::continue_lines;
 use line_selection::{Selection, select_lines, sure_lines};
 use neat_core::{EdgelMap, LineSegment2};
@@ -149,18 +149,8 @@ pub fn assemble_with_progress(
     } else {
         edgels
     };
-    let neighbours = neighbours::neighbours(&views, config.ball_margin, config.neighbours);
-    let scoring = Scoring::default();
-    let margin = config.ball_margin;
     let field = field_lines.map(|lines| FieldLines::new(&views, lines, scene_radius.recip()));
-    let alternatives = score_hypotheses(
-        &views,
-        &neighbours,
-        field.as_ref(),
-        margin,
-        MIN_VIEWS,
-        &scoring,
-    );
+    let alternatives = proposals(&views, field.as_ref(), config);
     progress(PROPOSED)?;
     let mut report = AssembleReport {
         usable_views: views
@@ -209,6 +199,18 @@ pub fn assemble_with_progress(
         report,
         refined_cameras,
     })
+}
+
+/// The positions in space of all 2D segments that some pair of views agrees on.
+fn proposals(
+    views: &[PreparedView],
+    field: Option<&FieldLines>,
+    config: &AssembleConfig,
+) -> Alternatives {
+    let margin = config.ball_margin;
+    let neighbours = neighbours::neighbours(views, margin, config.neighbours);
+    let scoring = Scoring::default();
+    score_hypotheses(views, &neighbours, field, margin, MIN_VIEWS, &scoring)
 }
 
 /// From lines to a graph: merged, continued, joined at corners, completed, cut and fitted.

@@ -151,7 +151,10 @@ fn merged(
     for junction in order {
         let radius = distance_in_pixels * upper_median(&mut pixels[junction]);
         let place = junctions[junction];
-        if kept.iter().all(|(other, _)| (other - place).norm() >= radius) {
+        if kept
+            .iter()
+            .all(|(other, _)| (other - place).norm() >= radius)
+        {
             kept.push((place, pixels[junction].len()));
         }
     }

@@ -177,23 +177,13 @@ impl PaperBackEndConfig {
             .map(|(view, rays)| neat_lines(view, rays, &self.neat_lines))
             .collect();
         let votes = vote_for_junctions(&refined, &lines_by_view, &self.junction_voting)?;
-        let by_images = self.image_refinement.enabled;
-        let kept = if by_images {
-            let config = &self.image_refinement;
-            refine_by_images(refined.clone(), views, &lines_by_view, config)
-        } else {
-            votes
-                .iter()
-                .filter(|v| v.votes >= self.junction_voting.min_votes)
-                .map(|v| (refined[v.junction], v.votes))
-                .collect()
-        };
+        let kept = self.kept_junctions(&refined, &votes, views, &lines_by_view);
         let (positions, junction_votes): (Vec<_>, Vec<_>) =
             distinct_and_sorted(kept).into_iter().unzip();
         let supported: Vec<_> = lines_by_view
             .iter()
             .flatten()
-            .filter(|line| by_images || line.is_supported(&self.neat_lines))
+            .filter(|line| self.image_refinement.enabled || line.is_supported(&self.neat_lines))
             .map(|line| line.segment)
             .collect();
         let attracted = Wireframe3d {
@@ -234,6 +224,25 @@ impl PaperBackEndConfig {
             result.drop_isolated_junctions();
         }
         Ok(result)
+    }
+
+    /// The junctions that lines go to, each with its votes or 2D segments.
+    fn kept_junctions(
+        &self,
+        refined: &[Vector3<f64>],
+        votes: &[JunctionVotes],
+        views: &[ViewObservation],
+        lines_by_view: &[Vec<NeatLine>],
+    ) -> Vec<(Vector3<f64>, usize)> {
+        let by_images = &self.image_refinement;
+        if by_images.enabled {
+            return refine_by_images(refined.to_vec(), views, lines_by_view, by_images);
+        }
+        votes
+            .iter()
+            .filter(|v| v.votes >= self.junction_voting.min_votes)
+            .map(|v| (refined[v.junction], v.votes))
+            .collect()
     }
 }
 

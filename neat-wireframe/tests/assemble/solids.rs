@@ -2,8 +2,8 @@
 
 use crate::scores::scores_within;
 use nalgebra::Vector3;
-use neat_core::{EdgelMap, LineSegment3};
 use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
+use neat_core::{EdgelMap, LineSegment3};
 use neat_detect::{DetectorConfig, edgel_map};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble, assemble_with_progress};
@@ -68,7 +68,9 @@ fn field_lines(data: &SyntheticData, views: &[ViewObservation], error: f64) -> V
         let edges = data.truth.segments();
         let seen = |edge: &LineSegment3| edge.map(|end| view.camera.project(end).pixel);
         let distance = |edge: &LineSegment3| detected.unordered_squared_end_distance(&seen(edge));
-        let nearest = edges.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let nearest = edges
+            .iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
         let edge = nearest.unwrap();
         NeatLine {
             segment_in_view,
