@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// A transform `x ↦ scale · x + translation` with one scale for all axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Similarity {
-    /// Common scale of the three axes; positive.
+    /// Common scale of the three axes. Negative where the frame it leads to is the mirror image.
     pub scale: f64,
     /// Added after scaling.
     pub translation: Vector3<f64>,
@@ -33,6 +33,29 @@ impl Similarity {
         Self {
             scale: 1.0 / self.scale,
             translation: -self.translation / self.scale,
+        }
+    }
+
+    /// What a length becomes, as a factor.
+    pub fn length_factor(&self) -> f64 {
+        self.scale.abs()
+    }
+
+    /// Maps a camera. In a frame that is mirrored its axes are left-handed: it projects as
+    /// before, and is what the files hold.
+    pub fn apply_to_camera(&self, camera: &Camera) -> Camera {
+        Camera {
+            world_from_camera: camera.world_from_camera * self.scale.signum(),
+            center_in_world: self.apply(&camera.center_in_world),
+            ..*camera
+        }
+    }
+
+    /// The same to a right-handed frame: that of the files, or its image through their origin.
+    pub fn without_mirroring(&self) -> Self {
+        Self {
+            scale: self.scale.abs(),
+            translation: self.translation * self.scale.signum(),
         }
     }
 
@@ -377,5 +400,25 @@ mod tests {
         assert!((similarity.inverse().apply(&there) - point).amax() < 1e-15);
         let by_matrix = similarity.matrix() * point.push(1.0);
         assert!((by_matrix.xyz() - there).amax() < 1e-15);
+    }
+
+    #[test]
+    fn a_camera_projects_alike_in_a_mirrored_frame() {
+        let mirrored = Similarity {
+            scale: -2.0,
+            translation: Vector3::new(5.0, 7.5, 3.0),
+        };
+        let camera = view("a", 4.0, 20, 10).camera;
+        let point = camera.center_in_world + camera.forward() * 3.0 + Vector3::new(0.1, 0.2, 0.0);
+        let there = mirrored.apply_to_camera(&camera);
+        let [before, after] = [
+            camera.project(&point),
+            there.project(&mirrored.apply(&point)),
+        ];
+        assert!((before.pixel - after.pixel).amax() < 1e-9);
+        assert!((2.0 * before.depth - after.depth).abs() < 1e-9);
+        let upright = mirrored.without_mirroring();
+        assert_eq!(upright.apply(&point), -mirrored.apply(&point));
+        assert_eq!(upright.length_factor(), mirrored.length_factor());
     }
 }

@@ -550,8 +550,15 @@ fn a_mirrored_world_is_refused_and_read_by_saying_so() {
         ..LoadOptions::default()
     };
     let loaded = load_scene(dir.path(), &options).unwrap().scene;
-    for (view, expected) in loaded.views.iter().zip(&expected.views) {
-        assert_eq!(view.camera, expected.camera);
+    for (view, in_right_world) in loaded.views.iter().zip(&expected.views) {
+        let point = Vector3::new(0.3, -0.2, 0.1);
+        let seen = in_right_world.camera.project(&point).pixel;
+        let in_files = Vector3::new(point.x, point.y, -point.z);
+        // Both where neat works and where its results are.
+        let in_world = loaded.original_from_world.inverse().apply(&in_files);
+        assert!((view.camera.project(&in_world).pixel - seen).amax() < 1e-9);
+        let camera = loaded.original_from_world.apply_to_camera(&view.camera);
+        assert!((camera.project(&in_files).pixel - seen).amax() < 1e-9);
     }
 }
 

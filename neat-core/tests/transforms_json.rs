@@ -2,8 +2,8 @@
 //! them, and the errors of bad ones.
 
 use image::RgbImage;
-use nalgebra::{Vector2, Vector3};
-use neat_core::layout::{Layout, SceneWarning};
+use nalgebra::{Matrix4, Vector2, Vector3};
+use neat_core::layout::{Layout, PoseConvention, PoseDirection, SceneWarning};
 use neat_core::{Camera, LoadOptions, LoadedScene, SceneError, Similarity, load_scene};
 use serde_json::{Value, json};
 use std::fs;
@@ -93,6 +93,37 @@ fn points_are_seen_where_a_hand_puts_them() {
     let seen = b.camera.project(&Vector3::new(0.0, 2.0, 1.0));
     assert_near(seen.pixel, 10.0, 2.0);
     assert_eq!(seen.depth, 5.0);
+}
+
+/// By one flag, and in the world of the file.
+#[test]
+fn matrices_of_the_other_direction_are_read_by_saying_so() {
+    let mut json = blender();
+    for frame in json["frames"].as_array_mut().unwrap() {
+        let rows: Vec<[f64; 4]> = serde_json::from_value(frame["transform_matrix"].take()).unwrap();
+        let inverse = Matrix4::from_row_iterator(rows.concat())
+            .try_inverse()
+            .unwrap();
+        let row = |row: usize| [0, 1, 2, 3].map(|column| inverse[(row, column)]);
+        frame["transform_matrix"] = json!([0, 1, 2, 3].map(row));
+    }
+    let dir = images_dir();
+    fs::write(dir.path().join("transforms.json"), json.to_string()).unwrap();
+    let options = LoadOptions {
+        require_wireframes: false,
+        pose_convention: Some(PoseConvention {
+            direction: PoseDirection::WorldToCamera,
+            ..PoseConvention::default()
+        }),
+        ..LoadOptions::default()
+    };
+    let found = load_scene(dir.path(), &options).unwrap().scene;
+    let expected = load(&blender()).unwrap().scene;
+    assert_eq!(found.original_from_world, expected.original_from_world);
+    for (found, expected) in found.views.iter().zip(&expected.views) {
+        let [found, expected] = [found, expected].map(|v| v.camera.matrix_world_from_camera());
+        assert!((found - expected).amax() < 1e-12, "{found}");
+    }
 }
 
 #[test]

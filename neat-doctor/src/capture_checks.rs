@@ -95,7 +95,7 @@ fn scene_sphere(scene: &Scene) -> Finding {
     let away = views_where(scene, |view| shares[view] == 0.0);
     // In the frame of the user's files, as --scene-sphere takes it.
     let [x, y, z] = scene.original_from_world.translation.into();
-    let radius = scene.original_from_world.scale * scene.sphere_radius;
+    let radius = scene.original_from_world.length_factor() * scene.sphere_radius;
     let ball = format!("the ball around ({x:.2}, {y:.2}, {z:.2}) of radius {radius:.3}");
     let remedy = "give the sphere of the object by --scene-sphere";
     let of_cameras = |names: &[String], what: &str| {

@@ -8,6 +8,7 @@ use crate::load_failure::{explain, size_factor};
 use crate::pose_diagnosis::Diagnosis;
 use crate::segment_checks::segment_findings;
 use crate::working_copies::WorkingCopies;
+use neat_core::layout::CameraAxes;
 use neat_core::{
     CameraError, LoadOptions, LoadedScene, MemoryLimit, Scene, SceneError, ViewError, load_scene,
 };
@@ -33,6 +34,9 @@ pub struct ExamineOptions {
     pub depth: Depth,
     /// What the scene was read with: remedies name what to use instead.
     pub read_with: Repair,
+    /// The axes that its cameras have in the files, which their reader turned into OpenCV's: what
+    /// [`LoadedScene::file_axes`] says.
+    pub file_axes: CameraAxes,
     /// How much memory may be used: views are looked at one after the other where it is
     /// little. What is found does not depend on it.
     pub memory_limit: MemoryLimit,
@@ -111,7 +115,13 @@ fn pose_findings(
             evenly(count, QUICK_VIEWS)
         };
         let gathered = gather(scene, working, views, textured)?;
-        let diagnosis = Diagnosis::new(scene, &gathered, options.read_with, mirrored);
+        let diagnosis = Diagnosis::new(
+            scene,
+            &gathered,
+            options.read_with,
+            options.file_axes,
+            mirrored,
+        );
         if diagnosis.is_plainly_good() {
             return Ok(diagnosis.agreeing_findings());
         }
@@ -122,7 +132,14 @@ fn pose_findings(
         FULL_VIEWS
     };
     let gathered = gather(scene, working, evenly(count, limit), textured)?;
-    Ok(Diagnosis::new(scene, &gathered, options.read_with, mirrored).findings())
+    Ok(Diagnosis::new(
+        scene,
+        &gathered,
+        options.read_with,
+        options.file_axes,
+        mirrored,
+    )
+    .findings())
 }
 
 /// Reads the scene in the folder `dir` and examines it. A scene that cannot be
@@ -200,6 +217,7 @@ fn examine_loaded_as(
 ) -> Examination {
     let options = ExamineOptions {
         read_with: Repair::of(load),
+        file_axes: loaded.file_axes,
         ..*options
     };
     let examination = examine_as(&loaded.scene, &options, mirrored);

@@ -81,6 +81,7 @@ impl Diagnosis<'_> {
         let convention = |is| Hypothesis::Convention {
             read_as: self.read_as(),
             is,
+            file_axes: self.file_axes,
         };
         let mut hypotheses: Vec<_> = conventions(&self.cameras[0], self.read_as())
             .into_iter()

@@ -12,6 +12,8 @@ pub(crate) enum Hypothesis {
     Convention {
         read_as: PoseConvention,
         is: PoseConvention,
+        /// Those of the files, out of which they were turned before.
+        file_axes: CameraAxes,
     },
     /// Quaternions whose numbers were read in another order.
     Quaternions(QuaternionOrder),
@@ -57,8 +59,13 @@ impl Hypothesis {
     /// The cameras if it holds.
     pub fn cameras(&self, cameras: &[Camera], names: &[&str]) -> Vec<Camera> {
         match self {
-            Self::Convention { read_as, is } => with_each(cameras, |camera| {
-                let pose = is.world_from_camera(&stored_pose(camera, read_as));
+            Self::Convention {
+                read_as,
+                is,
+                file_axes,
+            } => with_each(cameras, |camera| {
+                let stored = stored_pose(camera, read_as, file_axes);
+                let pose = is.world_from_camera(&stored, file_axes);
                 *camera =
                     Camera::from_matrices(camera.intrinsics, &pose, camera.width, camera.height);
             }),
@@ -168,33 +175,47 @@ fn with_each(cameras: &[Camera], change: impl Fn(&mut Camera)) -> Vec<Camera> {
     cameras.iter().map(changed).collect()
 }
 
-/// The matrix that `convention` makes the pose of `camera` of.
-pub(crate) fn stored_pose(camera: &Camera, convention: &PoseConvention) -> Matrix4<f64> {
+/// The matrix that `convention` makes the pose of `camera` of, in a file with these axes.
+pub(crate) fn stored_pose(
+    camera: &Camera,
+    convention: &PoseConvention,
+    file_axes: &CameraAxes,
+) -> Matrix4<f64> {
     let mut pose = camera.matrix_world_from_camera();
     if convention.mirrored_world {
-        for column in 0..4 {
-            pose[(2, column)] = -pose[(2, column)];
-        }
+        let mirrored = -pose.fixed_view::<3, 4>(0, 0);
+        pose.fixed_view_mut::<3, 4>(0, 0).copy_from(&mirrored);
     }
-    let rotation = pose.fixed_view::<3, 3>(0, 0) * convention.axes.opencv_from_camera();
+    let opencv_from_file = file_axes.opencv_from_camera();
+    let turn = convention.axes.opencv_from_camera() * opencv_from_file;
+    let rotation = pose.fixed_view::<3, 3>(0, 0) * turn;
     pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
-    if convention.direction == PoseDirection::WorldToCameraTranslation {
-        let translation = -(rotation.transpose() * pose.fixed_view::<3, 1>(0, 3));
+    let stored = stored_in(&pose, convention.direction);
+    stored * opencv_from_file.transpose().to_homogeneous()
+}
+
+/// The matrix of a camera-to-world pose, in a file whose matrices lead in this direction.
+fn stored_in(pose: &Matrix4<f64>, direction: PoseDirection) -> Matrix4<f64> {
+    if direction == PoseDirection::WorldToCameraTranslation {
+        let translation =
+            -(pose.fixed_view::<3, 3>(0, 0).transpose() * pose.fixed_view::<3, 1>(0, 3));
+        let mut pose = *pose;
         pose.fixed_view_mut::<3, 1>(0, 3).copy_from(&translation);
         return pose;
     }
     // The other directions are their own inverses.
-    PoseConvention {
-        direction: convention.direction,
+    let direction = PoseConvention {
+        direction,
         ..PoseConvention::default()
-    }
-    .world_from_camera(&pose)
+    };
+    direction.world_from_camera(pose, &CameraAxes::OPENCV)
 }
 
 /// All conventions but `read_as`, with the hand of the world that makes rigid
 /// poses of what is stored.
 pub(crate) fn conventions(camera: &Camera, read_as: PoseConvention) -> Vec<PoseConvention> {
-    let stored = stored_pose(camera, &read_as);
+    // Axes of files are right-handed: they do not matter here.
+    let stored = stored_pose(camera, &read_as, &CameraAxes::OPENCV);
     let right_handed = stored.fixed_view::<3, 3>(0, 0).determinant() > 0.0;
     let mut conventions = Vec::new();
     for direction in PoseDirection::ALL {
@@ -353,9 +374,11 @@ mod tests {
         };
         let camera = Camera::from_matrices(intrinsics, &pose, 4, 3);
         for read_as in conventions(&camera, PoseConvention::default()) {
-            let stored = stored_pose(&camera, &read_as);
-            let again = read_as.world_from_camera(&stored);
-            assert!((again - pose).amax() < 1e-12, "{read_as:?}");
+            for file_axes in [CameraAxes::OPENCV, CameraAxes::OPENGL] {
+                let stored = stored_pose(&camera, &read_as, &file_axes);
+                let again = read_as.world_from_camera(&stored, &file_axes);
+                assert!((again - pose).amax() < 1e-12, "{read_as:?}");
+            }
             assert_eq!(conventions(&camera, read_as).len(), 191);
         }
     }

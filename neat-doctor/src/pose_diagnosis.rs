@@ -6,7 +6,7 @@ use crate::examination::{Check, Finding, Level, Repair, counted, median, percent
 use crate::hypothesis::{Hypothesis, PoseOrder};
 use crate::point_transfer::{known_points, transfer_gain};
 use crate::silhouettes::covered_share;
-use neat_core::layout::PoseConvention;
+use neat_core::layout::{CameraAxes, PoseConvention};
 use neat_core::{Camera, Scene};
 use rayon::prelude::*;
 
@@ -38,6 +38,8 @@ pub(crate) struct Diagnosis<'a> {
     pub names: Vec<&'a str>,
     /// What the scene was read with.
     pub read_with: Repair,
+    /// The axes out of which its reader turned the cameras.
+    pub file_axes: CameraAxes,
     /// The poses could only be read by mirroring the world.
     pub mirrored: bool,
 }
@@ -83,8 +85,9 @@ impl Limits {
 }
 
 fn in_frame_of_files(scene: &Scene, camera: Camera) -> Camera {
+    let original_from_world = scene.original_from_world.without_mirroring();
     Camera {
-        center_in_world: scene.original_from_world.apply(&camera.center_in_world),
+        center_in_world: original_from_world.apply(&camera.center_in_world),
         ..camera
     }
 }
@@ -94,6 +97,7 @@ impl<'a> Diagnosis<'a> {
         scene: &'a Scene,
         gathered: &'a Gathered,
         read_with: Repair,
+        file_axes: CameraAxes,
         mirrored: bool,
     ) -> Self {
         Self {
@@ -104,6 +108,7 @@ impl<'a> Diagnosis<'a> {
                 .collect(),
             names: scene.views.iter().map(|view| view.name.as_str()).collect(),
             read_with,
+            file_axes,
             mirrored,
         }
     }
@@ -361,7 +366,8 @@ mod tests {
             likeness: Vec::new(),
             silhouettes: Vec::new(),
         };
-        Diagnosis::new(&scene, &gathered, Repair::default(), false).is_plainly_good()
+        let (repair, axes) = (Repair::default(), CameraAxes::OPENCV);
+        Diagnosis::new(&scene, &gathered, repair, axes, false).is_plainly_good()
     }
 
     #[test]

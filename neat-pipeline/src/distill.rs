@@ -299,7 +299,7 @@ pub fn agreement(scene: &Scene, config: &Config, wireframe: &Wireframe3d) -> Opt
     let config = ImageEvidenceConfig::default();
     let mut evidence = image_evidence(wireframe, &views, &points, &config).ok()?;
     if let Some(distance) = &mut evidence.median_junction_to_point_distance {
-        *distance *= scene.original_from_world.scale;
+        *distance *= scene.original_from_world.length_factor();
     }
     Some(evidence)
 }

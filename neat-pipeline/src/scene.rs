@@ -6,7 +6,7 @@ use crate::error::PipelineError;
 use crate::event::{Decision, Event, OnEvent, Stage, Warning, WarningKind, timed};
 use crate::resources::Resources;
 use neat_core::file_cache::FileCache;
-use neat_core::layout::HAWP_DIR;
+use neat_core::layout::{CameraAxes, HAWP_DIR};
 use neat_core::{LoadOptions, MemoryLimit, Scene, SceneSphere, SphereChoice, View, load_scene};
 use neat_doctor::{Depth, ExamineOptions, Finding, Level, Repair, Verdict};
 use std::path::{Path, PathBuf};
@@ -22,6 +22,8 @@ pub struct PreparedScene {
     pub files: Vec<PathBuf>,
     /// Whether its 2D wireframes were detected, for want of files.
     pub detected: bool,
+    /// The axes of cameras in these files.
+    pub file_axes: CameraAxes,
 }
 
 /// Reads the scene in the folder `dir`, and detects its 2D wireframes if it has
@@ -68,7 +70,7 @@ pub fn prepare_scene(
     // What is modelled: the configuration may have a radius of its own.
     let sphere = SceneSphere {
         center: scene.original_from_world.translation,
-        radius: scene.original_from_world.scale * scene.sphere_radius,
+        radius: scene.original_from_world.length_factor() * scene.sphere_radius,
         source: placed.map_or(loaded.sphere.source, |sphere| sphere.source),
     };
     on_event(Event::Decided(place(&sphere)));
@@ -84,6 +86,7 @@ pub fn prepare_scene(
         sphere,
         files: loaded.files,
         detected,
+        file_axes: loaded.file_axes,
     })
 }
 
@@ -121,7 +124,7 @@ fn placed_at(scene: Scene, sphere: &SceneSphere, config: &DataConfig) -> Scene {
     const SAME: f64 = 1e-9;
     let world_from_original = scene.original_from_world.inverse();
     let center = world_from_original.apply(&sphere.center);
-    let radius = world_from_original.scale * sphere.radius;
+    let radius = world_from_original.length_factor() * sphere.radius;
     let same_center = center.norm() <= SAME * radius;
     let same_radius = (scene.sphere_radius - radius).abs() <= SAME * radius;
     match (same_center, same_radius || config.scene_radius.is_some()) {
@@ -138,16 +141,17 @@ fn placed_at(scene: Scene, sphere: &SceneSphere, config: &DataConfig) -> Scene {
 /// # Errors
 /// If a run would be lost time.
 pub fn examine_quickly(
-    scene: &Scene,
+    prepared: &PreparedScene,
     config: &DataConfig,
     memory_limit: MemoryLimit,
     on_event: OnEvent<'_>,
 ) -> Result<(), PipelineError> {
     let examination = neat_doctor::examine(
-        scene,
+        &prepared.scene,
         &ExamineOptions {
             depth: Depth::Quick,
             read_with: Repair::of(&load_options(config, None, memory_limit)),
+            file_axes: prepared.file_axes,
             memory_limit,
         },
     );

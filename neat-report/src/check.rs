@@ -1,6 +1,7 @@
 //! What must hold before a report is rendered.
 
 use crate::{Report, ReportError};
+use neat_core::Camera;
 use neat_wireframe::validity::check_wireframe;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -41,7 +42,13 @@ pub(crate) fn check(report: &Report) -> Result<(), ReportError> {
     }
 
     for view in &report.views {
-        view.camera
+        // In a frame that is mirrored the axes of all cameras are left-handed.
+        let turn = view.camera.world_from_camera;
+        let right_handed = Camera {
+            world_from_camera: turn * turn.determinant().signum(),
+            ..view.camera
+        };
+        right_handed
             .validate()
             .map_err(|problem| ReportError::Camera {
                 view: view.name.clone(),
@@ -86,7 +93,7 @@ mod tests {
     use super::*;
     use crate::ReportView;
     use nalgebra::{Matrix3, Vector2, Vector3};
-    use neat_core::{Camera, Intrinsics, LineSegment2};
+    use neat_core::{Intrinsics, LineSegment2};
     use neat_wireframe::export::{EdgeFields, SupportingSegment, WireframeDocument};
 
     fn good() -> Report {
@@ -122,6 +129,15 @@ mod tests {
             }],
             ..Report::default()
         }
+    }
+
+    #[test]
+    fn cameras_of_a_mirrored_frame_are_right() {
+        let mut mirrored = good();
+        mirrored.views[0].camera.world_from_camera *= -1.0;
+        check(&mirrored).unwrap();
+        mirrored.views[0].camera.world_from_camera *= 2.0;
+        check(&mirrored).unwrap_err();
     }
 
     #[test]

@@ -96,21 +96,13 @@ impl Report {
         config: &PhotographConfig,
     ) -> Result<Self, ReportError> {
         let views = (scene.views.iter().zip(photographs(scene, config)?))
-            .map(|(view, photograph)| {
-                let center_in_world = scene
-                    .original_from_world
-                    .apply(&view.camera.center_in_world);
-                ReportView {
-                    name: view.name.clone(),
-                    camera: Camera {
-                        center_in_world,
-                        ..view.camera
-                    },
-                    photograph,
-                    segments: (view.wireframe.segments(min_segment_score).iter())
-                        .map(|scored| scored.segment)
-                        .collect(),
-                }
+            .map(|(view, photograph)| ReportView {
+                name: view.name.clone(),
+                camera: scene.original_from_world.apply_to_camera(&view.camera),
+                photograph,
+                segments: (view.wireframe.segments(min_segment_score).iter())
+                    .map(|scored| scored.segment)
+                    .collect(),
             })
             .collect();
         Ok(Self {

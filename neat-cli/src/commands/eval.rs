@@ -7,7 +7,7 @@ use crate::output;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use neat_core::ply::read_points;
-use neat_core::{Camera, LoadOptions, SceneError, View, file, load_scene};
+use neat_core::{LoadOptions, SceneError, View, file, load_scene};
 use neat_eval::{
     EvalError, EvaluationInput, EvaluationOptions, EvaluationReport, GroundPlane, NeatAbc,
     ObservationMask, Protocol, ScannedSurface, SceneTruth, Scores, TruthKind, foreign,
@@ -290,11 +290,7 @@ impl EvalArgs {
             Err(SceneError::UnknownLayout { .. }) => return Ok(truth),
             Err(error) => return Err(error.into()),
         };
-        // Turned as before; only the origin and the unit are others.
-        let in_files = |view: &View| Camera {
-            center_in_world: (scene.original_from_world).apply(&view.camera.center_in_world),
-            ..view.camera
-        };
+        let in_files = |view: &View| scene.original_from_world.apply_to_camera(&view.camera);
         truth.cameras = scene.views.iter().map(in_files).collect();
         Ok(truth)
     }

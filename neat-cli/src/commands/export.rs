@@ -280,7 +280,14 @@ impl ExportArgs {
                 fraction,
             });
         })?;
-        let mesh = mesh.map(|point| opened.scene.original_from_world.apply(point));
+        let original_from_world = &opened.scene.original_from_world;
+        let mut mesh = mesh.map(|point| original_from_world.apply(point));
+        if original_from_world.scale < 0.0 {
+            // The outside of a mirrored triangle is its inside.
+            mesh.triangles
+                .iter_mut()
+                .for_each(|corners| corners.swap(1, 2));
+        }
         let out = self
             .out
             .unwrap_or_else(|| opened.dir.root().join("mesh.ply"));

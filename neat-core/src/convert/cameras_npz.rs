@@ -15,12 +15,13 @@ const IMAGES_DIR: &str = "image";
 pub(super) fn write(scene: &Scene, dir: &Path) -> Result<(), SceneError> {
     let mut arrays = BTreeMap::new();
     // Programs of this layout model the unit ball of the normalised world.
+    let original_from_world = scene.original_from_world.without_mirroring();
     let original_from_unit = Similarity {
-        scale: scene.original_from_world.scale * scene.sphere_radius,
-        ..scene.original_from_world
+        scale: original_from_world.scale * scene.sphere_radius,
+        ..original_from_world
     };
     let scale = original_from_unit.matrix();
-    let world_from_original = scene.original_from_world.inverse().matrix();
+    let world_from_original = original_from_world.inverse().matrix();
     // The i-th camera is that of the i-th file: `a-b.png` is before `a.png`.
     let mut views: Vec<_> = scene.views.iter().collect();
     views.sort_by_key(|view| image_name(&view.name));

@@ -3,7 +3,8 @@
 //!
 //! Everything is written in the frame of the user's files
 //! ([`Scene::original_from_world`]), so that what other programs find in the
-//! converted scene lies where the user's own data are. Images are those of the
+//! converted scene lies where the user's own data are. These formats have no left-handed worlds:
+//! of one that was read as such the mirror image is written. Images are those of the
 //! scene: undistorted, and scaled down where the scene is.
 
 mod cameras_npz;
@@ -114,14 +115,16 @@ const CORNER_ORIGIN: f64 = 0.5;
 /// `camera` in the frame of the user's files.
 fn in_original_frame(camera: &Camera, scene: &Scene) -> Camera {
     Camera {
-        center_in_world: scene.original_from_world.apply(&camera.center_in_world),
+        center_in_world: (scene.original_from_world.without_mirroring())
+            .apply(&camera.center_in_world),
         ..*camera
     }
 }
 
 /// Positions of the sparse points in the frame of the user's files.
 fn points_in_original_frame(scene: &Scene) -> Vec<Vector3<f64>> {
-    let original = |position: &Vector3<f64>| scene.original_from_world.apply(position);
+    let original_from_world = scene.original_from_world.without_mirroring();
+    let original = |position: &Vector3<f64>| original_from_world.apply(position);
     (scene.sparse_points.iter())
         .map(|point| original(&point.position_in_world))
         .collect()

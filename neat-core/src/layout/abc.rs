@@ -161,7 +161,7 @@ fn write_cameras(scene: &Scene, path: &Path) -> Result<(), SceneError> {
             SCALE_MAT,
             NpyArray {
                 shape: vec![4, 4],
-                values: row_major(&scene.original_from_world.matrix()),
+                values: row_major(&scene.original_from_world.without_mirroring().matrix()),
             },
         ),
         (PIXEL_CENTER, number_array(scene.pixel_center)),

@@ -15,6 +15,7 @@
 //! image is taken for the origin: the principal point is (W/2, H/2) and the first
 //! pixel has its centre at (0.5, 0.5).
 
+use super::CameraAxes;
 use super::images::{self, ReadSize};
 use super::poses::{PosedImage, Poses, pose_of};
 use super::reconstruction::Reconstruction;
@@ -114,7 +115,10 @@ fn parse(
         points,
         pixel_center: PIXEL_CENTER,
     };
-    reconstruction.into_poses()
+    Ok(Poses {
+        file_axes: CameraAxes::OPENGL,
+        ..reconstruction.into_poses()?
+    })
 }
 
 /// Errs if the first line names another version. Its points would have no

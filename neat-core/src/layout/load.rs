@@ -7,8 +7,8 @@ use super::rectify::Rectification;
 use super::sphere::Evidence;
 use super::view_reader::{self, ViewReader};
 use super::{
-    HAWP_DIR, Layout, LoadOptions, SceneWarning, images, input_files, pixel_center, point_files,
-    turn,
+    CameraAxes, HAWP_DIR, Layout, LoadOptions, SceneWarning, images, input_files, pixel_center,
+    point_files, turn,
 };
 use crate::scene_sphere::SphereSource;
 use crate::{Camera, Observation, Scene, SceneError, SceneSphere, SparsePoint, View, hawp_json};
@@ -28,6 +28,9 @@ pub struct LoadedScene {
     pub sphere: SceneSphere,
     /// The files that it was read from, sorted.
     pub files: Vec<PathBuf>,
+    /// The axes that cameras have in files of this layout. Other than OpenCV's they were turned
+    /// when they were read.
+    pub file_axes: CameraAxes,
     /// In the order of the views.
     pub warnings: Vec<SceneWarning>,
 }
@@ -133,10 +136,11 @@ pub(super) fn load_posed(
     Ok(LoadedScene {
         sphere: SceneSphere {
             center: poses.original_from_world.apply(&sphere.center),
-            radius: poses.original_from_world.scale * sphere.radius,
+            radius: poses.original_from_world.length_factor() * sphere.radius,
             ..sphere
         },
         files,
+        file_axes: poses.file_axes,
         scene,
         layout,
         warnings,

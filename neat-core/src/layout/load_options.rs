@@ -71,10 +71,12 @@ impl LoadOptions {
     /// Makes poses, intrinsics and points what these options say they are.
     pub(super) fn correct(&self, poses: &mut Poses) {
         let convention = self.pose_convention.unwrap_or_default();
+        let file_axes = &poses.file_axes;
         let scale = self.intrinsics_scale.unwrap_or(1.0);
         let focal_scale = scale * self.focal_scale.unwrap_or(1.0);
         for view in &mut poses.views {
-            view.world_from_camera = convention.world_from_camera(&view.world_from_camera);
+            view.world_from_camera =
+                convention.world_from_camera(&view.world_from_camera, file_axes);
             view.intrinsics = view.intrinsics.with_focal_factor(focal_scale);
             view.intrinsics.cx *= scale;
             view.intrinsics.cy *= scale;
@@ -89,11 +91,11 @@ impl LoadOptions {
                 observation.pixel *= scale;
             }
             if convention.mirrored_world {
-                point.position_in_world.z *= -1.0;
+                point.position_in_world *= -1.0;
             }
         }
         if convention.mirrored_world {
-            poses.original_from_world.translation.z *= -1.0;
+            poses.original_from_world.scale *= -1.0;
         }
     }
 }

@@ -25,7 +25,7 @@ pub(super) fn read(
     let mut as_written = read_points(&path)?;
     if is_mirrored {
         for point in &mut as_written {
-            point.z = -point.z;
+            *point = -*point;
         }
     }
     let world_from_original = original_from_world.inverse();

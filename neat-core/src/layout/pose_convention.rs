@@ -21,8 +21,8 @@ pub struct PoseConvention {
     pub direction: PoseDirection,
     /// Which way the camera's axes point.
     pub axes: CameraAxes,
-    /// Whether the world is left-handed. If so its z axis is turned round, and
-    /// results are the mirror image of the frame of the files.
+    /// Whether the world is left-handed. If so all its axes are turned round while it is
+    /// worked on; results are in the frame of the files.
     pub mirrored_world: bool,
 }
 
@@ -234,8 +234,19 @@ impl PoseConvention {
     /// The camera-to-world matrix in OpenCV axes of a pose in this convention. A
     /// matrix that has to be inverted and cannot be comes back as it is: the
     /// check of cameras says what is wrong with it.
-    pub fn world_from_camera(&self, pose: &Matrix4<f64>) -> Matrix4<f64> {
-        let mut matrix = match self.direction {
+    ///
+    /// `file_axes` are those out of which a reader has turned the camera already: the direction
+    /// is that of the matrix in the file, in whose world the result is.
+    pub fn world_from_camera(&self, pose: &Matrix4<f64>, file_axes: &CameraAxes) -> Matrix4<f64> {
+        let turn = |pose: &Matrix4<f64>, by: &Matrix3<f64>| {
+            let mut pose = *pose;
+            let rotation = pose.fixed_view::<3, 3>(0, 0) * by;
+            pose.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+            pose
+        };
+        let opencv_from_file = file_axes.opencv_from_camera();
+        let pose = &turn(pose, &opencv_from_file);
+        let matrix = match self.direction {
             PoseDirection::CameraToWorld => *pose,
             PoseDirection::WorldToCamera => pose.try_inverse().unwrap_or(*pose),
             PoseDirection::TransposedRotation => {
@@ -253,11 +264,13 @@ impl PoseConvention {
                 matrix
             }
         };
-        let rotation = matrix.fixed_view::<3, 3>(0, 0) * self.axes.opencv_from_camera().transpose();
-        matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&rotation);
+        let opencv_from_camera = self.axes.opencv_from_camera() * opencv_from_file;
+        let mut matrix = turn(&matrix, &opencv_from_camera.transpose());
         if self.mirrored_world {
-            for column in 0..4 {
-                matrix[(2, column)] = -matrix[(2, column)];
+            for row in 0..3 {
+                for column in 0..4 {
+                    matrix[(row, column)] *= -1.0;
+                }
             }
         }
         matrix
@@ -278,7 +291,10 @@ mod tests {
     #[test]
     fn nothing_said_changes_nothing() {
         let convention = PoseConvention::default();
-        assert_eq!(convention.world_from_camera(&pose()), pose());
+        assert_eq!(
+            convention.world_from_camera(&pose(), &CameraAxes::OPENCV),
+            pose()
+        );
     }
 
     #[test]
@@ -300,7 +316,7 @@ mod tests {
                 direction,
                 ..PoseConvention::default()
             };
-            let repaired = convention.world_from_camera(&stored);
+            let repaired = convention.world_from_camera(&stored, &CameraAxes::OPENCV);
             assert!((repaired - right).amax() < 1e-12, "{direction}: {repaired}");
             assert_eq!(direction.to_string().parse(), Ok(direction));
         }
@@ -312,7 +328,7 @@ mod tests {
             axes: CameraAxes::OPENGL,
             ..PoseConvention::default()
         };
-        let repaired = convention.world_from_camera(&pose());
+        let repaired = convention.world_from_camera(&pose(), &CameraAxes::OPENCV);
         for (column, sign) in [(0, 1.0), (1, -1.0), (2, -1.0), (3, 1.0)] {
             assert_eq!(repaired.column(column), pose().column(column) * sign);
         }
@@ -327,7 +343,7 @@ mod tests {
             ..PoseConvention::default()
         };
         let ahead = pose() * nalgebra::Vector4::new(5.0, 0.0, 0.0, 1.0);
-        let repaired = convention.world_from_camera(&pose());
+        let repaired = convention.world_from_camera(&pose(), &CameraAxes::OPENCV);
         let in_camera = repaired.try_inverse().unwrap() * ahead;
         assert!((in_camera.xyz() - Vector3::new(0.0, 0.0, 5.0)).amax() < 1e-12);
     }
@@ -346,15 +362,43 @@ mod tests {
     }
 
     #[test]
+    fn a_direction_is_that_of_the_matrix_in_the_file() {
+        let file_axes = CameraAxes::OPENGL;
+        let turned_by_reader = |matrix: &Matrix4<f64>| {
+            matrix * file_axes.opencv_from_camera().transpose().to_homogeneous()
+        };
+        let right = turned_by_reader(&pose());
+        let inverse = turned_by_reader(&pose().try_inverse().unwrap());
+        let as_it_says = PoseConvention::default();
+        assert_eq!(as_it_says.world_from_camera(&right, &file_axes), right);
+        let inverted = PoseConvention {
+            direction: PoseDirection::WorldToCamera,
+            ..as_it_says
+        };
+        let found = inverted.world_from_camera(&inverse, &file_axes);
+        assert!((found - right).amax() < 1e-12);
+        // What axes say comes after what the layout says.
+        let other = PoseConvention {
+            axes: CameraAxes::OPENGL,
+            ..as_it_says
+        };
+        let found = other.world_from_camera(&right, &file_axes);
+        assert_eq!(found, other.world_from_camera(&right, &CameraAxes::OPENCV));
+    }
+
+    #[test]
     fn a_left_handed_world_is_turned_into_a_rigid_pose() {
         let convention = PoseConvention {
             mirrored_world: true,
             ..PoseConvention::default()
         };
-        let mirrored = convention.world_from_camera(&pose());
+        let mirrored = convention.world_from_camera(&pose(), &CameraAxes::OPENCV);
         let rotation = mirrored.fixed_view::<3, 3>(0, 0).into_owned();
         assert!((rotation.determinant() + 1.0).abs() < 1e-12);
-        assert_eq!(convention.world_from_camera(&mirrored), pose());
+        assert_eq!(
+            convention.world_from_camera(&mirrored, &CameraAxes::OPENCV),
+            pose()
+        );
     }
 
     proptest! {
@@ -366,7 +410,7 @@ mod tests {
             let axes = text.parse().unwrap_or(CameraAxes::OPENGL);
             for direction in PoseDirection::ALL {
                 let convention = PoseConvention { direction, axes, mirrored_world: true };
-                let _ = convention.world_from_camera(&Matrix4::from_row_slice(&cells));
+                let _ = convention.world_from_camera(&Matrix4::from_row_slice(&cells), &CameraAxes::OPENCV);
             }
         }
     }

@@ -1,5 +1,6 @@
 //! What every layout says about its images: file, intrinsics and pose.
 
+use super::CameraAxes;
 use crate::npz::{NpyArray, NpzReader};
 use crate::scene::{check_names, keep_observations};
 use crate::{CameraError, Distortion, Intrinsics, SceneError, Similarity, SparsePoint};
@@ -14,6 +15,8 @@ pub(super) struct Poses {
     pub views: Vec<PosedImage>,
     /// Leads to the frame of the user's files.
     pub original_from_world: Similarity,
+    /// The axes of cameras in files of this layout, out of which the reader has turned them.
+    pub file_axes: CameraAxes,
     /// Where the layout says where pixel centres are, in pixels.
     pub pixel_center: Option<f64>,
     /// Sparse points of the reconstruction, in the world of the poses, observed
@@ -37,6 +40,7 @@ impl Poses {
             path: path.into(),
             views,
             original_from_world: Similarity::identity(),
+            file_axes: CameraAxes::OPENCV,
             pixel_center: None,
             points: Vec::new(),
             declared_radius: None,

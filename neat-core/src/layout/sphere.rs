@@ -42,7 +42,10 @@ impl Evidence<'_> {
             SphereChoice::Given { center, radius } => {
                 let world_from_original = original_from_world.inverse();
                 let center = world_from_original.apply(&center);
-                (Given, Some((center, radius * world_from_original.scale)))
+                (
+                    Given,
+                    Some((center, radius * world_from_original.length_factor())),
+                )
             }
         };
         let Some((center, radius)) = ball else {

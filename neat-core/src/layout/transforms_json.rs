@@ -17,6 +17,7 @@
 
 mod lens;
 
+use super::CameraAxes;
 use super::images::{self, ENDINGS, has_known_ending, read_size, with_existing_ending};
 use super::poses::{PosedImage, Poses, upper_left};
 use crate::hawp_json::file_stem;
@@ -114,6 +115,7 @@ fn parse(bytes: &[u8], path: PathBuf, dir: &Path) -> Result<Poses, SceneError> {
     Ok(Poses {
         points: sparse_points(&path, dir, json.ply_file_path.as_deref())?,
         pixel_center,
+        file_axes: CameraAxes::OPENGL,
         ..Poses::new(&path, views)?
     })
 }

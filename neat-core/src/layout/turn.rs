@@ -121,6 +121,7 @@ mod tests {
             path: dir.path().join("poses"),
             views: ["a", "b"].map(posed).into(),
             original_from_world: Similarity::identity(),
+            file_axes: Default::default(),
             pixel_center: Some(0.5),
             points: Vec::new(),
             declared_radius: Some(1.0),

@@ -193,8 +193,8 @@ impl Session<'_> {
 /// For each view the rows of its camera-to-world matrix, in the frame of the user's files.
 fn poses_in_original(scene: &Scene) -> BTreeMap<&str, [[f64; 4]; 3]> {
     let pose = |camera: &Camera| {
-        let center = scene.original_from_world.apply(&camera.center_in_world);
-        let turn = &camera.world_from_camera;
+        let camera = scene.original_from_world.apply_to_camera(camera);
+        let (center, turn) = (camera.center_in_world, camera.world_from_camera);
         [0, 1, 2].map(|row| [turn[(row, 0)], turn[(row, 1)], turn[(row, 2)], center[row]])
     };
     let views = scene.views.iter();

@@ -280,7 +280,7 @@ fn prepare(
     }
     if options.examine && earlier.is_none() {
         timed(on_event, Stage::Examine, |on_event| {
-            examine_quickly(&prepared.scene, &asked.data, memory_limit, on_event)
+            examine_quickly(&prepared, &asked.data, memory_limit, on_event)
         })?;
     }
     Ok((prepared, plan))

@@ -40,7 +40,7 @@ impl Confidence {
         let covariances: Vec<Option<Matrix3<f64>>> = (self.junctions.iter())
             .map(|junction| junction.covariance.as_ref().map(in_original))
             .collect();
-        let undetermined = self.scene_radius * original_from_world.scale;
+        let undetermined = self.scene_radius * original_from_world.length_factor();
         let sigma = |covariance: &Option<Matrix3<f64>>| {
             let sigma = |c: &Matrix3<f64>| largest_eigenvalue(c).max(0.0).sqrt();
             covariance.as_ref().map_or(undetermined, sigma)

@@ -92,6 +92,7 @@ fn poses(dir: &Path, distortion: Distortion, pixel_center: f64) -> Poses {
             })
             .into(),
         original_from_world: Similarity::identity(),
+        file_axes: Default::default(),
         pixel_center: Some(pixel_center),
         points: points().map(seen).to_vec(),
         // The world stays as it is.
@@ -355,6 +356,7 @@ fn times_of_a_first_and_a_second_load() {
             path: dir.path().join("poses"),
             views: vec![view],
             original_from_world: Similarity::identity(),
+            file_axes: Default::default(),
             pixel_center: Some(0.5),
             points: Vec::new(),
             declared_radius: Some(1.0),
