@@ -24,8 +24,8 @@ use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 pub use thin_regions::paper_regions;
 
-/// Rays that tell the NEAT line of a 2D segment, in the mean, where partners are sought: a
-/// mean of so many is as good as one of all, which are some 200.
+/// Rays that tell the NEAT line of a 2D segment, in the mean, where partners are sought: of
+/// some 200 that there are. F1 of a house is the same with all.
 const RAYS_PER_LINE: usize = 64;
 
 /// Who listens to the progress wants the distillation to end.

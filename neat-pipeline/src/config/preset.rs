@@ -216,6 +216,10 @@ mod tests {
             FieldUse::Trained
         );
         assert!(config.model.attraction.encoding.grid().is_some());
+        // And its own back end, if it is asked for that, fits junctions to the images.
+        assert!(config.distill.paper.image_refinement.enabled);
+        let published = Preset::PaperAbc.config().distill.paper;
+        assert!(!published.image_refinement.enabled);
     }
 
     #[test]
