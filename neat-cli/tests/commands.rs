@@ -192,6 +192,46 @@ fn a_trained_run_can_be_distilled_rendered_and_continued() {
 }
 
 #[test]
+fn the_preset_neat_finds_the_edges_by_its_field() {
+    let scene = TestScene::with(&["--views", "16", "--image-size", "160"]);
+    let (run, truth) = (scene.path("run"), scene.path("scene/gt_wireframe.json"));
+    let found = || {
+        let scores = neat(&["eval", "--pred", &format!("{run}/wireframe.json")])
+            .args(["--gt", &truth, "--format", "json"])
+            .assert()
+            .success();
+        let scores: Value = serde_json::from_str(&stdout(&scores)).unwrap();
+        let scores = scores.get(0).unwrap_or(&scores);
+        let segments = &scores["scores"]["wireframe"]["segments_max"][1];
+        ["precision", "recall"].map(|of| segments[of].as_f64().unwrap())
+    };
+    let preset = ["--preset", "neat"];
+    scene
+        .run("reconstruct", "150")
+        .args(preset)
+        .assert()
+        .success();
+    let plan = fs::read_to_string(scene.file("run/plan.toml")).unwrap();
+    assert!(plan.contains("partners = \"field\""), "{plan}");
+    let [precision, recall] = found();
+    assert!(precision > 0.9 && recall > 0.9, "{precision} {recall}");
+    // By the field and its junctions alone.
+    neat(&["distill", &run, "--backend", "flex"])
+        .args(["--set", "distill.back_end=paper"])
+        .assert()
+        .success();
+    let [precision, recall] = found();
+    assert!(precision > 0.8 && recall > 0.8, "{precision} {recall}");
+
+    let no_field = neat(&["reconstruct", &scene.path("scene")])
+        .args(["--out", &scene.path("other"), "--set", "distill.field=none"])
+        .args(preset)
+        .assert()
+        .code(2);
+    assert!(stderr(&no_field).contains("distill.partners = field asks"));
+}
+
+#[test]
 fn eval_prints_and_saves_scores() {
     let scene = TestScene::new();
     let truth = scene.path("scene/gt_wireframe.json");
