@@ -36,7 +36,7 @@ pub fn numbers<'py>(object: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'
         false => object,
     };
     let array = numpy.call_method1("ascontiguousarray", (array, "float64"))?;
-    Ok(array.extract()?)
+    array.extract()
 }
 
 /// The same with `columns` numbers in each row; `name` is for messages.

@@ -145,20 +145,13 @@ pub fn reconstruct(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Run> {
     let mut keep = Vec::new();
-    let scene = match scene.cast::<Scene>() {
-        Ok(scene) => {
-            let (folder, temporary) = scene.get().place(py);
-            keep.extend(temporary);
-            folder
-        }
-        Err(_) => scene.extract()?,
-    };
+    let scene = scene_folder(scene, &mut keep)?;
+    let existing = existing(resume, overwrite)?;
     let out = match out {
         Some(out) => out,
         None if resume => {
-            return Err(
-                Failure::input("resume=True continues a run: give its folder as out").into(),
-            );
+            let text = "resume=True continues a run: give its folder as out";
+            return Err(Failure::input(text).into());
         }
         None => {
             let (folder, temporary) = temporary(py)?;
@@ -170,12 +163,6 @@ pub fn reconstruct(
         preset,
         config,
         settings: settings::overrides(settings)?,
-    };
-    let existing = match (resume, overwrite) {
-        (true, true) => return Err(Failure::input("resume and overwrite: give one of them").into()),
-        (true, false) => Existing::Resume,
-        (false, true) => Existing::Overwrite,
-        (false, false) => Existing::Refuse,
     };
     let (mut config, preset, of_run) = method.of(&out, existing)?;
     if train {
@@ -213,6 +200,25 @@ pub fn reconstruct(
         dir: reconstruction.run,
         _keep: keep,
     })
+}
+
+/// The folder of a scene, and what must live as long as that is needed.
+fn scene_folder(scene: &Bound<'_, PyAny>, keep: &mut Vec<Py<PyAny>>) -> PyResult<PathBuf> {
+    let Ok(scene) = scene.cast::<Scene>() else {
+        return scene.extract();
+    };
+    let (folder, temporary) = scene.get().place(scene.py());
+    keep.extend(temporary);
+    Ok(folder)
+}
+
+fn existing(resume: bool, overwrite: bool) -> Result<Existing, Failure> {
+    match (resume, overwrite) {
+        (true, true) => Err(Failure::input("resume and overwrite: give one of them")),
+        (true, false) => Ok(Existing::Resume),
+        (false, true) => Ok(Existing::Overwrite),
+        (false, false) => Ok(Existing::Refuse),
+    }
 }
 
 /// Hands an event to Python: warnings as warnings, all to who listens.

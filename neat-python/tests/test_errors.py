@@ -104,7 +104,8 @@ def test_evaluations_need_what_they_measure_against(run, truth):
     for arguments, message in [
         ({}, "nothing to measure against"),
         (dict(protocols=["neat-abc"]), "needs truth"),
-        (dict(truth=truth, protocols=["limap-tnt"]), "points"),
+        (dict(protocols=["limap-tnt"]), "limap-tnt needs points"),
+        (dict(truth=truth, protocols=["limap-tnt"]), "truth has no meaning for limap-tnt"),
         (dict(truth=truth, points=[[0, 0, 0]], protocols=["neat-abc"]), "points has no meaning for neat-abc"),
         (dict(truth=truth, protocols=["neat"]), "neat"),
         (dict(truth="nowhere.json"), "nowhere.json"),

@@ -12,6 +12,8 @@ _Floats: TypeAlias = NDArray[np.float64]
 _Indices: TypeAlias = NDArray[np.int64]
 _Image: TypeAlias = NDArray[np.uint8]
 
+__all__: list[str]
+
 __version__: Final[str]
 FORMATS: Final[list[str]]
 KINDS: Final[list[str]]
