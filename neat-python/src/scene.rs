@@ -18,7 +18,7 @@ use neat_pipeline::scene::load_options;
 use numpy::{PyArray2, PyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 /// Posed images: a folder in any layout that neat reads, which is looked into when something
@@ -46,6 +46,29 @@ pub fn temporary(py: Python<'_>) -> PyResult<(PathBuf, Py<PyAny>)> {
     Ok((keep.getattr("name")?.extract()?, keep.unbind()))
 }
 
+/// Where a scene is to be written: in a folder that was named, or in a temporary one that is
+/// called like the scene.
+fn place(
+    py: Python<'_>,
+    name: Option<&str>,
+    folder: Option<PathBuf>,
+) -> PyResult<(PathBuf, Option<Py<PyAny>>)> {
+    let bad = |text: String| Err(Failure::input(text).into());
+    match (name, folder) {
+        (Some(_), Some(_)) => {
+            bad("name and folder: give one of them; a folder names its scene".into())
+        }
+        (None, Some(folder)) => Ok((folder, None)),
+        (Some(name), None) if Path::new(name).file_name() != Some(name.as_ref()) => bad(format!(
+            "name is `{name}`: give a plain name, without slashes"
+        )),
+        (name, None) => {
+            let (folder, keep) = temporary(py)?;
+            Ok((folder.join(name.unwrap_or("scene")), Some(keep)))
+        }
+    }
+}
+
 #[pymethods]
 impl Scene {
     /// The scene in a folder. keep: anything that has to live as long as the folder is needed.
@@ -67,8 +90,9 @@ impl Scene {
     /// segments: for each view what `detect` returned, or (M, 4) x, y, x, y or (M, 5) with a score, in pixels; by default they are detected.
     /// points: (P, 3) of a sparse reconstruction, which place the part of space to model.
     /// pixel_center: image coordinates of the centre of the first pixel in K and segments, 0.5 or 0.
+    /// name: of the scene in a temporary folder; `folder` names its own.
     #[staticmethod]
-    #[pyo3(signature = (images, K, poses, *, names=None, segments=None, points=None, pixel_center=0.5, name="scene", folder=None))]
+    #[pyo3(signature = (images, K, poses, *, names=None, segments=None, points=None, pixel_center=0.5, name=None, folder=None))]
     #[expect(non_snake_case, reason = "the field's name")]
     fn from_arrays(
         py: Python<'_>,
@@ -79,9 +103,10 @@ impl Scene {
         segments: Option<Vec<Bound<'_, PyAny>>>,
         points: Option<&Bound<'_, PyAny>>,
         pixel_center: f64,
-        name: &str,
+        name: Option<&str>,
         folder: Option<PathBuf>,
     ) -> PyResult<Self> {
+        let (folder, keep) = place(py, name, folder)?;
         let given = Given {
             images: &images,
             names,
@@ -93,7 +118,8 @@ impl Scene {
             );
         }
         let scene = Posed {
-            name: name.to_owned(),
+            // Its folder names it.
+            name: folder.display().to_string(),
             views: given.views(
                 &matrices::<9>(K, "K", images.len())?,
                 &matrices::<16>(poses, "poses", images.len())?,
@@ -110,13 +136,6 @@ impl Scene {
                     .collect(),
                 None => Vec::new(),
             },
-        };
-        let (folder, keep) = match folder {
-            Some(folder) => (folder, None),
-            None => {
-                let (folder, keep) = temporary(py)?;
-                (folder.join(name), Some(keep))
-            }
         };
         let path = folder.clone();
         background::run(py, None, move || {
@@ -157,15 +176,17 @@ impl Scene {
     /// undistorted when the scene is read. The photographs are linked into the scene's folder, or
     /// copied where the system has no such links.
     #[staticmethod]
-    #[pyo3(signature = (reconstruction, images, *, name="scene", folder=None))]
+    #[pyo3(signature = (reconstruction, images, *, name=None, folder=None))]
     fn from_pycolmap<'py>(
         reconstruction: &Bound<'py, PyAny>,
         images: PathBuf,
-        name: &str,
+        name: Option<&str>,
         folder: Option<PathBuf>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let interop = reconstruction.py().import("neat3d.interop")?;
-        interop.call_method1("from_pycolmap", (reconstruction, images, name, folder))
+        let py = reconstruction.py();
+        let (folder, keep) = place(py, name, folder)?;
+        let interop = py.import("neat3d.interop")?;
+        interop.call_method1("from_pycolmap", (reconstruction, images, folder, keep))
     }
 
     /// Names of the views, in their order.

@@ -79,6 +79,8 @@ def test_arguments_that_make_no_sense(scene, options, message):
         (dict(segments=[[], [], [[1, 2, 3]]]), "segments has the shape"),
         (dict(segments=[[], [], [[1, 2, 3, np.nan]]]), "`0002`.*not finite"),
         (dict(points=[[1, 2]]), r"points has the shape \[1, 2\]: give \(N, 3\)"),
+        (dict(name="../a"), "give a plain name"),
+        (dict(name="a", folder="a"), "give one of them"),
         (dict(pixel_center=0.25), "give 0.5 or 0"),
     ],
 )

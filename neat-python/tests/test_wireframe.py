@@ -1,6 +1,8 @@
 """Arrays of a wireframe, its exports, and other packages."""
 
 import json
+import multiprocessing
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -91,6 +93,38 @@ def test_wireframes_are_made_of_arrays(tmp_path):
     for edges in ([[0, 3]], [[0, -1]], [[0, 0.5]]):
         with pytest.raises(neat3d.InputError):
             neat3d.Wireframe([[0, 0, 0], [1, 0, 0]], edges)
+
+
+class Foreign:
+    """An array that speaks DLPack only."""
+
+    def __init__(self, array):
+        self.array = array
+
+    def __dlpack__(self, **options):
+        return self.array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return self.array.__dlpack_device__()
+
+
+def test_tensors_of_others_are_taken():
+    points = np.array([[0, 0, 0], [1, 0, 0.5]], np.float32)
+    wireframe = neat3d.Wireframe(Foreign(points), Foreign(np.array([[0, 1]])))
+    assert np.array_equal(wireframe.segments[0], points)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the system does not fork")
+def test_forked_processes_detect():
+    image = np.full((64, 64, 3), 200, np.uint8)
+    image[:, :30] = 20
+    expected = len(neat3d.detect(image))
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        assert pool.apply_async(count, (image,)).get(60) == expected
+
+
+def count(image):
+    return len(neat3d.detect(image))
 
 
 def test_lines_for_trimesh(run):

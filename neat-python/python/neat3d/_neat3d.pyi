@@ -12,7 +12,20 @@ _Floats: TypeAlias = NDArray[np.float64]
 _Indices: TypeAlias = NDArray[np.int64]
 _Image: TypeAlias = NDArray[np.uint8]
 
-__all__: list[str]
+__all__ = [
+    "FORMATS",
+    "KINDS",
+    "PRESETS",
+    "Field",
+    "Run",
+    "Scene",
+    "Segments",
+    "Wireframe",
+    "__version__",
+    "detect",
+    "evaluate",
+    "reconstruct",
+]
 
 __version__: Final[str]
 FORMATS: Final[list[str]]
@@ -44,12 +57,16 @@ class Scene:
         segments: Sequence[Segments | ArrayLike] | None = None,
         points: ArrayLike | None = None,
         pixel_center: float = 0.5,
-        name: str = "scene",
+        name: str | None = None,
         folder: _Path | None = None,
     ) -> Scene: ...
     @staticmethod
     def from_pycolmap(
-        reconstruction: Any, images: _Path, *, name: str = "scene", folder: _Path | None = None
+        reconstruction: Any,
+        images: _Path,
+        *,
+        name: str | None = None,
+        folder: _Path | None = None,
     ) -> Scene: ...
     @staticmethod
     def synth(folder: _Path, **settings: Any) -> Scene: ...

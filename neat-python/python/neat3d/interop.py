@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,14 +37,10 @@ def to_open3d(wireframe: Wireframe) -> Any:
 def from_pycolmap(
     reconstruction: Any,
     images: str | os.PathLike[str],
-    name: str = "scene",
-    folder: str | os.PathLike[str] | None = None,
+    folder: str | os.PathLike[str],
+    keep: object = None,
 ) -> Scene:
-    """See :meth:`neat3d.Scene.from_pycolmap`."""
-    keep = None
-    if folder is None:
-        keep = tempfile.TemporaryDirectory(prefix="neat3d-")
-        folder = Path(keep.name) / name
+    """A scene in ``folder``; see :meth:`neat3d.Scene.from_pycolmap`. ``keep`` lives as long."""
     folder = Path(folder)
     if folder.exists() and any(folder.iterdir()):
         raise InputError(f"{folder} is not empty: choose another folder for the scene")
