@@ -7,9 +7,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use neat_pipeline::event::{Event, Stage};
 use neat_train::LOSS_TERMS;
 use neat_train::trainer::StepReport;
-use serde_json::{Value, json};
 use std::io::{IsTerminal, stderr};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 /// Without a terminal there is one line per so much time.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
@@ -92,7 +91,7 @@ impl Progress {
             self.last_line = Instant::now();
         }
         if !self.quiet || matches!(event, Event::Warning(_)) {
-            output::note(&to_json(event).to_string());
+            output::note(&event.to_json().to_string());
         }
     }
 
@@ -186,57 +185,4 @@ fn describe(report: &StepReport) -> String {
         terms.join(", "),
         report.segment_error_in_pixels,
     )
-}
-
-/// An event for programs: `event` says which, `time` when, in seconds since 1970.
-fn to_json(event: &Event<'_>) -> Value {
-    let mut value = match event {
-        Event::StageStarted(stage) => json!({ "event": "stage_started", "stage": stage }),
-        Event::StageProgress { stage, fraction } => {
-            json!({ "event": "stage_progress", "stage": stage, "fraction": fraction })
-        }
-        Event::StageFinished { stage, seconds } => {
-            json!({ "event": "stage_finished", "stage": stage, "seconds": seconds })
-        }
-        Event::Step { report, fraction } => {
-            json!({ "event": "step", "fraction": fraction, "report": report })
-        }
-        Event::Note(message) => json!({ "event": "note", "message": message }),
-        Event::Decided(decision) => json!({
-            "event": "decision",
-            "setting": decision.setting,
-            "value": decision.value,
-            "reason": decision.reason,
-        }),
-        Event::Resumed { step, steps } => {
-            json!({ "event": "resumed", "step": step, "steps": steps })
-        }
-        Event::Warning(warning) => {
-            json!({ "event": "warning", "kind": warning.kind, "message": warning.message })
-        }
-        Event::FileWritten(path) => {
-            json!({ "event": "file_written", "path": path.display().to_string() })
-        }
-    };
-    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
-    value["time"] = json!(since_1970.map_or(0.0, |time| time.as_secs_f64()));
-    value
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use neat_pipeline::event::{Warning, WarningKind};
-
-    #[test]
-    fn programs_read_an_event_by_its_name() {
-        let warning = Warning::new(WarningKind::NoEdges, "no edges");
-        let value = to_json(&Event::Warning(warning));
-        assert_eq!(value["event"], "warning");
-        assert_eq!(value["kind"], "no_edges");
-        assert!(value["time"].as_f64().unwrap() > 1e9);
-        let value = to_json(&Event::StageStarted(Stage::Train));
-        assert_eq!(value["stage"], "train");
-        assert!(!value.to_string().contains('\n'));
-    }
 }

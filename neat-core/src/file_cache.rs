@@ -6,6 +6,7 @@
 
 use crate::{SceneError, file};
 use sha2::{Digest, Sha256};
+use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -61,6 +62,15 @@ impl FileCache {
         Self { dir: dir.into() }
     }
 
+    /// The cache that all programs of neat share: in `$NEAT_CACHE`, else below the user's
+    /// folder for caches, without what killed writers left there; `None` if the system has
+    /// no such folder.
+    pub fn of_user() -> Option<Self> {
+        let cache = Self::new(dir_of_user()?);
+        cache.remove_abandoned();
+        Some(cache)
+    }
+
     /// The folder.
     pub fn dir(&self) -> &Path {
         &self.dir
@@ -106,6 +116,24 @@ impl FileCache {
     fn path(&self, key: &CacheKey) -> PathBuf {
         self.dir.join(&key.file_name)
     }
+}
+
+fn dir_of_user() -> Option<PathBuf> {
+    let path = |name: &str| env::var_os(name).filter(|value| !value.is_empty());
+    if let Some(dir) = path("NEAT_CACHE") {
+        return Some(dir.into());
+    }
+    let caches = if cfg!(windows) {
+        path("LOCALAPPDATA").map(PathBuf::from)
+    } else if cfg!(target_os = "macos") {
+        path("HOME").map(|home| PathBuf::from(home).join("Library/Caches"))
+    } else {
+        // By the XDG specification a relative path does not count.
+        let configured = path("XDG_CACHE_HOME").map(PathBuf::from);
+        let of_home = path("HOME").map(|home| PathBuf::from(home).join(".cache"));
+        configured.filter(|dir| dir.is_absolute()).or(of_home)
+    };
+    Some(caches?.join("neat"))
 }
 
 #[cfg(test)]

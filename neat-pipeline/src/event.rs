@@ -3,9 +3,10 @@
 
 use neat_train::trainer::StepReport;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use std::fmt;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// A part of a run that takes time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -182,6 +183,43 @@ pub enum Event<'a> {
     FileWritten(PathBuf),
 }
 
+impl Event<'_> {
+    /// The event for programs: `event` says which, `time` when, in seconds since 1970.
+    pub fn to_json(&self) -> Value {
+        let mut value = match self {
+            Event::StageStarted(stage) => json!({ "event": "stage_started", "stage": stage }),
+            Event::StageProgress { stage, fraction } => {
+                json!({ "event": "stage_progress", "stage": stage, "fraction": fraction })
+            }
+            Event::StageFinished { stage, seconds } => {
+                json!({ "event": "stage_finished", "stage": stage, "seconds": seconds })
+            }
+            Event::Step { report, fraction } => {
+                json!({ "event": "step", "fraction": fraction, "report": report })
+            }
+            Event::Note(message) => json!({ "event": "note", "message": message }),
+            Event::Decided(decision) => json!({
+                "event": "decision",
+                "setting": decision.setting,
+                "value": decision.value,
+                "reason": decision.reason,
+            }),
+            Event::Resumed { step, steps } => {
+                json!({ "event": "resumed", "step": step, "steps": steps })
+            }
+            Event::Warning(warning) => {
+                json!({ "event": "warning", "kind": warning.kind, "message": warning.message })
+            }
+            Event::FileWritten(path) => {
+                json!({ "event": "file_written", "path": path.display().to_string() })
+            }
+        };
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
+        value["time"] = json!(since_1970.map_or(0.0, |time| time.as_secs_f64()));
+        value
+    }
+}
+
 /// Who listens to the events of a run.
 pub type OnEvent<'a> = &'a mut dyn FnMut(Event<'_>);
 
@@ -219,5 +257,17 @@ mod tests {
         assert_eq!(read("\"no edges\""), other);
         let newer = r#"{"kind":"of_tomorrow","message":"no edges"}"#;
         assert_eq!(read(newer), other);
+    }
+
+    #[test]
+    fn programs_read_an_event_by_its_name() {
+        let warning = Warning::new(WarningKind::NoEdges, "no edges");
+        let value = Event::Warning(warning).to_json();
+        assert_eq!(value["event"], "warning");
+        assert_eq!(value["kind"], "no_edges");
+        assert!(value["time"].as_f64().unwrap() > 1e9);
+        let value = Event::StageStarted(Stage::Train).to_json();
+        assert_eq!(value["stage"], "train");
+        assert!(!value.to_string().contains('\n'));
     }
 }

@@ -136,6 +136,34 @@ impl TrainedField {
             .collect()
     }
 
+    /// The 3D segment that the attraction field holds at each point, seen along the unit vector
+    /// of the same index in `directions`: both ends one after the other. A network without
+    /// viewing directions does not look at these.
+    ///
+    /// # Panics
+    /// If there are not as many directions as points.
+    pub fn segments(&self, points: &[[f32; 3]], directions: &[[f32; 3]]) -> Vec<[f32; 6]> {
+        assert_eq!(
+            points.len(),
+            directions.len(),
+            "TrainedField::segments: points and directions"
+        );
+        let chunks = points.chunks(POINT_CHUNK);
+        (chunks.zip(directions.chunks(POINT_CHUNK)))
+            .flat_map(|(points, directions)| {
+                let points = point_tensor(points, &self.device);
+                let rays = vec![points.clone(), point_tensor(directions, &self.device)];
+                let output = self.model.implicit_network.evaluate(points);
+                let ends = self.model.attraction_network.forward(
+                    Tensor::cat(rays, 1),
+                    output.gradient,
+                    output.features,
+                );
+                host_vec(ends).as_chunks().0.to_vec()
+            })
+            .collect()
+    }
+
     /// A coarse copy of the surface on the host, for many cheap queries.
     pub fn surface_grid(&self) -> SurfaceGrid<'_> {
         let mut grid = DistanceGrid::sphere(SURFACE_RESOLUTION, self.scene_radius as f32, 0.0);
