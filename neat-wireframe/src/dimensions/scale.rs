@@ -41,7 +41,7 @@ fn parse(text: &str) -> Option<Scale> {
     let (a, b) = junctions.split_once('-')?;
     let (distance, tolerance) = match distance.split_once('±') {
         Some((distance, tolerance)) => (distance, Some(tolerance)),
-        None => (distance.as_ref(), None),
+        None => (distance, None),
     };
     let distance = distance.trim();
     let digits = distance.trim_end_matches(|c: char| c.is_ascii_alphabetic());
