@@ -8,6 +8,7 @@
 //! | move the junctions of a graph until its edges lie on detections | [`bundle_adjustment`] |
 //! | learn how sure each junction and edge is, and which 2D segments say so | [`confidence`] |
 //! | tell creases from paint and shadows, pieces of curves, and corners from ends | [`kinds`] |
+//! | read lengths, distances and angles off one, with intervals | [`dimensions`] |
 //! | measure a wireframe, with and without ground truth | [`metrics`] |
 //! | write and read one | [`export`], [`validity`] |
 //!
@@ -31,6 +32,7 @@
 pub mod assemble;
 pub mod bundle_adjustment;
 pub mod confidence;
+pub mod dimensions;
 pub mod export;
 pub mod kinds;
 pub mod metrics;

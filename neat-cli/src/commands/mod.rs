@@ -13,6 +13,7 @@ mod doctor;
 mod eval;
 mod export;
 mod info;
+mod measure;
 mod reconstruct;
 mod render;
 mod synth;
@@ -83,6 +84,7 @@ pub enum Command {
     Distill(distill::DistillArgs),
     View(view::ViewArgs),
     Export(export::ExportArgs),
+    Measure(measure::MeasureArgs),
     Eval(eval::EvalArgs),
     Render(render::RenderArgs),
     Synth(synth::SynthArgs),
@@ -107,6 +109,7 @@ impl Command {
             Self::Distill(args) => args.run(quiet),
             Self::View(args) => args.run(),
             Self::Export(args) => args.run(quiet),
+            Self::Measure(args) => args.run(),
             Self::Eval(args) => args.run(),
             Self::Render(args) => args.run(quiet),
             Self::Synth(args) => args.run(),

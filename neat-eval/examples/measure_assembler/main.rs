@@ -15,26 +15,23 @@
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
 
+mod prepared;
 mod probabilities;
 
-use neat_core::{Camera, LoadOptions, Scene, View, hawp_json, load_scene};
-use neat_detect::{DetectorConfig, detect_views, edgel_maps};
+use neat_core::{Camera, Scene, View};
 use neat_eval::{EvaluationInput, EvaluationOptions, NeatAbc, SceneTruth, Scores, foreign};
 use neat_eval::{Protocol, SurfaceAndCreases};
-use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble};
 use neat_wireframe::confidence::{ConfidenceConfig, assess};
 use neat_wireframe::export::{WireframeDocument, write_json};
 use neat_wireframe::kinds::edge_kinds;
 use neat_wireframe::metrics::{ImageEvidenceConfig, Matching, PrecisionRecall, image_evidence};
 use neat_wireframe::{ViewObservation, Wireframe3d};
+use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
 use probabilities::Probabilities;
+use std::env;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use std::{env, fs};
-
-/// As `neat reconstruct` has it.
-const MIN_SEGMENT_SCORE: f64 = 0.05;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
@@ -97,45 +94,6 @@ fn main() -> Result<()> {
         print!("{}", probabilities.table());
     }
     Ok(())
-}
-
-/// The scene in a unit ball, with 2D segments: those in `kept`, or else detected and kept.
-/// Segments of others are used where there is no truth.
-fn prepared(dir: &Path, kept: Option<&Path>) -> Result<Scene> {
-    let has_truth = dir.join("gt_wireframe.json").exists() || dir.join("truth").exists();
-    let given = dir.join("hawp").is_dir() && !has_truth;
-    let options = LoadOptions {
-        require_wireframes: given,
-        ..LoadOptions::default()
-    };
-    let mut scene = load_scene(dir, &options)?.scene;
-    if !given {
-        let folder = kept.map(|kept| kept.join("segments"));
-        let file = |folder: &Path, index: usize| folder.join(format!("{index:04}.json"));
-        let center = scene.pixel_center;
-        match &folder {
-            Some(folder) if folder.is_dir() => {
-                for (index, view) in scene.views.iter_mut().enumerate() {
-                    view.wireframe = hawp_json::read(&file(folder, index), center)?;
-                }
-            }
-            _ => detect_views(&mut scene, &DetectorConfig::default())?,
-        }
-        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
-            fs::create_dir_all(&folder)?;
-            for (index, view) in scene.views.iter().enumerate() {
-                hawp_json::write(&file(&folder, index), &view.wireframe, center)?;
-            }
-        }
-    }
-    let radius = scene.sphere_radius;
-    Ok(scene.scaled(radius.recip()))
-}
-
-fn assembled(scene: &Scene) -> Result<Assembled> {
-    let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
-    let edgels = edgel_maps(&scene.views, &DetectorConfig::default(), scene.pixel_center)?;
-    Ok(assemble(&views, &edgels, 1.0, &AssembleConfig::default()))
 }
 
 /// The edges that are more likely creases or boundaries than anything else.

@@ -1,6 +1,7 @@
 //! Whether edges exist as often as their probabilities say.
 
-use crate::{MIN_SEGMENT_SCORE, Result};
+use crate::Result;
+use crate::prepared::MIN_SEGMENT_SCORE;
 use neat_core::{LineSegment3, Scene};
 use neat_eval::{Binning, Judged, NeatAbc, SceneTruth, SurfaceAndCreases};
 use neat_eval::{existing_edges, expected_calibration_error, foreign, reliability};

@@ -64,9 +64,9 @@ fn print_probabilities() {
 
 fn print_covariances() {
     println!(
-        "| noise | views | detector | wireframe | junctions | without | 50 % | 68 % | 95 % | median sigma | median error | estimated noise |"
+        "| noise | views | detector | wireframe | junctions | without | 50 % | 68 % | 95 % | lengths 95 % | median sigma | median error | estimated noise |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for detector in [Detector::Vertices, Detector::Segments] {
         for views in [12, 40] {
             for sigma in [0.3, 0.5, 1.0] {
@@ -79,9 +79,10 @@ fn print_covariances() {
                     let [half, two_thirds, most] = coverage.shares();
                     let [claimed, error] = coverage.medians();
                     println!(
-                        "| {sigma} | {views} | {detector:?} | {name} | {} | {} | {half:.2} | {two_thirds:.2} | {most:.3} | {claimed:.5} | {error:.5} | {:.2} {:.2} {:.2} |",
+                        "| {sigma} | {views} | {detector:?} | {name} | {} | {} | {half:.2} | {two_thirds:.2} | {most:.3} | {:.3} | {claimed:.5} | {error:.5} | {:.2} {:.2} {:.2} |",
                         coverage.junctions,
                         coverage.undetermined,
+                        coverage.share_of_lengths(),
                         noise.vertex,
                         noise.across,
                         noise.along,

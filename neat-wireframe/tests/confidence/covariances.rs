@@ -41,6 +41,8 @@ fn bundle_adjusted_junctions_lie_in_their_ellipsoids() {
                 assert!((0.35..=0.65).contains(&half), "{case}");
                 let [claimed, error] = coverage.medians();
                 assert!((0.8..=1.3).contains(&(claimed / error)), "{case}");
+                let lengths = coverage.share_of_lengths();
+                assert!((0.85..=0.995).contains(&lengths), "{case}: {lengths}");
             }
         }
     }
@@ -62,6 +64,11 @@ fn assembled_junctions_are_honest_too() {
     assert!(coverage.junctions >= 300);
     let most = coverage.shares()[2];
     assert!((0.85..=0.99).contains(&most), "{coverage:?}");
+    let lengths = coverage.share_of_lengths();
+    assert!(
+        coverage.lengths >= 300 && (0.85..=0.995).contains(&lengths),
+        "{lengths}"
+    );
 }
 
 /// A back end that does not ask the 2D segments is measured by them all the same.

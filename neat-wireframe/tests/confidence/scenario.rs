@@ -4,9 +4,11 @@
 use crate::noise::Noise;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::synthetic::{Frustum, Solid, visible_parts};
-use neat_core::{Camera, Intrinsics, LineSegment2, ScoredSegment2, Wireframe3d};
+use neat_core::{Camera, Intrinsics, LineSegment2, ScoredSegment2, Similarity, Wireframe3d};
 use neat_wireframe::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, bundle_adjust};
 use neat_wireframe::confidence::Confidence;
+use neat_wireframe::dimensions::{Dimensions, Quantity};
+use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::{SignedDistance, ViewObservation};
 
 /// What a detector does to a segment.
@@ -225,6 +227,10 @@ pub struct Coverage {
     pub undetermined: usize,
     /// Junctions within the 50, 68 and 95 % ellipsoids.
     inside: [usize; 3],
+    /// Edges between true junctions, and how many of them have the true length within its
+    /// 95 % interval.
+    pub lengths: usize,
+    lengths_held: usize,
     errors: Vec<f64>,
     sigmas: Vec<f64>,
 }
@@ -255,6 +261,33 @@ impl Coverage {
             self.errors.push(error.norm());
             self.sigmas.push(covariance.trace().sqrt());
         }
+        self.add_lengths(wireframe, confidence, true_position);
+    }
+
+    fn add_lengths(
+        &mut self,
+        wireframe: &Wireframe3d,
+        confidence: &Confidence,
+        true_position: impl Fn(usize) -> Option<Vector3<f64>>,
+    ) {
+        let mut document = WireframeDocument::from(wireframe);
+        confidence.fill(&mut document, &[], &Similarity::identity());
+        let dimensions = Dimensions::new(&document, None).unwrap();
+        for length in dimensions.lengths() {
+            let Quantity::Length { edge } = length.quantity else {
+                continue;
+            };
+            let ends = wireframe.edges[edge].map(&true_position);
+            if let ([Some(a), Some(b)], Some([low, high])) = (ends, length.interval) {
+                self.lengths += 1;
+                self.lengths_held += usize::from((low..=high).contains(&(b - a).norm()));
+            }
+        }
+    }
+
+    /// Share of the true lengths within the 95 % intervals.
+    pub fn share_of_lengths(&self) -> f64 {
+        self.lengths_held as f64 / self.lengths as f64
     }
 
     /// Shares within the 50, 68 and 95 % ellipsoids.

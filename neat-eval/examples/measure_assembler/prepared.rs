@@ -1,0 +1,52 @@
+//! Scenes as the assembler gets them.
+
+use crate::Result;
+use neat_core::{LoadOptions, Scene, hawp_json, load_scene};
+use neat_detect::{DetectorConfig, detect_views, edgel_maps};
+use neat_wireframe::ViewObservation;
+use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble};
+use std::fs;
+use std::path::Path;
+
+/// As `neat reconstruct` has it.
+pub const MIN_SEGMENT_SCORE: f64 = 0.05;
+
+/// The scene in a unit ball, with 2D segments: those in `kept`, or else detected and kept.
+/// Segments of others are used where there is no truth.
+pub fn prepared(dir: &Path, kept: Option<&Path>) -> Result<Scene> {
+    let has_truth = dir.join("gt_wireframe.json").exists() || dir.join("truth").exists();
+    let given = dir.join("hawp").is_dir() && !has_truth;
+    let options = LoadOptions {
+        require_wireframes: given,
+        ..LoadOptions::default()
+    };
+    let mut scene = load_scene(dir, &options)?.scene;
+    if !given {
+        let folder = kept.map(|kept| kept.join("segments"));
+        let file = |folder: &Path, index: usize| folder.join(format!("{index:04}.json"));
+        let center = scene.pixel_center;
+        match &folder {
+            Some(folder) if folder.is_dir() => {
+                for (index, view) in scene.views.iter_mut().enumerate() {
+                    view.wireframe = hawp_json::read(&file(folder, index), center)?;
+                }
+            }
+            _ => detect_views(&mut scene, &DetectorConfig::default())?,
+        }
+        if let Some(folder) = folder.filter(|folder| !folder.is_dir()) {
+            fs::create_dir_all(&folder)?;
+            for (index, view) in scene.views.iter().enumerate() {
+                hawp_json::write(&file(&folder, index), &view.wireframe, center)?;
+            }
+        }
+    }
+    let radius = scene.sphere_radius;
+    Ok(scene.scaled(radius.recip()))
+}
+
+/// What `neat reconstruct` would assemble of it.
+pub fn assembled(scene: &Scene) -> Result<Assembled> {
+    let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
+    let edgels = edgel_maps(&scene.views, &DetectorConfig::default(), scene.pixel_center)?;
+    Ok(assemble(&views, &edgels, 1.0, &AssembleConfig::default()))
+}

@@ -1,0 +1,126 @@
+//! How often the 95 % intervals of `neat measure` hold the true lengths of edges.
+//!
+//! ```text
+//! cargo run --release -p neat-eval --example measure_intervals -- [--out DIR] [--solids SEEDS] SCENE…
+//! ```
+//!
+//! Scenes hold a `gt_wireframe.json` or a folder `truth`; 2D segments are taken from `--out` and
+//! kept there, as by `measure_assembler`. `--solids` adds synthetic solids of so many seeds, with
+//! 16, 32 and 64 views in turn, whose images are detected like photographs. Every scene goes the
+//! way of `neat reconstruct`: assembled, assessed, made a document, measured.
+//!
+//! An edge belongs to a true one if both ends lie within a tolerance of its ends, the nearest
+//! pairs first, one to one. The tolerance caps errors, so the table has half of it, the whole and
+//! twice as much: where coverage falls with it, edges are paired that are not the same. Edges
+//! with a free end, whose length ends where images stop telling, are counted apart.
+
+#![expect(clippy::print_stdout, reason = "it measures for people to read")]
+
+mod coverage;
+#[path = "../measure_assembler/prepared.rs"]
+mod prepared;
+
+use coverage::Coverage;
+use neat_core::synthetic::{Solid, SyntheticScene, generate};
+use neat_core::{Scene, Wireframe3d};
+use neat_detect::{DetectorConfig, detect_views};
+use neat_eval::{NeatAbc, SceneTruth, SurfaceAndCreases, foreign};
+use neat_wireframe::ViewObservation;
+use neat_wireframe::confidence::{ConfidenceConfig, assess};
+use neat_wireframe::export::WireframeDocument;
+use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
+use std::env;
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+/// What edges are held against.
+struct Truth {
+    wireframe: Wireframe3d,
+    /// In the unit of the files.
+    tolerance: f64,
+}
+
+fn main() -> Result<()> {
+    let (mut scenes, mut out, mut seeds) = (Vec::new(), None, 0_u64);
+    let mut arguments = env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--out" => out = arguments.next().map(PathBuf::from),
+            "--solids" => seeds = arguments.next().unwrap_or_default().parse()?,
+            _ => scenes.push(PathBuf::from(argument)),
+        }
+    }
+    let mut coverage = Coverage::default();
+    for dir in &scenes {
+        let name = dir.file_name().unwrap_or_default().to_string_lossy();
+        let scene = prepared(dir, out.as_ref().map(|out| out.join(&*name)).as_deref())?;
+        let truth = true_edges(dir)?;
+        let folder = dir.parent().and_then(Path::file_name).unwrap_or_default();
+        let kind = match dir.join("truth").exists() {
+            true => name,
+            false => folder.to_string_lossy(),
+        };
+        coverage.add(
+            &kind,
+            &documented(scene)?,
+            &truth.wireframe,
+            truth.tolerance,
+        )?;
+    }
+    for (seed, solid) in (0..seeds).flat_map(|seed| Solid::ALL.map(|solid| (seed, solid))) {
+        let config = SyntheticScene {
+            solid,
+            seed,
+            views: [16, 32, 64][usize::try_from(seed % 3)?],
+            ..SyntheticScene::default()
+        };
+        let mut data = generate(&config)?;
+        detect_views(&mut data.scene, &DetectorConfig::default())?;
+        let tolerance = NeatAbc::default().thresholds[0];
+        coverage.add("solids", &documented(data.scene)?, &data.truth, tolerance)?;
+    }
+    print!("{}", coverage.table());
+    Ok(())
+}
+
+/// The straight edges whose ends are ends of the geometry, with the threshold of the protocol
+/// that the scene is measured by.
+fn true_edges(dir: &Path) -> Result<Truth> {
+    if !dir.join("truth").exists() {
+        return Ok(Truth {
+            wireframe: foreign::read_truth(&dir.join("gt_wireframe.json"))?.wireframe,
+            tolerance: NeatAbc::default().thresholds[0],
+        });
+    }
+    let SceneTruth {
+        mut wireframe,
+        cut_ends,
+        scale,
+        ..
+    } = SceneTruth::read(dir)?;
+    // Where an edge stops being seen, the truth depends on who looks.
+    let is_cut = |junction: &usize| cut_ends.get(*junction).copied().unwrap_or(false);
+    wireframe.edges.retain(|edge| !edge.iter().any(is_cut));
+    Ok(Truth {
+        wireframe,
+        tolerance: scale * SurfaceAndCreases::default().thresholds[1],
+    })
+}
+
+/// As a run would write it.
+fn documented(mut scene: Scene) -> Result<WireframeDocument> {
+    let built = assembled(&scene)?;
+    if let Some(cameras) = &built.refined_cameras {
+        scene = scene.with_cameras(cameras);
+    }
+    let views = ViewObservation::from_scene(&scene, MIN_SEGMENT_SCORE);
+    let config = ConfidenceConfig::default();
+    let confidence = assess(&built.wireframe, &views, None, 1.0, &config)?;
+    let original = |p: &_| scene.original_from_world.apply(p);
+    let mut document = WireframeDocument::from(&built.wireframe.map(original));
+    let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
+    confidence.fill(&mut document, &names, &scene.original_from_world);
+    Ok(document)
+}

@@ -1,0 +1,329 @@
+//! Dimensions of a wireframe, each with its standard deviation: lengths of edges, distances
+//! of junctions and of parallel edges, angles.
+//!
+//! A dimension is a function of the positions of a few junctions, and of those that set the
+//! scale. Its variance is linear propagation of their covariances as `wireframe.json` has
+//! them. Junctions count as independent of each other, but one that a dimension uses twice,
+//! such as an end of the edge that sets the scale, counts as one.
+//!
+//! ```
+//! use neat_wireframe::dimensions::{Dimensions, Quantity};
+//! use neat_wireframe::export::WireframeDocument;
+//!
+//! let document = WireframeDocument {
+//!     junctions: vec![[0.0, 0.0, 0.0].into(), [2.0, 0.0, 0.0].into()],
+//!     edges: vec![[0, 1]],
+//!     junction_covariances: vec![Some([1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4]); 2],
+//!     ..Default::default()
+//! };
+//! let scale = "0-1=3.20m".parse()?;
+//! let dimensions = Dimensions::new(&document, Some(scale))?;
+//! let length = dimensions.measure(Quantity::Length { edge: 0 })?;
+//! // What sets the scale is known as well as its measure is.
+//! assert!((length.value - 3.2).abs() < 1e-12 && length.sigma.unwrap() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod geometry;
+mod parallel;
+mod scale;
+
+pub use scale::{Scale, ScaleError};
+
+use crate::export::WireframeDocument;
+use nalgebra::{Matrix3, Vector3};
+use serde::Serialize;
+use std::collections::BTreeSet;
+
+/// Half the width of a 95 % interval of one normal number, in standard deviations …
+const INTERVAL: f64 = 1.959_964;
+/// … and the radius of the disc that holds 95 % of two.
+const DISC: f64 = 2.447_747;
+/// Step of the derivatives, as a share of the greatest extent: differences are exact to about
+/// 1e-10 of it.
+const STEP: f64 = 1e-6;
+/// Edges under a smaller sine to each other leave in the same direction, or the opposite one.
+const SAME_DIRECTION: f64 = 0.1;
+
+/// What is measured, by the numbers that `wireframe.json` counts from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case", tag = "kind")]
+pub enum Quantity {
+    /// From one end of an edge to the other.
+    Length {
+        /// The edge.
+        edge: usize,
+    },
+    /// Between two junctions.
+    Distance {
+        /// The junctions.
+        junctions: [usize; 2],
+    },
+    /// From the middle of the shorter of two edges to the line of the other.
+    Gap {
+        /// The edges.
+        edges: [usize; 2],
+    },
+    /// Between the lines of two edges, from 0 to 90°.
+    Angle {
+        /// The edges.
+        edges: [usize; 2],
+    },
+}
+
+/// A quantity with its value.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Dimension {
+    /// What it is.
+    #[serde(flatten)]
+    pub quantity: Quantity,
+    /// In degrees for angles, else in the unit of [`Dimensions::unit`].
+    pub value: f64,
+    /// Its standard deviation, in the same unit; `None` where a junction is not determined.
+    pub sigma: Option<f64>,
+    /// Holds the true value with a probability of 95 %, as far as the covariances hold.
+    pub interval: Option<[f64; 2]>,
+    /// Whether it hangs on an end of an edge that no edge of another direction fixes.
+    pub free_end: bool,
+}
+
+/// Why something cannot be measured.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DimensionError {
+    /// A number beyond the last.
+    #[error("there is no {what} {index}: the wireframe has {count}, counted from 0")]
+    Missing {
+        /// "junction" or "edge".
+        what: &'static str,
+        /// The number asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// One thing, twice.
+    #[error("{what} {index} is named twice: name two of them")]
+    Twice {
+        /// "junction" or "edge".
+        what: &'static str,
+        /// Its number.
+        index: usize,
+    },
+    /// Junctions in one place set no scale, and an edge between them has no direction.
+    #[error("junctions {a} and {b} lie in one place: choose others")]
+    OnePlace {
+        /// One of them.
+        a: usize,
+        /// The other.
+        b: usize,
+    },
+}
+
+/// Measures the wireframe of a document.
+pub struct Dimensions<'a> {
+    document: &'a WireframeDocument,
+    scale: Option<Scale>,
+    /// Greatest side of the box around all junctions.
+    extent: f64,
+    /// Whether each junction is a free end.
+    free: Vec<bool>,
+}
+
+impl<'a> Dimensions<'a> {
+    /// - `document`: one that passes [`WireframeDocument::check`].
+    /// - `scale`: what a distance truly is; without, lengths are in the unit of the files.
+    ///
+    /// # Errors
+    /// If the scale names junctions that are not there or lie in one place.
+    pub fn new(
+        document: &'a WireframeDocument,
+        scale: Option<Scale>,
+    ) -> Result<Self, DimensionError> {
+        let axes = document.junctions.iter().flat_map(|p| [p.x, p.y, p.z]);
+        let largest = axes.clone().fold(f64::NEG_INFINITY, f64::max);
+        let dimensions = Self {
+            document,
+            scale,
+            extent: (largest - axes.fold(f64::INFINITY, f64::min)).max(f64::MIN_POSITIVE),
+            free: free_ends(document),
+        };
+        if let Some(scale) = &scale {
+            dimensions.check(&Quantity::Distance {
+                junctions: scale.junctions,
+            })?;
+        }
+        Ok(dimensions)
+    }
+
+    /// The unit of lengths; `None` is that of the files.
+    pub fn unit(&self) -> Option<&'static str> {
+        self.scale.map(|scale| scale.unit)
+    }
+
+    /// The lengths of all edges, in their order. Edges without a length are left out.
+    pub fn lengths(&self) -> Vec<Dimension> {
+        (0..self.document.edges.len())
+            .filter_map(|edge| self.measure(Quantity::Length { edge }).ok())
+            .collect()
+    }
+
+    /// The gaps between edges that may be parallel, lie beside each other for most of the
+    /// shorter one and apart for sure; those of the longest edges first, `most` at most.
+    pub fn parallels(&self, most: usize) -> Vec<Dimension> {
+        parallel::pairs(self, most)
+    }
+
+    /// The value of one quantity, and how sure it is.
+    ///
+    /// # Errors
+    /// If it names what is not there, one thing twice, or an edge without a direction.
+    pub fn measure(&self, quantity: Quantity) -> Result<Dimension, DimensionError> {
+        self.check(&quantity)?;
+        let own = self.junctions_of(&quantity);
+        let by_scale = match quantity {
+            Quantity::Angle { .. } => None,
+            _ => self.scale,
+        };
+        let mut junctions = own.clone();
+        junctions.extend(by_scale.iter().flat_map(|scale| scale.junctions));
+        let value = |points: &[Vector3<f64>]| {
+            let (own, reference) = points.split_at(own.len());
+            let value = geometry::value(&quantity, own);
+            match (by_scale, reference) {
+                (Some(scale), [a, b]) => value * scale.length / (b - a).norm(),
+                _ => value,
+            }
+        };
+        let points: Vec<Vector3<f64>> =
+            (junctions.iter().map(|j| self.document.junctions[*j])).collect();
+        let measured = value(&points);
+        let propagated =
+            |of: &dyn Fn(&[Vector3<f64>]) -> Vector3<f64>| self.propagated(&junctions, &points, of);
+        let linear = || propagated(&|points| Vector3::new(value(points), 0.0, 0.0));
+        let variance = match quantity {
+            // An angle near 0 has no derivative: it is how far apart two directions are.
+            Quantity::Angle { .. } => match propagated(&geometry::apart) {
+                Some(variance) if measured > DISC * variance.sqrt() => linear(),
+                variance => variance,
+            },
+            _ => linear(),
+        };
+        let relative = by_scale.map_or(0.0, |scale| scale.sigma / scale.length);
+        let sigma = variance.map(|variance| (variance + (measured * relative).powi(2)).sqrt());
+        Ok(Dimension {
+            quantity,
+            value: measured,
+            sigma,
+            interval: sigma.map(|sigma| interval(&quantity, measured, sigma)),
+            free_end: match quantity {
+                Quantity::Length { .. } | Quantity::Distance { .. } => {
+                    junctions.iter().any(|junction| self.free[*junction])
+                }
+                _ => false,
+            },
+        })
+    }
+
+    /// The largest variance of a vector in any direction, by linear propagation, with central
+    /// differences for derivatives; `None` if a junction is not determined.
+    fn propagated(
+        &self,
+        junctions: &[usize],
+        points: &[Vector3<f64>],
+        of: &dyn Fn(&[Vector3<f64>]) -> Vector3<f64>,
+    ) -> Option<f64> {
+        let step = STEP * self.extent;
+        let mut sum = Matrix3::zeros();
+        for junction in junctions.iter().copied().collect::<BTreeSet<usize>>() {
+            // It moves wherever it stands.
+            let moved = |by: Vector3<f64>| {
+                let all = junctions.iter().zip(points);
+                let all = all.map(|(j, p)| if *j == junction { p + by } else { *p });
+                of(&all.collect::<Vec<_>>())
+            };
+            let slopes = [Vector3::x(), Vector3::y(), Vector3::z()]
+                .map(|axis| (moved(axis * step) - moved(-axis * step)) / (2.0 * step));
+            let slopes = Matrix3::from_columns(&slopes);
+            sum += slopes * self.covariance(junction)? * slopes.transpose();
+        }
+        let finite = sum.iter().all(|x| x.is_finite());
+        finite.then(|| sum.symmetric_eigenvalues().max().max(0.0))
+    }
+
+    fn covariance(&self, junction: usize) -> Option<Matrix3<f64>> {
+        let [xx, xy, xz, yy, yz, zz] = (*self.document.junction_covariances.get(junction)?)?;
+        Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
+    }
+
+    /// In the order that [`geometry::value`] expects.
+    fn junctions_of(&self, quantity: &Quantity) -> Vec<usize> {
+        let edges = &self.document.edges;
+        match quantity {
+            Quantity::Length { edge } => edges[*edge].to_vec(),
+            Quantity::Distance { junctions } => junctions.to_vec(),
+            Quantity::Gap { edges: pair } | Quantity::Angle { edges: pair } => {
+                pair.iter().flat_map(|edge| edges[*edge]).collect()
+            }
+        }
+    }
+
+    fn check(&self, quantity: &Quantity) -> Result<(), DimensionError> {
+        let (what, named, count) = match quantity {
+            Quantity::Length { edge } => ("edge", vec![*edge], self.document.edges.len()),
+            Quantity::Distance { junctions } => {
+                let count = self.document.junctions.len();
+                ("junction", junctions.to_vec(), count)
+            }
+            Quantity::Gap { edges } | Quantity::Angle { edges } => {
+                ("edge", edges.to_vec(), self.document.edges.len())
+            }
+        };
+        if let Some(&index) = named.iter().find(|index| **index >= count) {
+            return Err(DimensionError::Missing { what, index, count });
+        }
+        if let [index, other] = named[..]
+            && index == other
+        {
+            return Err(DimensionError::Twice { what, index });
+        }
+        for pair in self.junctions_of(quantity).chunks_exact(2) {
+            let [a, b] = [pair[0], pair[1]];
+            let apart = (self.document.junctions[b] - self.document.junctions[a]).norm();
+            if apart <= 2.0 * STEP * self.extent {
+                return Err(DimensionError::OnePlace { a, b });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Lengths are not negative, and angles end at 0 and 90°. There a small angle is no normal
+/// number: it is the length of two, and grows by noise alone.
+fn interval(quantity: &Quantity, value: f64, sigma: f64) -> [f64; 2] {
+    let around = [value - INTERVAL * sigma, value + INTERVAL * sigma];
+    match quantity {
+        Quantity::Angle { .. } if value <= DISC * sigma => [0.0, (value + DISC * sigma).min(90.0)],
+        Quantity::Angle { .. } => [around[0], around[1].min(90.0)],
+        _ => [around[0].max(0.0), around[1]],
+    }
+}
+
+/// The junctions at which no two edges of different directions meet: where such an edge ends
+/// along itself, no other tells.
+fn free_ends(document: &WireframeDocument) -> Vec<bool> {
+    let mut directions: Vec<Vec<Vector3<f64>>> = vec![Vec::new(); document.junctions.len()];
+    for [a, b] in &document.edges {
+        let along = document.junctions[*b] - document.junctions[*a];
+        if let Some(along) = along.try_normalize(0.0) {
+            directions[*a].push(along);
+            directions[*b].push(along);
+        }
+    }
+    let is_free = |directions: &Vec<Vector3<f64>>| {
+        let mut others = directions.iter().skip(1);
+        !others.any(|other| directions[0].cross(other).norm() > SAME_DIRECTION)
+    };
+    directions.iter().map(is_free).collect()
+}
+
+#[cfg(test)]
+mod tests;

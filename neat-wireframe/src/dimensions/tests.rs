@@ -1,0 +1,239 @@
+use super::*;
+use crate::test_scenes::{Noise, cube};
+
+/// Nearly normal with standard deviation 1: the sum of twelve uniform numbers.
+fn normal(noise: &mut Noise) -> f64 {
+    (0..12).map(|_| noise.uniform()).sum::<f64>() * 0.5
+}
+
+/// The cube with a covariance of its own at each junction, and the roots of these.
+fn unsure_cube(sigma: f64) -> (WireframeDocument, Vec<Matrix3<f64>>) {
+    let (junctions, edges) = cube();
+    let mut noise = Noise(3);
+    let root = |_| Matrix3::from_fn(|_, _| sigma * noise.uniform());
+    let roots: Vec<Matrix3<f64>> = (0..junctions.len()).map(root).collect();
+    let covariances = roots.iter().map(|root| {
+        let c = root * root.transpose();
+        Some([
+            c[(0, 0)],
+            c[(0, 1)],
+            c[(0, 2)],
+            c[(1, 1)],
+            c[(1, 2)],
+            c[(2, 2)],
+        ])
+    });
+    let document = WireframeDocument {
+        junction_covariances: covariances.collect(),
+        junctions: junctions.to_vec(),
+        edges: edges.to_vec(),
+        ..WireframeDocument::default()
+    };
+    (document, roots)
+}
+
+/// Of the cube and perhaps more edges.
+fn all_quantities(edges: usize) -> Vec<Quantity> {
+    let pairs = (0..edges).flat_map(|a| (a + 1..edges).map(move |b| [a, b]));
+    let mut all: Vec<_> = (0..edges).map(|edge| Quantity::Length { edge }).collect();
+    all.extend((1..8).map(|b| Quantity::Distance { junctions: [0, b] }));
+    all.extend(pairs.clone().map(|edges| Quantity::Angle { edges }));
+    all.extend(pairs.map(|edges| Quantity::Gap { edges }));
+    all
+}
+
+#[test]
+fn a_cube_has_the_dimensions_of_one() {
+    let (document, _) = unsure_cube(0.0);
+    let side = (document.junctions[document.edges[0][0]]
+        - document.junctions[document.edges[0][1]])
+        .norm();
+    let dimensions = Dimensions::new(&document, None).unwrap();
+    let lengths = dimensions.lengths();
+    assert_eq!(lengths.len(), 12);
+    for length in &lengths {
+        assert!((length.value - side).abs() < 1e-12 && !length.free_end);
+    }
+    let parallels = dimensions.parallels(100);
+    assert_eq!(parallels.len(), 18);
+    for gap in &parallels {
+        let sides = gap.value / side;
+        assert!((sides - 1.0).abs() < 1e-9 || (sides - 2f64.sqrt()).abs() < 1e-9);
+    }
+    assert_eq!(dimensions.parallels(5).len(), 5);
+    for quantity in all_quantities(12) {
+        if let Quantity::Angle { .. } = quantity {
+            let angle = dimensions.measure(quantity).unwrap().value;
+            assert!(angle.abs() < 1e-6 || (angle - 90.0).abs() < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn scatter_is_what_is_said() {
+    let (mut document, roots) = unsure_cube(2e-3);
+    // A diagonal of a face or of the whole, which is not at right angles to all others.
+    let from_first = |b: &usize| (document.junctions[*b] - document.junctions[0]).norm();
+    let farthest = (1..8).max_by(|a, b| from_first(a).total_cmp(&from_first(b)));
+    document.edges.push([0, farthest.unwrap()]);
+    let scale: Scale = "0-1=5m±0.02".parse().unwrap();
+    for scale in [None, Some(scale)] {
+        let said = Dimensions::new(&document, scale).unwrap();
+        // Angles are folded at 0 and 90, and of crossing edges of one length either may be the
+        // shorter one.
+        let smooth = |quantity: &Quantity| match *quantity {
+            Quantity::Gap { edges } => {
+                let angle = said.measure(Quantity::Angle { edges }).unwrap();
+                angle.value < 1.0
+            }
+            Quantity::Angle { edges } => edges[0] == 12 || edges[1] == 12,
+            _ => true,
+        };
+        let quantities: Vec<Quantity> = all_quantities(13).into_iter().filter(smooth).collect();
+        assert!(quantities.len() > 30);
+        let mut noise = Noise(17);
+        let mut squares = vec![0.0; quantities.len()];
+        const TRIALS: usize = 3000;
+        for _ in 0..TRIALS {
+            let mut moved = document.clone();
+            for (junction, root) in moved.junctions.iter_mut().zip(&roots) {
+                *junction += root * Vector3::from_fn(|_, _| normal(&mut noise));
+            }
+            let scale = scale.map(|scale| Scale {
+                length: scale.length + scale.sigma * normal(&mut noise),
+                ..scale
+            });
+            let seen = Dimensions::new(&moved, scale).unwrap();
+            for (sum, quantity) in squares.iter_mut().zip(&quantities) {
+                let error =
+                    seen.measure(*quantity).unwrap().value - said.measure(*quantity).unwrap().value;
+                *sum += error * error;
+            }
+        }
+        for (sum, quantity) in squares.iter().zip(&quantities) {
+            let sigma = said.measure(*quantity).unwrap().sigma.unwrap();
+            let scatter = (sum / TRIALS as f64).sqrt();
+            assert!(
+                (scatter - sigma).abs() < 0.06 * sigma + 1e-9,
+                "{quantity:?}: scatters by {scatter}, said {sigma}"
+            );
+        }
+    }
+}
+
+#[test]
+fn intervals_of_small_angles_hold_zero() {
+    let (truth, roots) = unsure_cube(5e-3);
+    let edges = truth.edges.clone();
+    let is_parallel = |[a, b]: [usize; 2]| {
+        let along = |e: usize| truth.junctions[edges[e][1]] - truth.junctions[edges[e][0]];
+        geometry::angle(&along(a), &along(b)) < 1.0
+    };
+    let pairs: Vec<[usize; 2]> = (0..12)
+        .flat_map(|a| (a + 1..12).map(move |b| [a, b]))
+        .filter(|pair| is_parallel(*pair))
+        .collect();
+    let mut noise = Noise(29);
+    let (mut held, mut all) = (0, 0);
+    for _ in 0..300 {
+        let mut seen = truth.clone();
+        for (junction, root) in seen.junctions.iter_mut().zip(&roots) {
+            *junction += root * Vector3::from_fn(|_, _| normal(&mut noise));
+        }
+        let dimensions = Dimensions::new(&seen, None).unwrap();
+        for edges in &pairs {
+            let angle = dimensions
+                .measure(Quantity::Angle { edges: *edges })
+                .unwrap();
+            let [low, high] = angle.interval.unwrap();
+            assert!(low <= angle.value && angle.value <= high);
+            held += usize::from(low <= 0.0);
+            all += 1;
+        }
+    }
+    let share = f64::from(u32::try_from(held).unwrap()) / f64::from(all);
+    assert!(share > 0.95, "{share}");
+}
+
+#[test]
+fn what_is_not_determined_has_no_interval_and_free_ends_are_told() {
+    let (mut document, _) = unsure_cube(1e-3);
+    document.junction_covariances[document.edges[0][1]] = None;
+    let end = document.junctions.len();
+    document.junctions.push(document.junctions[0] * 2.0);
+    document.edges.push([0, end]);
+    document
+        .junction_covariances
+        .push(Some([1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6]));
+    let dimensions = Dimensions::new(&document, None).unwrap();
+    let first = dimensions.measure(Quantity::Length { edge: 0 }).unwrap();
+    assert_eq!((first.sigma, first.interval), (None, None));
+    let last = dimensions.measure(Quantity::Length { edge: 12 }).unwrap();
+    assert!(last.free_end && last.interval.is_some());
+    document.junction_covariances.clear();
+    let without = Dimensions::new(&document, None).unwrap();
+    assert!(
+        without
+            .lengths()
+            .iter()
+            .all(|length| length.interval.is_none())
+    );
+    assert!(!without.parallels(1000).is_empty());
+}
+
+#[test]
+fn what_cannot_be_measured_is_told() {
+    let (mut document, _) = unsure_cube(0.0);
+    document.junctions.push(document.junctions[0]);
+    document.edges.push([0, 8]);
+    let dimensions = Dimensions::new(&document, None).unwrap();
+    let said = |quantity| dimensions.measure(quantity).unwrap_err().to_string();
+    assert!(said(Quantity::Length { edge: 13 }).contains("no edge 13"));
+    assert!(said(Quantity::Distance { junctions: [0, 9] }).contains("no junction 9"));
+    assert!(said(Quantity::Angle { edges: [4, 4] }).contains("named twice"));
+    assert!(said(Quantity::Length { edge: 12 }).contains("one place"));
+    assert_eq!(dimensions.lengths().len(), 12);
+    for bad in ["0-8=1m", "0-99=1m", "3-3=1m"] {
+        assert!(
+            Dimensions::new(&document, Some(bad.parse().unwrap())).is_err(),
+            "{bad}"
+        );
+    }
+    let empty = WireframeDocument::default();
+    let nothing = Dimensions::new(&empty, None).unwrap();
+    assert!(nothing.lengths().is_empty() && nothing.parallels(9).is_empty());
+}
+
+#[test]
+fn scales_are_read() {
+    let scale: Scale = "3-17=3.20m".parse().unwrap();
+    assert_eq!(
+        (scale.junctions, scale.length, scale.sigma, scale.unit),
+        ([3, 17], 3.2, 0.0, "m")
+    );
+    for text in ["0-1=12 in ± 0.5", "0-1=12in+-0.5in", " 0 - 1 = 12in±0.5"] {
+        let scale: Scale = text.parse().unwrap();
+        assert_eq!((scale.length, scale.unit), (12.0, "in"), "{text}");
+        assert!((scale.sigma * INTERVAL - 0.5).abs() < 1e-12);
+    }
+    for bad in [
+        "",
+        "3-17",
+        "3-17=",
+        "3-17=3.2",
+        "3-17=m",
+        "3-17=0m",
+        "3-17=-1m",
+        "3-17=1km",
+        "3=1m",
+        "a-b=1m",
+        "3-17=infm",
+        "3-17=NaNm",
+        "3-17=1m±",
+        "3-17=1m±-1",
+        "3-17=1m±1mm",
+        "-1-2=3m",
+    ] {
+        assert!(bad.parse::<Scale>().is_err(), "{bad}");
+    }
+}
