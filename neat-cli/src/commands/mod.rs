@@ -5,6 +5,7 @@ mod baseline;
 mod batch;
 mod bench;
 mod compare_backends;
+mod completions;
 mod convert;
 mod demo;
 mod detect;
@@ -13,6 +14,7 @@ mod doctor;
 mod eval;
 mod export;
 mod info;
+mod man;
 mod reconstruct;
 mod render;
 mod synth;
@@ -20,7 +22,7 @@ mod train;
 mod view;
 
 use crate::error::CliError;
-use crate::{interrupt, output, threads};
+use crate::{interrupt, output, threads, version};
 use clap::{Parser, Subcommand};
 
 /// Turns posed photographs and their 2D wireframes into one 3D wireframe.
@@ -28,6 +30,7 @@ use clap::{Parser, Subcommand};
 #[command(
     name = "neat",
     version,
+    long_version = version::long(),
     arg_required_else_help = true,
     after_help = "\
 Start here:
@@ -95,6 +98,8 @@ pub enum Command {
     Bench(bench::BenchArgs),
     Ablate(ablate::AblateArgs),
     Baseline(baseline::BaselineArgs),
+    Completions(completions::CompletionsArgs),
+    Man(man::ManArgs),
 }
 
 impl Command {
@@ -119,6 +124,8 @@ impl Command {
             Self::Bench(args) => args.run(quiet),
             Self::Ablate(args) => args.run(quiet),
             Self::Baseline(args) => args.run(quiet),
+            Self::Completions(args) => args.run(),
+            Self::Man(args) => args.run(),
         }
     }
 }
