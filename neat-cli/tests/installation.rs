@@ -7,6 +7,7 @@ use std::process::{Command, Output};
 use support::{neat, stdout};
 
 /// Whether a tool is here; says so where it is not.
+#[expect(clippy::print_stderr, reason = "a skipped test must say so")]
 fn has(tool: &str) -> bool {
     let found = Command::new(tool).arg("--version").output().is_ok();
     if !found {
