@@ -36,8 +36,8 @@ fn of_package() -> Option<String> {
 }
 
 /// HEAD, if this folder is where it belongs in a repository, and not a copy in another one.
-/// The reflog grows with every commit, checkout and merge: the program is linked again after
-/// these, and not after every build.
+/// The reflog grows with every commit, checkout and merge: the program is built again after
+/// these, and otherwise only if it changes.
 fn of_repository() -> Option<String> {
     if git(&["rev-parse", "--show-prefix"])? != "neat-cli/" {
         return None;
