@@ -1,13 +1,19 @@
 #!/usr/bin/env bash
 # `cargo check` for machines that are not here, where rustup has or gets their standard library.
 #
-#   scripts/check_targets.sh
+#   scripts/check_targets.sh          # the crates without burn
+#   scripts/check_targets.sh --all    # and the program and the C interface: burn, twice
 #
 # Nothing is linked and nothing runs: what compiles here may still fail there.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-free=(neat-core neat-detect neat-doctor neat-wireframe neat-eval neat-export neat-report neat-batch)
+crates=(neat-core neat-detect neat-doctor neat-wireframe neat-eval neat-export neat-report)
+# What starts processes, which a page in a browser cannot.
+native=(neat-batch)
+if [ "${1:-}" = --all ]; then
+    native+=(neat-cli neat-capi)
+fi
 
 # check TARGET CRATE...: says so where the target cannot be had.
 check() {
@@ -27,7 +33,6 @@ check() {
     echo "$1: ${*:2}"
 }
 
-check aarch64-unknown-linux-gnu "${free[@]}" neat-cli neat-capi
-check x86_64-pc-windows-gnu "${free[@]}" neat-cli neat-capi
-# Batches start processes, which a page cannot.
-check wasm32-unknown-unknown "${free[@]/neat-batch/}"
+check aarch64-unknown-linux-gnu "${crates[@]}" "${native[@]}"
+check x86_64-pc-windows-gnu "${crates[@]}" "${native[@]}"
+check wasm32-unknown-unknown "${crates[@]}"
