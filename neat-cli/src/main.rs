@@ -14,6 +14,7 @@ mod output;
 mod progress;
 mod scene_arguments;
 mod threads;
+mod version;
 
 use clap::Parser;
 use commands::Cli;

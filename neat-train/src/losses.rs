@@ -383,22 +383,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_documentation_has_the_table() {
-        let rows = LOSS_TERMS
-            .each_ref()
-            .map(|term| format!("| `{}` | {} |\n", term.name, term.what));
-        let documentation = include_str!("../../docs/method.md");
-        let expected = format!(
-            "| term | what, and by which function |\n| --- | --- |\n{}",
-            rows.concat()
-        );
-        assert!(
-            documentation.contains(&expected),
-            "docs/method.md lacks:\n{expected}"
-        );
-    }
-
-    #[test]
     fn every_term_has_its_weight_and_its_place_in_the_log() {
         let numbers: Vec<f32> = (0..=LOSS_TERMS.len()).map(|i| i as f32).collect();
         let losses = Losses::from_terms(&numbers);

@@ -5,6 +5,7 @@ mod baseline;
 mod batch;
 mod bench;
 mod compare_backends;
+mod completions;
 mod convert;
 mod demo;
 mod detect;
@@ -14,6 +15,7 @@ mod eval;
 mod export;
 mod info;
 mod measure;
+mod man;
 mod reconstruct;
 mod render;
 mod synth;
@@ -21,7 +23,7 @@ mod train;
 mod view;
 
 use crate::error::CliError;
-use crate::{interrupt, output, threads};
+use crate::{interrupt, output, threads, version};
 use clap::{Parser, Subcommand};
 
 /// Turns posed photographs and their 2D wireframes into one 3D wireframe.
@@ -29,6 +31,7 @@ use clap::{Parser, Subcommand};
 #[command(
     name = "neat",
     version,
+    long_version = version::long(),
     arg_required_else_help = true,
     after_help = "\
 Start here:
@@ -97,6 +100,8 @@ pub enum Command {
     Bench(bench::BenchArgs),
     Ablate(ablate::AblateArgs),
     Baseline(baseline::BaselineArgs),
+    Completions(completions::CompletionsArgs),
+    Man(man::ManArgs),
 }
 
 impl Command {
@@ -122,6 +127,8 @@ impl Command {
             Self::Bench(args) => args.run(quiet),
             Self::Ablate(args) => args.run(quiet),
             Self::Baseline(args) => args.run(quiet),
+            Self::Completions(args) => args.run(),
+            Self::Man(args) => args.run(),
         }
     }
 }
