@@ -201,10 +201,10 @@ impl Images<'_> {
         let Some((projected, normal, samples)) = prepared else {
             return Vec::new();
         };
-        let count = samples.points.len();
+        let count = samples.len();
         let mut edgels = Vec::with_capacity(count);
-        for (k, (_, pixel)) in samples.points.iter().enumerate() {
-            edgels.extend(self.edgel(view, pixel, &samples.normal, reach));
+        for (k, sample) in samples.iter().enumerate() {
+            edgels.extend(self.edgel(view, sample, reach));
             // Most tubes are none: this is soon known.
             let most = edgels.len() + (count - k - 1);
             if (most as f64) < FOUND * count as f64 {
