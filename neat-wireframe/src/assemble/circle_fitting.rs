@@ -4,16 +4,15 @@
 //! and hides its back. It grows by sectors that speak for it, at most to twice its length, and is
 //! fitted to the edgels beside them, until it grows no more.
 
-use super::edge_samples::{Images, Sample, are_enough};
+use super::curve_samples::{SPACING, distance_of_curve};
+use super::edge_samples::{Images, Sample};
 use super::line_evidence::{LineEvidence, Showing};
 use super::line_extent::{best_stretch, gain_of_sample};
 use super::line_fitting::change_by_edgels;
 use super::line_selection::CLAIM_COSINE;
-use super::projected_line::ProjectedLine;
-use crate::projection::project_in_front;
 use crate::statistics::upper_median;
-use nalgebra::{SVector, Unit, UnitQuaternion, Vector2, Vector3};
-use neat_core::{CircularArc, LineSegment3};
+use nalgebra::{SVector, Unit, UnitQuaternion};
+use neat_core::CircularArc;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -36,13 +35,8 @@ const MIN_EDGELS: usize = 20;
 const RIDGE: f64 = 1e-6;
 /// A fit changes the radius by this factor at most: farther its rows do not hold.
 const MAX_CHANGE: f64 = 2.0;
-/// Distance between samples in pixels, and how many a sector has: as for lines.
-const SPACING: f64 = 3.0;
-const COUNTS: [usize; 2] = [6, 40];
-/// … and where it takes its edgels: as for lines.
+/// Distance between samples where an arc takes its edgels, in pixels: as for lines.
 const CLAIM_SPACING: f64 = 0.5;
-/// What projects to less, in pixels, has no direction that an edgel could agree with.
-const MIN_STEP: f64 = 0.2;
 /// Pixels between places of which the ends are one.
 const END_STEP: f64 = 2.0;
 
@@ -56,10 +50,9 @@ pub(super) struct FoundArc {
     pub pixel: f64,
 }
 
-/// How the distance of an edgel from an arc changes with the circle's centre, its radius, its
-/// turn around both axes (times the radius), and the radius of a tube around it of which it is the
-/// outline; and what takes the distance away.
-type Row = (SVector<f64, 7>, f64);
+/// How the distance of an edgel from an arc changes with the circle's centre, its radius and its
+/// turn around both axes (times the radius); and what takes the distance away.
+type Row = (SVector<f64, 6>, f64);
 
 /// A part of an arc, and what the images say about it.
 struct Sector {
@@ -220,18 +213,9 @@ impl Images<'_> {
     /// What the views that show an arc say about one place of it.
     fn gain_of_place(&self, arc: &CircularArc, angle: f64, step: f64, showing: &[Showing]) -> f64 {
         let gain = |Showing { view, chance }: &Showing| {
-            let camera = &self.views[*view].camera;
-            let project = |angle: f64| project_in_front(camera, &arc.point_at(angle));
-            let pixel = project(angle)?;
-            let along = project(angle + 0.5 * step)? - project(angle - 0.5 * step)?;
-            let direction = along.try_normalize(MIN_STEP)?;
-            let sample = Sample {
-                place: angle,
-                pixel,
-                normal: Vector2::new(-direction.y, direction.x),
-            };
-            (self.is_inside(*view, &pixel))
-                .then(|| gain_of_sample(self.edgel(*view, &sample, self.reach).is_some(), *chance))
+            let sample = self.sample_of_curve(*view, angle, step, |a| Some(arc.point_at(a)))?;
+            let is_there = self.edgel(*view, &sample, self.reach).is_some();
+            Some(gain_of_sample(is_there, *chance))
         };
         showing.iter().filter_map(gain).sum()
     }
@@ -252,29 +236,10 @@ impl Images<'_> {
         &self,
         view: usize,
         arc: &CircularArc,
-        [low, high]: [f64; 2],
+        angles: [f64; 2],
         spacing: f64,
     ) -> Option<Vec<Sample>> {
-        let camera = &self.views[view].camera;
-        let project = |angle: f64| project_in_front(camera, &arc.point_at(angle));
-        let middle = 0.5 * (low + high);
-        let [start, bend, end] = [project(low)?, project(middle)?, project(high)?];
-        let length = (bend - start).norm() + (end - bend).norm();
-        let count = ((length / spacing) as usize).clamp(COUNTS[0], COUNTS[1]);
-        let step = (high - low) / count as f64;
-        let sample = |k: usize| {
-            let place = low + step * (k as f64 + 0.5);
-            let pixel = project(place)?;
-            let along = project(place + 0.5 * step)? - project(place - 0.5 * step)?;
-            let direction = along.try_normalize(MIN_STEP)?;
-            self.is_inside(view, &pixel).then_some(Sample {
-                place,
-                pixel,
-                normal: Vector2::new(-direction.y, direction.x),
-            })
-        };
-        let samples: Vec<Sample> = (0..count).filter_map(sample).collect();
-        are_enough(&samples, count).then_some(samples)
+        self.samples_of_curve(view, angles, spacing, |angle| Some(arc.point_at(angle)))
     }
 
     /// The circle through the edgels within `reach` pixels beside parts of an arc in some views.
@@ -284,14 +249,13 @@ impl Images<'_> {
         parts: &[([f64; 2], Vec<usize>)],
         reach: f64,
     ) -> Option<CircularArc> {
-        let rows: Vec<(SVector<f64, 6>, f64)> = (parts.par_iter())
+        let rows: Vec<Row> = (parts.par_iter())
             .flat_map_iter(|(angles, views)| {
                 (views.iter()).flat_map(|view| {
                     let samples = self.samples_of_sector(*view, arc, *angles, SPACING);
                     self.rows_of_samples(arc, *view, &samples.unwrap_or_default(), reach)
                 })
             })
-            .map(|(row, value)| (row.fixed_rows::<6>(0).into_owned(), value))
             .collect();
         let pixel = self.pixel_of_arc(arc, parts.iter().flat_map(|(_, views)| views.clone()));
         let change = change_by_edgels(&rows, MIN_EDGELS, reach, RIDGE, pixel)?.solution;
@@ -321,14 +285,10 @@ impl Images<'_> {
             let edgel = self.edgel(view, sample, reach)?;
             let position = self.maps[view].get(edgel).position.cast();
             let (point, tangent) = (arc.point_at(sample.place), arc.tangent_at(sample.place));
-            let half = 0.01 * arc.radius * tangent;
-            let line = ProjectedLine::new(camera, &LineSegment3::new(point - half, point + half))?;
-            let found = line.distance_with_gradient(camera, &position);
-            let by_point: Vector3<f64> = found.by_points[0] + found.by_points[1];
+            let (distance, by_point) =
+                distance_of_curve(camera, &point, &(arc.radius * tangent), &position)?;
             let offset = arc.toward(sample.place);
             let by_turn = arc.axes.map(|axis| axis.cross(&offset).dot(&by_point));
-            let sight = point - camera.center_in_world;
-            let outward = tangent.cross(&sight).try_normalize(0.0)?;
             let row = [
                 by_point.x,
                 by_point.y,
@@ -336,9 +296,8 @@ impl Images<'_> {
                 by_point.dot(&offset),
                 by_turn[0],
                 by_turn[1],
-                by_point.dot(&outward),
             ];
-            Some((SVector::from(row), -found.distance))
+            Some((SVector::from(row), -distance))
         };
         samples.iter().filter_map(row).collect()
     }

@@ -76,7 +76,9 @@ fn chosen_arcs(
             && settled.gain > least
         {
             images.claim_arc(&settled, &mut taken);
-            chosen.push(settled);
+            if !images.is_outline(&settled.arc, settled.pixel) {
+                chosen.push(settled);
+            }
         }
     }
     chosen

@@ -23,6 +23,7 @@ mod collinear_pieces;
 mod config;
 mod corners;
 mod curve_pieces;
+mod curve_samples;
 mod curves;
 mod edge_completion;
 mod edge_cutting;
@@ -48,6 +49,7 @@ mod projected_line;
 mod report;
 mod slab_ends;
 mod straightness;
+mod swept_tubes;
 mod tangent_ends;
 mod view_segments;
 
