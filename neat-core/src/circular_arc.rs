@@ -1,10 +1,12 @@
 //! Arcs of circles in space.
 
+use crate::LineSegment3;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// An arc of a circle, or a whole one.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CircularArc {
     /// The circle's centre.
     pub center: Vector3<f64>,
@@ -108,6 +110,34 @@ impl CircularArc {
         let count = (self.sweep() / most).ceil().max(1.0);
         (0..=count as usize)
             .map(|k| self.point_at(self.angles[0] + self.sweep() * k as f64 / count))
+            .collect()
+    }
+
+    /// Whether its numbers are those of an arc.
+    pub fn is_valid(&self) -> bool {
+        let points = [self.center, self.axes[0], self.axes[1]];
+        let finite = points
+            .iter()
+            .flat_map(|point| point.iter())
+            .all(|x| x.is_finite());
+        let [x, y] = self.axes;
+        let square = (x.norm() - 1.0)
+            .abs()
+            .max((y.norm() - 1.0).abs())
+            .max(x.dot(&y).abs());
+        finite
+            && square < 1e-6
+            && self.radius.is_normal()
+            && self.radius > 0.0
+            && self.angles[0].is_finite()
+            && (0.0..TAU + 1e-9).contains(&self.sweep())
+    }
+
+    /// Chords along it, from end to end, that turn by at most `most` radians from one to the next.
+    pub fn chords(&self, most: f64) -> Vec<LineSegment3> {
+        let points = self.points(most);
+        (points.windows(2))
+            .map(|ends| LineSegment3::new(ends[0], ends[1]))
             .collect()
     }
 

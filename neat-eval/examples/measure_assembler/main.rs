@@ -78,11 +78,24 @@ fn main() -> Result<()> {
         eprintln!("   {name} {:?}", built.report);
         scores.extend(score);
         if let Some(kept) = &kept {
-            let arcs: Vec<String> = built.arcs.iter().map(|a| {
-                let a = a.map(original);
-                let p: Vec<String> = a.points(0.02).iter().map(|p| format!("[{},{},{}]", p.x, p.y, p.z)).collect();
-                format!("{{\"radius\":{},\"sweep\":{},\"points\":[{}]}}", a.radius, a.sweep(), p.join(","))
-            }).collect();
+            let arcs: Vec<String> = built
+                .arcs
+                .iter()
+                .map(|a| {
+                    let a = a.map(original);
+                    let p: Vec<String> = a
+                        .points(0.02)
+                        .iter()
+                        .map(|p| format!("[{},{},{}]", p.x, p.y, p.z))
+                        .collect();
+                    format!(
+                        "{{\"radius\":{},\"sweep\":{},\"points\":[{}]}}",
+                        a.radius,
+                        a.sweep(),
+                        p.join(",")
+                    )
+                })
+                .collect();
             fs::write(kept.join("arcs.json"), format!("[{}]", arcs.join(",")))?;
             write_json(
                 &kept.join("wireframe.json"),

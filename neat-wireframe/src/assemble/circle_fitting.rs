@@ -302,3 +302,73 @@ impl Images<'_> {
         samples.iter().filter_map(row).collect()
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::assemble::test_views::TestViews;
+    use crate::assemble::view_segments::PreparedView;
+    use crate::test_scenes::{cameras_on_sphere, views_of_edges};
+    use nalgebra::Vector3;
+    use neat_core::Camera;
+
+    /// Views that show another arc each.
+    pub(crate) fn views_of_arcs(count: usize, arc: impl Fn(&Camera) -> CircularArc) -> TestViews {
+        let view = |camera: &Camera| {
+            let points = arc(camera).points(TAU / 120.0);
+            let edges: Vec<[usize; 2]> = (1..points.len()).map(|k| [k - 1, k]).collect();
+            let seen = views_of_edges(&[*camera], &points, &edges);
+            PreparedView::new(&seen[0], 1.0, 0.0)
+        };
+        TestViews::of(cameras_on_sphere(count).iter().map(view).collect())
+    }
+
+    pub(crate) fn arc(sweep: f64) -> CircularArc {
+        CircularArc {
+            center: Vector3::new(0.05, -0.1, 0.1),
+            axes: [Vector3::new(0.6, 0.8, 0.0), Vector3::z()],
+            radius: 0.3,
+            angles: [0.0, sweep],
+        }
+    }
+
+    #[test]
+    fn a_part_of_an_arc_grows_to_all_of_it() {
+        for sweep in [1.5, 4.0, TAU] {
+            let truth = arc(sweep);
+            let views = views_of_arcs(20, |_| truth);
+            let images = views.images();
+            // A part of it, a pixel beside it.
+            let start = CircularArc {
+                center: truth.center + Vector3::new(0.001, 0.002, -0.001),
+                radius: 0.27,
+                angles: [0.5, 0.9],
+                ..truth
+            };
+            let moved = truth.point_at(0.7) - start.point_at(0.7);
+            let start = start.map(|point| point + moved);
+            let all: Vec<usize> = (0..20).collect();
+            let found = images.follow_arc(&start, &all).unwrap();
+            let settled = images.settle_arc(&found, &images.nothing_taken()).unwrap();
+            assert!((settled.arc.center - truth.center).norm() < 1e-3);
+            assert!((settled.arc.radius - truth.radius).abs() < 1e-3);
+            assert!(
+                (settled.arc.sweep() - sweep).abs() < 0.06,
+                "{}",
+                settled.arc.sweep()
+            );
+            if sweep < TAU {
+                for [end, true_end] in [[0, 0], [1, 1]] {
+                    let end = settled.arc.point_at(settled.arc.angles[end]);
+                    let true_end = truth.point_at(truth.angles[true_end]);
+                    assert!((end - true_end).norm() < 0.02);
+                }
+            }
+            // Nothing is left of it for another one.
+            let mut taken = images.nothing_taken();
+            images.claim_arc(&settled, &mut taken);
+            let left = images.settle_arc(&found, &taken);
+            assert!(left.is_none_or(|left| left.gain < 0.05 * settled.gain));
+        }
+    }
+}

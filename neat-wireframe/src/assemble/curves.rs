@@ -15,6 +15,10 @@ use std::ops::ControlFlow;
 /// Nearer to an arc than so many reaches, all along, a chord is one of its own.
 const SAME: f64 = 2.0;
 
+/// An arc all along a surer one, nearer than so many pixels, is what blur and rims make of the same
+/// edge: smoothing leaves no two edges so near each other.
+const BESIDE_IN_PIXELS: f64 = 3.0;
+
 /// The arcs that the images show, of the chords among the lines and of those that pieces of
 /// curves propose.
 pub(super) fn find_arcs(
@@ -76,7 +80,10 @@ fn chosen_arcs(
             && settled.gain > least
         {
             images.claim_arc(&settled, &mut taken);
-            if !images.is_outline(&settled.arc, settled.pixel) {
+            let is_again = chosen
+                .iter()
+                .any(|other| runs_beside(other, &settled.arc, BESIDE_IN_PIXELS * settled.pixel));
+            if !is_again && !images.is_outline(&settled.arc, settled.pixel) {
                 chosen.push(settled);
             }
         }
@@ -86,7 +93,11 @@ fn chosen_arcs(
 
 /// Whether an arc runs along another one.
 fn covers(images: &Images, whole: &FoundArc, part: &CircularArc) -> bool {
-    let near = SAME * images.reach * whole.pixel;
+    runs_beside(whole, part, SAME * images.reach * whole.pixel)
+}
+
+/// Whether all of an arc is at most so far from another one.
+fn runs_beside(whole: &FoundArc, part: &CircularArc, near: f64) -> bool {
     [0.1, 0.5, 0.9].iter().all(|place| {
         let point = part.point_at(part.angles[0] + place * part.sweep());
         whole.arc.distance_to_circle(&point) < near

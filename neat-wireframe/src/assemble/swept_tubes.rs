@@ -237,3 +237,42 @@ fn parts_of(arc: &CircularArc, pixel: f64) -> Vec<[f64; 2]> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::circle_fitting::tests::{arc, views_of_arcs};
+    use neat_core::Camera;
+    use std::f64::consts::TAU;
+
+    const RADIUS: f64 = 0.3;
+
+    /// What a view sees of a sphere around the origin.
+    fn outline_of_sphere(camera: &Camera) -> CircularArc {
+        let eye = camera.center_in_world;
+        let toward = eye.normalize();
+        let sine = RADIUS / eye.norm();
+        let x = toward.cross(&Vector3::ith(toward.iamin(), 1.0)).normalize();
+        CircularArc {
+            center: RADIUS * sine * toward,
+            axes: [x, toward.cross(&x)],
+            radius: RADIUS * (1.0 - sine * sine).sqrt(),
+            angles: [0.0, TAU],
+        }
+    }
+
+    #[test]
+    fn a_line_of_a_sphere_is_an_outline_and_a_rim_is_none() {
+        let sphere = views_of_arcs(60, outline_of_sphere);
+        let images = sphere.images();
+        let pixel = images.views[0].pixel_size_at(&Vector3::zeros());
+        let seen = outline_of_sphere(&images.views[0].camera);
+        let part = CircularArc {
+            angles: [0.0, 1.5],
+            ..seen
+        };
+        assert!(images.is_outline(&part, pixel));
+        let rim = views_of_arcs(60, |_| arc(TAU));
+        assert!(!rim.images().is_outline(&arc(1.5), pixel));
+    }
+}
