@@ -54,6 +54,8 @@ TEMPORARY = re.compile(r"\..+\.\d+\.\d+\.tmp")
 CHECKPOINT = re.compile(r"step-(\d{8})\.safetensors")
 # Quick, with checkpoints often enough that most kills have one to go on from.
 SETTINGS = ("train.checkpoint_interval=10", "train.warm_up_steps=10", "train.rays=128")
+# So many kills apart it says how far it is: a thousand take most of an hour.
+TOLD_EVERY = 100
 # A reconstruction of the toy scene takes some seconds; this one is stuck.
 PATIENCE_IN_SECONDS = 600
 
@@ -336,6 +338,7 @@ class Outcome:
     def add(self, folder, kills, failures):
         """Counts the kills of a run: (stage, in a write, with a checkpoint) of each."""
         with self.lock:
+            before = self.kills()
             for stage, in_a_write, with_checkpoint in kills:
                 counts = self.counts[stage]
                 counts["kills"] += 1
@@ -344,6 +347,8 @@ class Outcome:
                 counts["identical"] += not failures
             for text in failures:
                 self.fail(folder, text)
+            if self.kills() // TOLD_EVERY > before // TOLD_EVERY:
+                print(f"{self.kills()} kills, {len(self.failures)} failures", file=sys.stderr)
 
     def count(self, kind):
         return sum(kind in text for text in self.failures)

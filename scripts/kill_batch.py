@@ -54,6 +54,7 @@ def main():
         failures += found
         full += filled
         left, number = left - kills, number + 1
+        print(f"{left} kills left, {len(failures)} failures", file=sys.stderr)
     for failure in failures:
         print(failure)
     print(

@@ -52,6 +52,7 @@ pub mod assignment;
 #[cfg(test)]
 mod awkward_array;
 mod camera;
+mod circular_arc;
 pub mod convert;
 mod distortion;
 mod downscaling;
@@ -80,6 +81,7 @@ mod wireframe2d;
 mod wireframe3d;
 
 pub use camera::{Camera, CameraError, Intrinsics, Projection, Ray};
+pub use circular_arc::CircularArc;
 pub use distortion::Distortion;
 pub use downscaling::Downscaling;
 pub use edgel::{Edgel, EdgelMap};

@@ -112,6 +112,7 @@ fn with_edges(document: &WireframeDocument, passes: &[bool]) -> WireframeDocumen
         count += usize::from(joined);
     }
     WireframeDocument {
+        arcs: document.arcs.clone(),
         metadata: document.metadata.clone(),
         junctions: chosen(&document.junctions, &joined),
         edges: passing

@@ -6,7 +6,7 @@ mod thin_regions;
 use crate::config::{BackEnd, Config, Partners};
 use crate::event::{Decision, POSES};
 use crate::plan::Plan;
-use neat_core::{EdgelMap, Scene, SceneError, Wireframe3d};
+use neat_core::{CircularArc, EdgelMap, Scene, SceneError, Wireframe3d};
 use neat_detect::{DetectorConfig, edgel_maps};
 use neat_train::TrainedField;
 use neat_wireframe::assemble::{AssembleReport, Assembled, assemble_with_progress};
@@ -64,6 +64,8 @@ pub enum DistillError {
 pub struct Distilled {
     /// In the world frame of the scene's cameras.
     pub wireframe: Wireframe3d,
+    /// Arcs of circles beside its edges, likewise.
+    pub arcs: Vec<CircularArc>,
     /// How sure every junction and edge is, and by which 2D segments.
     pub confidence: Confidence,
     /// What each edge is: of the shape of things, or on it.
@@ -154,6 +156,9 @@ impl Distilled {
         let original = (self.wireframe).map(|point| original_from_world.apply(point));
         let mut document = WireframeDocument::from(&original);
         let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
+        document.arcs = (self.arcs.iter())
+            .map(|arc| arc.map(|point| original_from_world.apply(point)))
+            .collect();
         self.confidence
             .fill(&mut document, &names, original_from_world);
         fill_kinds(&mut document, &self.kinds, &junction_types(&self.wireframe));
@@ -186,11 +191,11 @@ pub fn distill(
     let scene_radius = config.data.scene_radius.unwrap_or(scene.sphere_radius);
     let back_end = plan.back_end();
     let mut refined_scene = None;
-    let (wireframe, report, surface) = match back_end {
+    let (wireframe, arcs, report, surface) = match back_end {
         BackEnd::Paper => {
             let field = field.ok_or(DistillError::NoField(back_end))?;
             let (wireframe, report) = paper(scene, field, config, &views, progress)?;
-            (wireframe, report, Some(field.surface_grid()))
+            (wireframe, Vec::new(), report, Some(field.surface_grid()))
         }
         // A learned surface is too coarse to hide edges behind.
         BackEnd::Assembler => {
@@ -200,9 +205,15 @@ pub fn distill(
             };
             let built = assembled(scene, asked, config, &views, scene_radius, progress)?;
             let steps = built.report;
+            let arcs = built.arcs;
             refined_scene =
                 (built.refined_cameras).map(|cameras| scene.clone().with_cameras(&cameras));
-            (built.wireframe, BackEndReport::Assembler { steps }, None)
+            (
+                built.wireframe,
+                arcs,
+                BackEndReport::Assembler { steps },
+                None,
+            )
         }
     };
     // The rest asks the images from where they show the wireframe.
@@ -216,6 +227,7 @@ pub fn distill(
     let kinds = edge_kinds(&wireframe, scene, &shown)?;
     Ok(Distilled {
         wireframe,
+        arcs,
         confidence,
         kinds,
         report,

@@ -8,7 +8,11 @@ pub use picture::draw_wireframe;
 use image::{Rgb, RgbImage};
 use line_drawing::{Pen, draw_disc, draw_segment};
 use nalgebra::Vector2;
-use neat_core::{Camera, LineSegment2, LineSegment3, SceneError, View, Wireframe2d, Wireframe3d};
+use neat_core::{
+    Camera, CircularArc, LineSegment2, LineSegment3, SceneError, View, Wireframe2d, Wireframe3d,
+};
+
+use neat_wireframe::export::WireframeDocument;
 
 /// Line width relative to the larger side of the image.
 const WIDTH_PER_SIZE: f64 = 1.0 / 400.0;
@@ -26,14 +30,14 @@ const JUNCTION_COLOR: [f64; 3] = [32.0, 200.0, 255.0];
 pub fn draw_overlay(
     view: &View,
     pixel_center: f64,
-    wireframe: &Wireframe3d,
+    (wireframe, arcs): (&Wireframe3d, &[CircularArc]),
 ) -> Result<RgbImage, SceneError> {
     let photograph = view.image.read()?.into_owned();
     Ok(draw_projected(
         photograph,
         &view.camera,
         pixel_center,
-        wireframe,
+        (wireframe, arcs),
     ))
 }
 
@@ -43,7 +47,7 @@ pub fn draw_sketch(
     view: &View,
     pixel_center: f64,
     min_segment_score: f64,
-    wireframe: &Wireframe3d,
+    drawn: (&Wireframe3d, &[CircularArc]),
 ) -> RgbImage {
     let (width, height) = view.image.dimensions();
     let size = f64::from(width.max(height));
@@ -56,14 +60,23 @@ pub fn draw_sketch(
         let segment = (scored.segment).map(|end| end.add_scalar(-pixel_center));
         draw_segment(&mut image, &segment, &[detected; 2]);
     }
-    draw_projected(image, &view.camera, pixel_center, wireframe)
+    draw_projected(image, &view.camera, pixel_center, drawn)
+}
+
+/// All edges, and chords of all arcs.
+fn segments_of(wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Vec<LineSegment3> {
+    let mut segments = wireframe.segments();
+    for arc in arcs {
+        segments.extend(arc.chords(WireframeDocument::TURN_OF_DRAWN_ARCS));
+    }
+    segments
 }
 
 fn draw_projected(
     mut image: RgbImage,
     camera: &Camera,
     pixel_center: f64,
-    wireframe: &Wireframe3d,
+    (wireframe, arcs): (&Wireframe3d, &[CircularArc]),
 ) -> RgbImage {
     let size = f64::from(image.width().max(image.height()));
     let radius = (size * WIDTH_PER_SIZE / 2.0 * thinness(wireframe)).max(0.75);
@@ -75,7 +88,7 @@ fn draw_projected(
         color: JUNCTION_COLOR,
         radius: 2.0 * radius,
     };
-    for segment in wireframe.segments() {
+    for segment in segments_of(wireframe, arcs) {
         if let Some(segment) = visible_part(&segment, camera, pixel_center) {
             draw_segment(&mut image, &segment, &[line; 2]);
         }
@@ -176,7 +189,7 @@ mod tests {
     fn lines_lie_on_the_projected_edges() {
         let data = scene();
         let view = &data.scene.views[3];
-        let image = draw_overlay(view, data.scene.pixel_center, &data.truth).unwrap();
+        let image = draw_overlay(view, data.scene.pixel_center, (&data.truth, &[])).unwrap();
         for segment in data.truth.segments() {
             let middle = view.camera.project(&segment.point_at(0.5)).pixel;
             // The index of the pixel that holds a point: its centre is at +0.5.
@@ -198,7 +211,7 @@ mod tests {
                 &data.scene.views[3],
                 data.scene.pixel_center,
                 0.05,
-                &data.truth,
+                (&data.truth, &[]),
             )
         };
         let before = sketch(&data);

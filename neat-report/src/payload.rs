@@ -4,7 +4,7 @@ use crate::{Curve, JunctionSnapshot, Report, ReportView};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
-use neat_wireframe::export::{EdgeFields, JunctionFields};
+use neat_wireframe::export::{EdgeFields, JunctionFields, WireframeDocument};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -15,6 +15,8 @@ pub(crate) struct Payload<'a> {
     title: &'a str,
     junctions: &'a [Vector3<f64>],
     edges: &'a [[usize; 2]],
+    /// Points along each arc.
+    arcs: Vec<Vec<Vector3<f64>>>,
     junction_fields: &'a JunctionFields,
     edge_fields: &'a EdgeFields,
     /// Largest standard deviation of each junction, where it is known.
@@ -81,6 +83,9 @@ impl<'a> Payload<'a> {
             title: &report.title,
             junctions: &document.junctions,
             edges: &document.edges,
+            arcs: (document.arcs.iter())
+                .map(|arc| arc.points(WireframeDocument::TURN_OF_DRAWN_ARCS))
+                .collect(),
             junction_fields: &document.junction_fields,
             edge_fields: &document.edge_fields,
             sigmas: sigmas(report),

@@ -72,8 +72,28 @@ fn main() -> Result<()> {
             "{name:18} {text} {} edges{of_edges} {seconds:.1} s",
             wireframe.edges.len()
         );
+        eprintln!("   {name} {:?}", built.report);
         scores.extend(score);
         if let Some(kept) = &kept {
+            let arcs: Vec<String> = built
+                .arcs
+                .iter()
+                .map(|a| {
+                    let a = a.map(original);
+                    let p: Vec<String> = a
+                        .points(0.02)
+                        .iter()
+                        .map(|p| format!("[{},{},{}]", p.x, p.y, p.z))
+                        .collect();
+                    format!(
+                        "{{\"radius\":{},\"sweep\":{},\"points\":[{}]}}",
+                        a.radius,
+                        a.sweep(),
+                        p.join(",")
+                    )
+                })
+                .collect();
+            fs::write(kept.join("arcs.json"), format!("[{}]", arcs.join(",")))?;
             write_json(
                 &kept.join("wireframe.json"),
                 &WireframeDocument::from(&wireframe),

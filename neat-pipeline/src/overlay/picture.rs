@@ -1,10 +1,12 @@
 //! The wireframe alone, on white, from a viewpoint that shows its shape.
 
 use super::line_drawing::{Pen, draw_disc, draw_segment};
-use super::{thinness, visible_part};
+use super::{segments_of, thinness, visible_part};
 use image::{Rgb, RgbImage};
 use nalgebra::{Matrix3, Vector3};
-use neat_core::{Camera, Intrinsics, Scene, Wireframe3d};
+use neat_core::{Camera, CircularArc, Intrinsics, Scene, Wireframe3d};
+
+use neat_wireframe::export::WireframeDocument;
 
 /// Width and height of the picture.
 const SIZE: u32 = 1200;
@@ -31,9 +33,9 @@ const JUNCTION: Pen = Pen {
 ///
 /// The viewing direction is that of the scene's camera from which the edges
 /// appear least foreshortened.
-pub fn draw_wireframe(wireframe: &Wireframe3d, scene: &Scene) -> RgbImage {
+pub fn draw_wireframe(wireframe: &Wireframe3d, arcs: &[CircularArc], scene: &Scene) -> RgbImage {
     let mut picture = RgbImage::from_pixel(SIZE, SIZE, Rgb([255; 3]));
-    let Some((center, radius)) = bounding_ball(wireframe) else {
+    let Some((center, radius)) = bounding_ball(wireframe, arcs) else {
         return picture;
     };
     let orientations = scene.views.iter().map(|view| view.camera.world_from_camera);
@@ -48,7 +50,7 @@ pub fn draw_wireframe(wireframe: &Wireframe3d, scene: &Scene) -> RgbImage {
         let nearness = (DISTANCE + 1.0 - depth(point) / radius) / 2.0;
         FAR.mix(&NEAR, nearness.clamp(0.0, 1.0)).scaled(thinness)
     };
-    let mut segments = wireframe.segments();
+    let mut segments = segments_of(wireframe, arcs);
     // Near lines go over far ones.
     segments.sort_by(|a, b| depth(&b.point_at(0.5)).total_cmp(&depth(&a.point_at(0.5))));
     for segment in &segments {
@@ -64,16 +66,16 @@ pub fn draw_wireframe(wireframe: &Wireframe3d, scene: &Scene) -> RgbImage {
 }
 
 /// Centre and radius of a ball around all junctions; `None` without any.
-fn bounding_ball(wireframe: &Wireframe3d) -> Option<(Vector3<f64>, f64)> {
-    let first = wireframe.junctions.first()?;
-    let (low, high) = wireframe
-        .junctions
-        .iter()
-        .fold((*first, *first), |(low, high), p| (low.inf(p), high.sup(p)));
+fn bounding_ball(wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Option<(Vector3<f64>, f64)> {
+    let mut points = wireframe.junctions.clone();
+    for arc in arcs {
+        points.extend(arc.points(WireframeDocument::TURN_OF_DRAWN_ARCS));
+    }
+    let first = points.first()?;
+    let (low, high) =
+        (points.iter()).fold((*first, *first), |(low, high), p| (low.inf(p), high.sup(p)));
     let center = (low + high) / 2.0;
-    let radius = wireframe
-        .junctions
-        .iter()
+    let radius = (points.iter())
         .map(|p| (p - center).norm())
         .fold(0.0, f64::max);
     // One junction alone has no extent.
@@ -129,7 +131,7 @@ mod tests {
             ..SyntheticScene::default()
         };
         let data = generate(&config).unwrap();
-        let picture = draw_wireframe(&data.truth, &data.scene);
+        let picture = draw_wireframe(&data.truth, &[], &data.scene);
         let inked = |x: u32, y: u32| picture.get_pixel(x, y).0 != [255; 3];
         let columns: Vec<u32> = (0..SIZE)
             .filter(|x| (0..SIZE).any(|y| inked(*x, y)))
@@ -149,13 +151,13 @@ mod tests {
             sphere_radius: 1.0,
             sparse_points: Vec::new(),
         };
-        let picture = draw_wireframe(&Wireframe3d::default(), &scene);
+        let picture = draw_wireframe(&Wireframe3d::default(), &[], &scene);
         assert!(picture.pixels().all(|pixel| pixel.0 == [255; 3]));
         let lonely = Wireframe3d {
             junctions: vec![Vector3::new(1.0, 2.0, 3.0)],
             edges: Vec::new(),
         };
-        let picture = draw_wireframe(&lonely, &scene);
+        let picture = draw_wireframe(&lonely, &[], &scene);
         let color = picture.get_pixel(SIZE / 2, SIZE / 2).0.map(f64::from);
         assert_eq!(color, JUNCTION.color);
     }

@@ -121,6 +121,7 @@ impl Session<'_> {
         agreement: Option<ImageEvidence>,
     ) -> Result<(Wireframe3d, WireframeDocument), PipelineError> {
         let in_world = &distilled.wireframe;
+        let arcs = &distilled.arcs;
         let document = WireframeDocument {
             metadata: self.metadata(distilled, agreement),
             ..distilled.document(&self.scene)
@@ -131,7 +132,7 @@ impl Session<'_> {
         write_json(&json, &document)?;
         write_obj(&obj, &original)?;
         write_ply(&ply, &original)?;
-        write_png(&png, &draw_wireframe(in_world, &self.scene))?;
+        write_png(&png, &draw_wireframe(in_world, arcs, &self.scene))?;
         let mut written = vec![json, obj, ply, png];
 
         let scene = distilled.refined_scene.as_ref().unwrap_or(&self.scene);
@@ -146,10 +147,10 @@ impl Session<'_> {
         let draw = |(view, path): &(&View, PathBuf)| {
             let pixel_center = self.scene.pixel_center;
             let picture = match self.plan.config().distill.overlay {
-                OverlayGround::Photo => draw_overlay(view, pixel_center, in_world)?,
+                OverlayGround::Photo => draw_overlay(view, pixel_center, (in_world, arcs))?,
                 OverlayGround::Segments => {
                     let min_score = self.plan.config().data.min_segment_score;
-                    draw_sketch(view, pixel_center, min_score, in_world)
+                    draw_sketch(view, pixel_center, min_score, (in_world, arcs))
                 }
             };
             write_png(path, &picture)

@@ -9,6 +9,7 @@ function readData() {
   const toModel = (p) => scale(subtract(p, data.frame.center), 1 / data.frame.radius);
   data.toModel = toModel;
   data.points = data.junctions.map(toModel);
+  data.arcs = data.arcs.map((points) => points.map(toModel));
   data.degrees = data.junctions.map(() => 0);
   for (const ends of data.edges) for (const end of ends) data.degrees[end]++;
   data.lengths = data.edges.map(([a, b]) => norm(subtract(data.junctions[a], data.junctions[b])));

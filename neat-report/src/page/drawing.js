@@ -75,6 +75,13 @@ function drawScene(viewer) {
     edges.line(data.points[a], data.points[b], shown, pen.edgeWidth);
     if (pen.onPhotograph) rims.line(data.points[a], data.points[b], RIM, pen.edgeWidth + 1.4);
   });
+  for (const points of data.arcs) {
+    const shown = snapshot ? mixPoints(pen.ink, pen.colors.stage, 0.72) : pen.ink;
+    points.slice(1).forEach((end, index) => {
+      edges.line(points[index], end, shown, 0.7 * pen.edgeWidth);
+      if (pen.onPhotograph) rims.line(points[index], end, RIM, 0.7 * pen.edgeWidth + 1.4);
+    });
+  }
   if (snapshot) {
     for (const point of snapshot.points) dots.dot(point, pen.colors.evolution, 6.5 * pen.thin);
   } else if (state.showJunctions) {

@@ -6,14 +6,14 @@
 //! Sides of a polygon have neighbours like that, but are straight: the arc must explain the
 //! edgels beside the line itself better, too.
 
-use super::edge_samples::{Images, across, project_segment};
+use super::edge_samples::{Images, Sample, across, project_segment};
 use super::line_evidence::LineEvidence;
 use super::line_fitting::{change_by_edgels, directions_across};
 use super::projected_line::ProjectedLine;
 use super::straightness::Bow;
 use crate::projection::project_in_front;
 use nalgebra::{Matrix3x2, SVector, Vector2, Vector3};
-use neat_core::LineSegment3;
+use neat_core::{CircularArc, LineSegment3};
 use rayon::prelude::*;
 
 /// From where to where an arc is followed, where its chord reaches from -1 to 1: on both sides,
@@ -70,6 +70,15 @@ impl Arc {
         }
     }
 
+    /// The arc that rises so high over its line, and meets its ends.
+    fn bent(&self, height: Vector2<f64>) -> Self {
+        Self {
+            shift: height,
+            bend: -4.0 * height / self.line.length(),
+            ..*self
+        }
+    }
+
     /// How far the circle has risen, for each bend, by half the line's length.
     fn rise(&self, place: f64) -> f64 {
         let turned = self.bend.norm_squared() * place * place;
@@ -82,16 +91,13 @@ impl Arc {
         self.line.point_at(0.5 * (place + 1.0)) + self.across * offset
     }
 
+    fn circular(&self) -> Option<CircularArc> {
+        CircularArc::through([-1.0, 0.0, 1.0].map(|place| self.at(place)))
+    }
+
     fn tangent(&self, place: f64) -> LineSegment3 {
         LineSegment3::new(self.at(place - TANGENT), self.at(place + TANGENT))
     }
-}
-
-/// A place along an arc in a view.
-struct Sample {
-    place: f64,
-    pixel: Vector2<f64>,
-    normal: Vector2<f64>,
 }
 
 /// What edgels say against an arc, in nats, and which of its samples have one.
@@ -110,39 +116,46 @@ struct Gain {
 }
 
 impl Images<'_> {
-    /// Whether a line is a chord of an arc that goes on beyond its ends. `bow` is what edgels
-    /// beside the line show, `noise` the standard deviation of an edgel, in pixels.
-    pub(super) fn is_chord(
+    /// The arc of which a line is a chord, as far as the chord reaches, where it goes on beyond
+    /// the chord's ends. `bow` is what edgels beside the line show, `noise` the standard
+    /// deviation of an edgel, in pixels.
+    pub(super) fn arc_of_chord(
         &self,
         line: &LineSegment3,
         evidence: &LineEvidence,
         bow: Option<&Bow>,
         noise: f64,
-    ) -> bool {
-        let Some((across, bow)) = directions_across(line).zip(bow) else {
-            return false;
-        };
+    ) -> Option<CircularArc> {
+        let bow = bow?;
         // Most lines end here.
         if bow.height.norm() < bow.error {
-            return false;
+            return None;
         }
+        let straight = Arc::straight(line, directions_across(line)?);
         let pixel = self.pixel_size(line, evidence.views());
-        let straight = Arc::straight(line, across);
         let starts: Vec<(Arc, [f64; 2])> = (HEIGHTS.iter())
             .flat_map(|factor| {
-                let height = factor * pixel * bow.height;
-                let start = Arc {
-                    shift: height,
-                    bend: -4.0 * height / line.length(),
-                    ..straight
-                };
+                let start = straight.bent(factor * pixel * bow.height);
                 RANGES.map(|range| (start, range))
             })
             .collect();
-        starts.par_iter().any(|(start, range)| {
+        let found = starts.par_iter().find_map_first(|(start, range)| {
             self.fit_arc(start, evidence, *range, pixel)
-                .is_some_and(|arc| self.goes_on(&arc, &straight, evidence, *range, noise))
-        })
+                .filter(|arc| self.goes_on(arc, &straight, evidence, *range, noise))
+        });
+        found?.circular()
+    }
+
+    /// The arc over a line whose `bow` is that of a curve.
+    pub(super) fn arc_of_bow(
+        &self,
+        line: &LineSegment3,
+        evidence: &LineEvidence,
+        bow: &Bow,
+    ) -> Option<CircularArc> {
+        let pixel = self.pixel_size(line, evidence.views());
+        let straight = Arc::straight(line, directions_across(line)?);
+        straight.bent(pixel * bow.height).circular()
     }
 
     /// Whether an arc explains edgels better than the line, beside it and beyond it.
@@ -237,7 +250,7 @@ impl Images<'_> {
     ) -> Vec<(SVector<f64, 6>, f64)> {
         let camera = &self.views[view].camera;
         let row = |sample: &Sample| {
-            let edgel = self.edgel(view, &sample.pixel, &sample.normal, reach)?;
+            let edgel = self.edgel(view, sample, reach)?;
             let position = self.maps[view].get(edgel).position.cast();
             let tangent = ProjectedLine::new(camera, &arc.tangent(sample.place))?;
             let found = tangent.distance_with_gradient(camera, &position);
@@ -255,11 +268,15 @@ impl Images<'_> {
     /// counts as one at the reach.
     fn cost(&self, arc: &Arc, view: usize, range: [f64; 2], noise: f64) -> Cost {
         let mut cost = Cost::default();
-        for Sample { pixel, normal, .. } in self.samples_of_arc(arc, view, range) {
-            let edgel = self.edgel(view, &pixel, &normal, self.reach);
+        for sample in self.samples_of_arc(arc, view, range) {
+            let edgel = self.edgel(view, &sample, self.reach);
             let distance = edgel.map_or(self.reach, |edgel| {
                 let position: Vector2<f64> = self.maps[view].get(edgel).position.cast();
-                normal.dot(&(position - pixel)).abs().min(self.reach)
+                sample
+                    .normal
+                    .dot(&(position - sample.pixel))
+                    .abs()
+                    .min(self.reach)
             });
             cost.nats += 0.5 * (distance / noise).powi(2);
             cost.samples += 1;
@@ -300,7 +317,9 @@ mod tests {
         let evidence = images.evidence(line, None, 0.0);
         assert!(evidence.showing.len() > 10, "{}", evidence.showing.len());
         let bow = images.bend(line, &evidence).bow;
-        images.is_chord(line, &evidence, bow.as_ref(), NOISE)
+        images
+            .arc_of_chord(line, &evidence, bow.as_ref(), NOISE)
+            .is_some()
     }
 
     #[test]

@@ -39,10 +39,11 @@ pub(super) struct Images<'a> {
     pub rounding: f64,
 }
 
-/// Places along the projection of a 3D line.
-pub(super) struct EdgeSamples {
-    /// Parameter along the line, and pixel.
-    pub points: Vec<(f64, Vector2<f64>)>,
+/// A place along the projection of a line or a curve in a view.
+pub(super) struct Sample {
+    /// Its parameter.
+    pub place: f64,
+    pub pixel: Vector2<f64>,
     /// Across the projection.
     pub normal: Vector2<f64>,
 }
@@ -74,21 +75,24 @@ impl Images<'_> {
         line: &LineSegment3,
         [low, high]: [f64; 2],
         count: Option<usize>,
-    ) -> Option<EdgeSamples> {
+    ) -> Option<Vec<Sample>> {
         let camera = &self.views[view].camera;
         let part = LineSegment3::new(line.point_at(low), line.point_at(high));
         let least = MIN_PROJECTED_LENGTH - 2.0 * self.rounding;
         let (length, normal) = across_of(&project_segment(&self.views[view], &part)?, least)?;
         let count =
             count.unwrap_or_else(|| ((length / SPACING) as usize).clamp(COUNTS[0], COUNTS[1]));
-        let mut points = Vec::with_capacity(count);
-        points.extend((0..count).filter_map(|i| {
+        let mut samples = Vec::with_capacity(count);
+        samples.extend((0..count).filter_map(|i| {
             let place = low + (high - low) * ((i as f64 + 0.5) / count as f64);
             let pixel = project_in_front(camera, &line.point_at(place))?;
-            self.is_inside(view, &pixel).then_some((place, pixel))
+            self.is_inside(view, &pixel).then_some(Sample {
+                place,
+                pixel,
+                normal,
+            })
         }));
-        let enough = points.len() >= COUNTS[0] && points.len() as f64 >= MIN_INSIDE * count as f64;
-        enough.then_some(EdgeSamples { points, normal })
+        are_enough(&samples, count).then_some(samples)
     }
 
     /// Whether a pixel is far enough from the image's border.
@@ -100,28 +104,22 @@ impl Images<'_> {
             && pixel.y < f64::from(camera.height) - BORDER
     }
 
-    /// The index of the nearest edgel within `reach` pixels across a line at `pixel`.
-    pub(super) fn edgel(
-        &self,
-        view: usize,
-        pixel: &Vector2<f64>,
-        normal: &Vector2<f64>,
-        reach: f64,
-    ) -> Option<usize> {
+    /// The index of the nearest edgel within `reach` pixels beside a sample.
+    pub(super) fn edgel(&self, view: usize, sample: &Sample, reach: f64) -> Option<usize> {
+        let Sample { pixel, normal, .. } = sample;
         self.maps[view]
             .nearest(pixel, normal, reach, MIN_COSINE, |_| true)
             .map(|(_, index)| index)
     }
 
-    /// Whether an edgel lies beside a line at `pixel`; those that are `taken` by another line
-    /// do not count.
+    /// Whether an edgel lies beside a sample; those that are `taken` by another line do not count.
     pub(super) fn has_edgel(
         &self,
         view: usize,
-        pixel: &Vector2<f64>,
-        normal: &Vector2<f64>,
+        sample: &Sample,
         taken: Option<&[Vec<bool>]>,
     ) -> bool {
+        let Sample { pixel, normal, .. } = sample;
         let mut found = false;
         self.maps[view].visit(pixel, normal, self.reach, MIN_COSINE, |_, index| {
             found = taken.is_none_or(|taken| !taken[view][index]);
@@ -139,7 +137,7 @@ impl Images<'_> {
     pub(super) fn shares<const N: usize>(
         &self,
         view: usize,
-        samples: &EdgeSamples,
+        samples: &[Sample],
         shifts: &[f64; N],
     ) -> [f64; N] {
         let farthest = shifts
@@ -147,9 +145,9 @@ impl Images<'_> {
             .fold(0.0, |far: f64, shift| far.max(shift.abs()));
         let reach = farthest + self.reach;
         let mut hits = [0; N];
-        for (_, pixel) in &samples.points {
+        for Sample { pixel, normal, .. } in samples {
             let mut found = [false; N];
-            self.maps[view].visit(pixel, &samples.normal, reach, MIN_COSINE, |across, _| {
+            self.maps[view].visit(pixel, normal, reach, MIN_COSINE, |across, _| {
                 for (found, shift) in found.iter_mut().zip(shifts) {
                     *found |= (across - shift).abs() <= self.reach;
                 }
@@ -159,7 +157,7 @@ impl Images<'_> {
                 *hits += u32::from(found);
             }
         }
-        hits.map(|hits| f64::from(hits) / samples.points.len() as f64)
+        hits.map(|hits| f64::from(hits) / samples.len() as f64)
     }
 
     /// Positions of the edgels within `reach` pixels beside a line in a view, in order.
@@ -172,8 +170,8 @@ impl Images<'_> {
         let Some(samples) = self.samples(view, line, [0.0, 1.0], None) else {
             return Vec::new();
         };
-        (samples.points.iter())
-            .filter_map(|(_, pixel)| self.edgel(view, pixel, &samples.normal, reach))
+        (samples.iter())
+            .filter_map(|sample| self.edgel(view, sample, reach))
             .map(|index| self.maps[view].get(index).position.cast())
             .collect()
     }
@@ -199,6 +197,11 @@ impl Images<'_> {
         let lengths = lengths.map(|segment| segment.length());
         upper_median(&mut lengths.collect::<Vec<f64>>())
     }
+}
+
+/// Whether a view holds enough of `count` samples to say anything.
+pub(super) fn are_enough(samples: &[Sample], count: usize) -> bool {
+    samples.len() >= COUNTS[0] && samples.len() as f64 >= MIN_INSIDE * count as f64
 }
 
 /// The projection of a 3D segment, `None` unless it lies in front of the camera.

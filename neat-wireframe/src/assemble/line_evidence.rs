@@ -7,7 +7,7 @@
 //! wherever they want, since any two planes meet in one: the two that say most do not
 //! count. What is another line in each view is weighed in the same way.
 
-use super::edge_samples::{EdgeSamples, Images, project_segment};
+use super::edge_samples::{Images, Sample, project_segment};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -103,7 +103,7 @@ fn most_of_view(state: State) -> f64 {
 struct ViewOfLine {
     view: usize,
     state: State,
-    samples: EdgeSamples,
+    samples: Vec<Sample>,
     /// The most that it can say, and what it says if it does not show the line.
     most: f64,
 }
@@ -137,7 +137,20 @@ impl Images<'_> {
         least: f64,
         free: usize,
     ) -> LineEvidence {
-        let views = self.views_of(line, in_view, taken);
+        let samples = |view| self.samples_asked(view, &in_view(view)?);
+        self.evidence_of_samples(&line.point_at(0.5), samples, taken, least, free)
+    }
+
+    /// [`Self::evidence_of`] what is near `middle` and has the samples `in_view` in each view.
+    pub(super) fn evidence_of_samples(
+        &self,
+        middle: &Vector3<f64>,
+        in_view: impl Fn(usize) -> Option<Vec<Sample>> + Sync,
+        taken: Option<&[Vec<bool>]>,
+        least: f64,
+        free: usize,
+    ) -> LineEvidence {
+        let views = self.views_of(middle, in_view, taken);
         let mut evidence = LineEvidence {
             gain: f64::NEG_INFINITY,
             showing: Vec::new(),
@@ -170,14 +183,25 @@ impl Images<'_> {
 
     /// What the evidence of a line cannot exceed, for a part of its price.
     pub(super) fn most_evidence(&self, line: &LineSegment3) -> f64 {
-        most_of_views(&self.views_of(line, |_| Some(*line), None), FREE_VIEWS)
+        let samples = |view| self.samples_asked(view, line);
+        most_of_views(
+            &self.views_of(&line.point_at(0.5), samples, None),
+            FREE_VIEWS,
+        )
     }
 
-    /// What each view does with a line.
+    /// The samples of a line, without its ends.
+    fn samples_asked(&self, view: usize, line: &LineSegment3) -> Option<Vec<Sample>> {
+        let length = project_segment(&self.views[view], line)?.length();
+        let end = ENDS.max(self.rounding / length).min(0.5);
+        self.samples(view, line, [end, 1.0 - end], None)
+    }
+
+    /// What each view does with what has the samples `in_view`.
     fn views_of(
         &self,
-        line: &LineSegment3,
-        in_view: impl Fn(usize) -> Option<LineSegment3> + Sync,
+        middle: &Vector3<f64>,
+        in_view: impl Fn(usize) -> Option<Vec<Sample>> + Sync,
         taken: Option<&[Vec<bool>]>,
     ) -> Vec<ViewOfLine> {
         let mut views: Vec<ViewOfLine> = (0..self.views.len())
@@ -185,10 +209,7 @@ impl Images<'_> {
             .with_min_len(MIN_VIEWS_OF_TASK)
             .filter(|view| !self.maps[*view].is_empty())
             .filter_map(|view| {
-                let line = in_view(view)?;
-                let length = project_segment(&self.views[view], &line)?.length();
-                let end = ENDS.max(self.rounding / length).min(0.5);
-                let samples = self.samples(view, &line, [end, 1.0 - end], None)?;
+                let samples = in_view(view)?;
                 let state = self.state(view, &samples, taken);
                 Some(ViewOfLine {
                     view,
@@ -198,7 +219,6 @@ impl Images<'_> {
                 })
             })
             .collect();
-        let middle = line.point_at(0.5);
         let toward = |view: usize| -> Vector3<f64> {
             (self.views[view].camera.center_in_world - middle).normalize()
         };
@@ -223,12 +243,12 @@ impl Images<'_> {
     }
 
     /// What a view does with a line; its samples are asked until that is sure.
-    fn state(&self, view: usize, samples: &EdgeSamples, taken: Option<&[Vec<bool>]>) -> State {
-        let count = samples.points.len();
+    fn state(&self, view: usize, samples: &[Sample], taken: Option<&[Vec<bool>]>) -> State {
+        let count = samples.len();
         let of = |hits: usize| State::of(hits as f64 / count as f64);
         let mut hits = 0;
-        for (k, (_, pixel)) in samples.points.iter().enumerate() {
-            hits += usize::from(self.has_edgel(view, pixel, &samples.normal, taken));
+        for (k, sample) in samples.iter().enumerate() {
+            hits += usize::from(self.has_edgel(view, sample, taken));
             let left = count - k - 1;
             if of(hits) == of(hits + left) {
                 break;

@@ -1,6 +1,6 @@
 //! From where to where along a 3D line the images show an edge.
 
-use super::edge_samples::{Images, across, project_segment};
+use super::edge_samples::{Images, Sample, across, project_segment};
 use super::line_evidence::Showing;
 use crate::projection::project_in_front;
 use neat_core::LineSegment3;
@@ -35,13 +35,17 @@ impl Images<'_> {
             else {
                 continue;
             };
-            let hit = (HIT / chance).ln().max(LEAST_HIT);
             for (k, gain) in gains.iter_mut().enumerate() {
                 let point = line.point_at(place(k as f64 + 0.5));
                 let pixel = project_in_front(&prepared.camera, &point);
                 if let Some(pixel) = pixel.filter(|pixel| self.is_inside(*view, pixel)) {
-                    let edgel = self.edgel(*view, &pixel, &normal, self.reach);
-                    *gain += if edgel.is_some() { hit } else { MISS };
+                    let sample = Sample {
+                        place: 0.0,
+                        pixel,
+                        normal,
+                    };
+                    let edgel = self.edgel(*view, &sample, self.reach);
+                    *gain += gain_of_sample(edgel.is_some(), *chance);
                 }
             }
         }
@@ -55,8 +59,17 @@ impl Images<'_> {
     }
 }
 
+/// What a view says about a place by whether an edgel is there, which is so by `chance`, too.
+pub(super) fn gain_of_sample(is_there: bool, chance: f64) -> f64 {
+    if is_there {
+        (HIT / chance).ln().max(LEAST_HIT)
+    } else {
+        MISS
+    }
+}
+
 /// The stretch with the largest sum (Bentley, *Programming Pearls*, 1984).
-fn best_stretch(gains: &[f64]) -> [usize; 2] {
+pub(super) fn best_stretch(gains: &[f64]) -> [usize; 2] {
     let (mut best, mut best_range) = (0.0, [0, 0]);
     let (mut sum, mut start) = (0.0, 0);
     for (k, gain) in gains.iter().enumerate() {

@@ -3,7 +3,7 @@
 
 use super::candidate_queue::CandidateQueue;
 use super::config::AssembleConfig;
-use super::edge_samples::{Images, project_segment};
+use super::edge_samples::{Images, Sample, project_segment};
 use super::hypothesis_scoring::Alternatives;
 use super::line_evidence::LineEvidence;
 use super::outlines::Tube;
@@ -11,7 +11,7 @@ use super::progress::OnProgress;
 use super::projected_line::ProjectedLine;
 use super::view_segments::SegmentId;
 use crate::statistics::{SIGMA_BY_MEDIAN, upper_median};
-use neat_core::{LineSegment2, LineSegment3};
+use neat_core::{CircularArc, LineSegment2, LineSegment3};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
@@ -43,7 +43,7 @@ const MIN_SHOWING: usize = 3;
 /// An evidence that others have lowered by more goes back into the queue, in nats.
 const STALE: f64 = 0.5;
 /// A line has the edgels beside it whose normals have this cosine to its own …
-const CLAIM_COSINE: f64 = 0.8;
+pub(super) const CLAIM_COSINE: f64 = 0.8;
 /// … at so many samples for each of its pixels.
 const CLAIM_DENSITY: f64 = 2.0;
 /// 2D segments whose ends lie within so many reaches of a line are its own: they propose
@@ -57,6 +57,15 @@ pub(super) struct ChosenLine {
     pub evidence: LineEvidence,
 }
 
+/// A line that stands for an arc.
+#[derive(Clone, Debug)]
+pub(super) struct Chord {
+    /// As far as the line reaches.
+    pub arc: CircularArc,
+    /// The views that show the line.
+    pub views: Vec<usize>,
+}
+
 /// Lines, and how they came about.
 pub(super) struct Selection<'a> {
     /// The images with the reach that their noise asks for.
@@ -65,6 +74,8 @@ pub(super) struct Selection<'a> {
     pub lines: Vec<ChosenLine>,
     /// Lines that the images show and that stand for curves.
     pub curved: usize,
+    /// Those of them that are arcs.
+    pub chords: Vec<Chord>,
     /// Those that are outlines of round things.
     pub outlines: usize,
     /// For each edgel of each view, whether a line has it.
@@ -86,7 +97,8 @@ pub(super) fn sure_lines(
 ) -> ControlFlow<(), Vec<ChosenLine>> {
     let some = candidates(&images, alternatives, SEGMENTS_FOR_SURE_LINES);
     let (least, most) = (config.min_evidence, SURE_LINES);
-    let sure = choose(images, &some, least, most, LEAST_NOISE, progress)?;
+    let taken = images.nothing_taken();
+    let sure = choose(images, &some, (least, most), LEAST_NOISE, taken, progress)?;
     ControlFlow::Continue(sure.lines)
 }
 
@@ -105,7 +117,24 @@ pub(super) fn select_lines<'a>(
     let all = candidates(&images, alternatives, 1);
     tracing::debug!(noise, candidates = all.len(), "lines are proposed");
     let (least, most) = (config.min_evidence, usize::MAX);
-    choose(images, &all, least, most, noise, progress)
+    let taken = images.nothing_taken();
+    choose(images, &all, (least, most), noise, taken, progress)
+}
+
+/// The chords among the lines that the images show, of all positions of pieces of curves, by the
+/// edgels that no line of a selection has. The views of `images` hold the pieces.
+pub(super) fn select_chords(
+    images: Images,
+    alternatives: &Alternatives,
+    selection: &Selection,
+    config: &AssembleConfig,
+    progress: OnProgress<'_>,
+) -> ControlFlow<(), Vec<Chord>> {
+    let all = candidates(&images, alternatives, 1);
+    let bounds = (config.min_evidence, usize::MAX);
+    let taken = selection.taken.clone();
+    let found = choose(images, &all, bounds, selection.noise, taken, progress)?;
+    ControlFlow::Continue(found.chords)
 }
 
 /// The candidates of one of `step` segments of each view.
@@ -150,17 +179,19 @@ fn noise_of_edgels(images: &Images, lines: &[ChosenLine]) -> f64 {
 /// What a line that the images show stands for.
 enum Kind {
     Straight,
-    Curve,
+    /// The arc through it, if it is one.
+    Curve(Option<CircularArc>),
     Outline(Tube),
 }
 
 fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
     let ChosenLine { line, evidence } = found;
     let bend = images.bend(line, evidence);
-    if images.is_curved(line, &bend, noise)
-        || images.is_chord(line, evidence, bend.bow.as_ref(), noise)
-    {
-        Kind::Curve
+    let bow = bend.bow.as_ref();
+    if images.is_curved(line, &bend, noise) {
+        Kind::Curve(bow.and_then(|bow| images.arc_of_bow(line, evidence, bow)))
+    } else if let Some(arc) = images.arc_of_chord(line, evidence, bow, noise) {
+        Kind::Curve(Some(arc))
     } else {
         images
             .tube(line, evidence)
@@ -171,9 +202,9 @@ fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
 fn choose<'a>(
     images: Images<'a>,
     candidates: &[Candidate],
-    min_evidence: f64,
-    most: usize,
+    (min_evidence, most): (f64, usize),
     noise: f64,
+    taken: Vec<Vec<bool>>,
     progress: OnProgress<'_>,
 ) -> ControlFlow<(), Selection<'a>> {
     let bounds: Vec<f64> = (candidates.par_iter())
@@ -184,12 +215,12 @@ fn choose<'a>(
         min_evidence,
         candidates,
         queue: CandidateQueue::new(&bounds, min_evidence),
-        taken: images.nothing_taken(),
+        taken,
         explained: (images.views.iter())
             .map(|view| vec![false; view.segments.len()])
             .collect(),
     };
-    let (mut lines, mut curved, mut tubes) = (Vec::new(), 0, Vec::new());
+    let (mut lines, mut curved, mut chords, mut tubes) = (Vec::new(), 0, Vec::new(), Vec::new());
     loop {
         // A line takes its edgels whatever it stands for: that is asked of many at once.
         let room = most - lines.len();
@@ -211,7 +242,13 @@ fn choose<'a>(
         for (line, kind) in found.into_iter().zip(kinds) {
             match kind {
                 Kind::Straight => lines.push(line),
-                Kind::Curve => curved += 1,
+                Kind::Curve(arc) => {
+                    curved += 1;
+                    chords.extend(arc.map(|arc| Chord {
+                        arc,
+                        views: line.evidence.views().collect(),
+                    }));
+                }
                 Kind::Outline(tube) => tubes.push(tube),
             }
         }
@@ -224,6 +261,7 @@ fn choose<'a>(
         noise,
         lines,
         curved,
+        chords,
         outlines,
         taken: chooser.taken,
     })
@@ -319,8 +357,7 @@ pub(super) fn claim_edgels(images: &Images, line: &LineSegment3, taken: &mut [Ve
             let Some(samples) = images.samples(view, line, [0.0, 1.0], Some(count as usize)) else {
                 return;
             };
-            for (_, pixel) in &samples.points {
-                let normal = &samples.normal;
+            for Sample { pixel, normal, .. } in &samples {
                 map.visit(pixel, normal, images.reach, CLAIM_COSINE, |_, edgel| {
                     taken[edgel] = true;
                     ControlFlow::Continue(())

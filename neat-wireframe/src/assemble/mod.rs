@@ -18,9 +18,13 @@
 
 mod arcs;
 mod candidate_queue;
+mod circle_fitting;
 mod collinear_pieces;
 mod config;
 mod corners;
+mod curve_pieces;
+mod curve_samples;
+mod curves;
 mod edge_completion;
 mod edge_cutting;
 mod edge_samples;
@@ -45,6 +49,7 @@ mod projected_line;
 mod report;
 mod slab_ends;
 mod straightness;
+mod swept_tubes;
 mod tangent_ends;
 mod view_segments;
 
@@ -60,6 +65,7 @@ use crate::paper::NeatLine;
 use crate::{ViewObservation, Wireframe3d};
 use collinear_pieces::merge_pieces;
 use corners::find_corners;
+use curves::find_arcs;
 use edge_completion::complete_edges;
 use edge_cutting::{cut_edges, in_order};
 use edge_samples::Images;
@@ -187,6 +193,14 @@ pub fn assemble_with_progress(
     report.lines = selection.lines.len();
     report.curved_lines = selection.curved;
     report.outlines = selection.outlines;
+    let arcs = {
+        let progress = &mut part(progress, [SELECTED, SELECTED]);
+        find_arcs(&selection, config, progress)?
+    };
+    report.arcs = arcs.len();
+    let arcs = (arcs.iter())
+        .map(|found| found.arc.map(|point| point * scene_radius))
+        .collect();
     let progress = &mut part(progress, [SELECTED, 1.0]);
     let wireframe = graph_of(selection, config, &mut report, progress)?;
     let wireframe = wireframe.map(|junction| junction * scene_radius);
@@ -196,6 +210,7 @@ pub fn assemble_with_progress(
     let refined_cameras = poses.map(|poses| poses.cameras(scene_radius));
     ControlFlow::Continue(Assembled {
         wireframe,
+        arcs,
         report,
         refined_cameras,
     })

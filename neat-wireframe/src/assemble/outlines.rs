@@ -14,16 +14,16 @@ use neat_core::LineSegment3;
 use rayon::prelude::*;
 
 /// Radii that are tried, in pixels, on both sides of a line; the fit finds those between.
-const RADII: [f64; 8] = [2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0];
+pub(super) const RADII: [f64; 8] = [2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0];
 /// Thinner tubes are lines, in reaches of edgels; with 3 all objects and parts are as with 2.
-const MIN_REACHES: f64 = 2.0;
+pub(super) const MIN_REACHES: f64 = 2.0;
 /// Reach of each round of the fit, and how far its views may have turned, in degrees: the
 /// first guess is good for little.
-const ROUNDS: [(f64, f64); 3] = [(2.5, 20.0), (2.5, 45.0), (1.0, 60.0)];
+pub(super) const ROUNDS: [(f64, f64); 3] = [(2.5, 20.0), (2.5, 45.0), (1.0, 60.0)];
 /// Share of the samples that must have an edgel for a view to count in the fit.
-const FOUND: f64 = 0.6;
+pub(super) const FOUND: f64 = 0.6;
 /// Fewer edgels determine no tube.
-const MIN_EDGELS: usize = 20;
+pub(super) const MIN_EDGELS: usize = 20;
 /// Three views show a cylinder wherever they want, as two do with a line. Four do so with a
 /// cone, which has a parameter more; but with four fewer outlines are told on the parts, and
 /// with three no object loses an edge.
@@ -201,10 +201,10 @@ impl Images<'_> {
         let Some((projected, normal, samples)) = prepared else {
             return Vec::new();
         };
-        let count = samples.points.len();
+        let count = samples.len();
         let mut edgels = Vec::with_capacity(count);
-        for (k, (_, pixel)) in samples.points.iter().enumerate() {
-            edgels.extend(self.edgel(view, pixel, &samples.normal, reach));
+        for (k, sample) in samples.iter().enumerate() {
+            edgels.extend(self.edgel(view, sample, reach));
             // Most tubes are none: this is soon known.
             let most = edgels.len() + (count - k - 1);
             if (most as f64) < FOUND * count as f64 {

@@ -1,7 +1,7 @@
 //! What the assembler returns.
 
 use crate::Wireframe3d;
-use neat_core::Camera;
+use neat_core::{Camera, CircularArc};
 use serde::{Deserialize, Serialize};
 
 /// A wireframe, and how it came about.
@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct Assembled {
     /// Junctions in lexicographic order of their coordinates; edges `[a, b]`, a < b, sorted.
     pub wireframe: Wireframe3d,
+    /// Arcs of circles that the images show.
+    pub arcs: Vec<CircularArc>,
     /// What each step found.
     pub report: AssembleReport,
     /// The cameras of all views, from where the images show the wireframe; `None` where they
@@ -37,6 +39,8 @@ pub struct AssembleReport {
     pub lines: usize,
     /// … those that stand for curves, and are left out …
     pub curved_lines: usize,
+    /// … of which so many arcs came …
+    pub arcs: usize,
     /// … and outlines of round things, which are left out, too.
     pub outlines: usize,
     /// Lines that were pieces of others.

@@ -98,15 +98,15 @@ impl Images<'_> {
         let Some(((across, projected), samples)) = prepared else {
             return Vec::new();
         };
-        (samples.points.iter())
-            .filter_map(|(place, pixel)| {
-                let edgel = self.edgel(view, pixel, &samples.normal, self.wide_reach())?;
+        (samples.iter())
+            .filter_map(|sample| {
+                let edgel = self.edgel(view, sample, self.wide_reach())?;
                 let position = self.maps[view].get(edgel).position.cast();
                 let found = projected.distance_with_gradient(camera, &position);
                 let [by_start, by_end] = found.by_points;
                 let [x, y] = across.tr_mul(&(by_start + by_end)).into();
                 // A shift, a tilt and a bow, each in two directions.
-                let along = 2.0 * place - 1.0;
+                let along = 2.0 * sample.place - 1.0;
                 let bend = 1.0 - along * along;
                 let design = [x, y, x * along, y * along, x * bend, y * bend];
                 Some((SVector::from(design), -found.distance))

@@ -82,8 +82,8 @@ impl Images<'_> {
             let Some((projected, samples)) = prepared else {
                 continue;
             };
-            for (place, pixel) in &samples.points {
-                let Some(edgel) = self.edgel(view, pixel, &samples.normal, self.reach) else {
+            for sample in &samples {
+                let Some(edgel) = self.edgel(view, sample, self.reach) else {
                     continue;
                 };
                 let position = self.maps[view].get(edgel).position.cast();
@@ -91,7 +91,7 @@ impl Images<'_> {
                 let [start, end] = found.by_points;
                 let row = across.tr_mul(&(start + end));
                 let station =
-                    &mut halves[index % 2][((place * count as f64) as usize).min(count - 1)];
+                    &mut halves[index % 2][((sample.place * count as f64) as usize).min(count - 1)];
                 station.matrix += row * row.transpose();
                 station.right -= found.distance * row;
             }

@@ -4,7 +4,7 @@
 use crate::ViewObservation;
 use crate::segment_grid::SegmentGrid;
 use nalgebra::Vector3;
-use neat_core::{Camera, LineSegment2, LineSegment3};
+use neat_core::{Camera, LineSegment2, LineSegment3, ScoredSegment2};
 
 /// Names one 2D segment of the prepared views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -82,6 +82,21 @@ impl PreparedView {
             camera,
             segments,
         }
+    }
+
+    /// The same camera with other segments, of any length.
+    pub(super) fn with_segments(&self, segments: &[LineSegment2]) -> Self {
+        let scored = |(edge, segment): (usize, &LineSegment2)| ScoredSegment2 {
+            segment: *segment,
+            score: 1.0,
+            edge,
+        };
+        let observation = ViewObservation {
+            camera: self.camera,
+            segments: segments.iter().enumerate().map(scored).collect(),
+            junctions: Vec::new(),
+        };
+        Self::new(&observation, 1.0, 0.0)
     }
 
     /// The same segments, seen by another camera of the same image.

@@ -3,7 +3,7 @@
 use super::{EdgeFields, ExportError, JunctionFields, check};
 use crate::Wireframe3d;
 use nalgebra::Vector3;
-use neat_core::file;
+use neat_core::{CircularArc, file};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -35,6 +35,9 @@ pub struct WireframeDocument {
     /// Index pairs into `junctions`.
     #[serde(default, alias = "lines")]
     pub edges: Vec<[usize; 2]>,
+    /// Arcs of circles beside the edges, in the frame of the user's files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub arcs: Vec<CircularArc>,
     /// Facts about every junction.
     #[serde(default, skip_serializing_if = "JunctionFields::is_empty")]
     pub junction_fields: JunctionFields,
@@ -68,6 +71,10 @@ pub struct SupportingSegment {
 }
 
 impl WireframeDocument {
+    /// What draws arcs as chains of straight pieces turns by so much at most, in radians: a
+    /// circle of 500 pixels is drawn to half a pixel.
+    pub const TURN_OF_DRAWN_ARCS: f64 = 0.09;
+
     /// The bare graph, without fields or metadata.
     pub fn wireframe(&self) -> Wireframe3d {
         Wireframe3d {
@@ -84,6 +91,12 @@ impl WireframeDocument {
     /// wrong length.
     pub fn check(&self, path: &Path) -> Result<(), ExportError> {
         check(path, &self.junctions, &self.edges)?;
+        if let Some(arc) = self.arcs.iter().position(|arc| !arc.is_valid()) {
+            return Err(ExportError::BadArc {
+                path: path.into(),
+                arc,
+            });
+        }
         let per_junction = (
             self.junction_fields.named(),
             self.junctions.len(),

@@ -50,6 +50,17 @@ pub enum ExportError {
         /// What it describes: "junction" or "edge".
         of: &'static str,
     },
+    /// An arc is none.
+    #[error(
+        "{path}: arc {arc} is none: it needs a radius above 0, axes of length 1 perpendicular to \
+         each other, and ascending angles at most 2π apart"
+    )]
+    BadArc {
+        /// The file.
+        path: PathBuf,
+        /// Its index.
+        arc: usize,
+    },
     /// The text is not the JSON of a wireframe.
     #[error("{path} is not a wireframe in JSON; it may be truncated: export it again")]
     Json {

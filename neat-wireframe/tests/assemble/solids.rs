@@ -3,13 +3,14 @@
 use crate::scores::scores_within;
 use nalgebra::Vector3;
 use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
-use neat_core::{EdgelMap, LineSegment3};
+use neat_core::{CircularArc, EdgelMap, LineSegment2, LineSegment3};
 use neat_detect::{DetectorConfig, edgel_map};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble, assemble_with_progress};
 use neat_wireframe::paper::NeatLine;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 fn scene(solid: Solid, seed: u64) -> SyntheticData {
@@ -47,6 +48,52 @@ fn noisy_detections_give_the_true_edges() {
             solid.name(),
         );
     }
+}
+
+#[test]
+fn a_circle_beside_a_box_comes_back_as_one_arc() {
+    let truth = CircularArc {
+        center: Vector3::new(0.05, -0.1, 0.1),
+        axes: [Vector3::new(0.6, 0.8, 0.0), Vector3::z()],
+        radius: 0.4,
+        angles: [0.0, TAU],
+    };
+    let config = SyntheticScene {
+        solid: Solid::Box,
+        views: 40,
+        noise_in_pixels: 0.0,
+        shading: false,
+        ..SyntheticScene::default()
+    };
+    let data = generate(&config).unwrap();
+    let observations = ViewObservation::from_scene(&data.scene, 0.05);
+    let edgels: Vec<EdgelMap> = (observations.iter())
+        .map(
+            |ViewObservation {
+                 camera, segments, ..
+             }| {
+                let pixels: Vec<_> = (truth.points(0.05).iter())
+                    .map(|point| camera.project(point).pixel)
+                    .collect();
+                let chords = pixels
+                    .windows(2)
+                    .map(|ends| LineSegment2::new(ends[0], ends[1]));
+                let shapes: Vec<LineSegment2> = (segments.iter())
+                    .map(|found| found.segment)
+                    .chain(chords)
+                    .collect();
+                EdgelMap::of_segments(&shapes, camera.width, camera.height)
+            },
+        )
+        .collect();
+    let radius = data.scene.sphere_radius;
+    let result = assemble(&observations, &edgels, radius, &AssembleConfig::default());
+    assert_eq!(precision_and_recall(&data, &result), (1.0, 1.0));
+    assert_eq!(result.arcs.len(), 1, "{:?}", result.arcs);
+    let arc = &result.arcs[0];
+    assert!((arc.center - truth.center).norm() < 2e-3);
+    assert!((arc.radius - truth.radius).abs() < 2e-3);
+    assert!(arc.sweep() > 6.1);
 }
 
 #[test]

@@ -1,0 +1,108 @@
+//! The arcs of which lines are chords, each found once.
+
+use super::circle_fitting::FoundArc;
+use super::config::AssembleConfig;
+use super::curve_pieces::curve_pieces;
+use super::edge_samples::Images;
+use super::line_selection::{Chord, Selection, claim_edgels, select_chords};
+use super::progress::OnProgress;
+use super::proposals;
+use super::view_segments::PreparedView;
+use neat_core::CircularArc;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+
+/// Nearer to an arc than so many reaches, all along, a chord is one of its own.
+const SAME: f64 = 2.0;
+
+/// An arc all along a surer one, nearer than so many pixels, is what blur and rims make of the same
+/// edge: smoothing leaves no two edges so near each other.
+const BESIDE_IN_PIXELS: f64 = 3.0;
+
+/// The arcs that the images show, of the chords among the lines and of those that pieces of
+/// curves propose.
+pub(super) fn find_arcs(
+    selection: &Selection,
+    config: &AssembleConfig,
+    progress: OnProgress<'_>,
+) -> ControlFlow<(), Vec<FoundArc>> {
+    let images = &selection.images;
+    let views: Vec<PreparedView> = (images.views.par_iter().zip(images.maps))
+        .zip(&selection.taken)
+        .map(|((view, map), taken)| view.with_segments(&curve_pieces(map, |edgel| !taken[edgel])))
+        .collect();
+    let pieces: usize = views.iter().map(|view| view.segments.len()).sum();
+    let with_pieces = Images {
+        views: &views,
+        ..*images
+    };
+    let alternatives = proposals(&views, None, config);
+    let mut chords = selection.chords.clone();
+    chords.extend(select_chords(
+        with_pieces,
+        &alternatives,
+        selection,
+        config,
+        progress,
+    )?);
+    tracing::debug!(pieces, chords = chords.len(), "curves are proposed");
+    let mut taken = images.nothing_taken();
+    for line in &selection.lines {
+        claim_edgels(images, &line.line, &mut taken);
+    }
+    let grown = grown_arcs(images, &chords);
+    ControlFlow::Continue(chosen_arcs(images, grown, taken, config.min_evidence))
+}
+
+/// The arcs around chords, as far as the images show them.
+fn grown_arcs(images: &Images, chords: &[Chord]) -> Vec<FoundArc> {
+    let mut grown: Vec<FoundArc> = Vec::new();
+    for Chord { arc, views } in chords {
+        if !grown.iter().any(|other| covers(images, other, arc)) {
+            grown.extend(images.follow_arc(arc, views));
+        }
+    }
+    grown
+}
+
+/// The arcs that the images speak for most, one after the other, each by edgels that none before
+/// it has.
+fn chosen_arcs(
+    images: &Images,
+    mut grown: Vec<FoundArc>,
+    mut taken: Vec<Vec<bool>>,
+    least: f64,
+) -> Vec<FoundArc> {
+    grown.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let mut chosen = Vec::new();
+    for arc in grown {
+        if let Some(settled) = images.settle_arc(&arc, &taken)
+            && settled.gain > least
+        {
+            images.claim_arc(&settled, &mut taken);
+            let is_again = chosen
+                .iter()
+                .any(|other| runs_beside(other, &settled.arc, BESIDE_IN_PIXELS * settled.pixel));
+            if !is_again && !images.is_outline(&settled.arc, settled.pixel) {
+                chosen.push(settled);
+            }
+        }
+    }
+    chosen
+}
+
+/// Whether an arc runs along another one.
+fn covers(images: &Images, whole: &FoundArc, part: &CircularArc) -> bool {
+    runs_beside(whole, part, SAME * images.reach * whole.pixel)
+}
+
+/// Whether all of an arc is at most so far from another one.
+fn runs_beside(whole: &FoundArc, part: &CircularArc, near: f64) -> bool {
+    [0.1, 0.5, 0.9].iter().all(|place| {
+        let point = part.point_at(part.angles[0] + place * part.sweep());
+        whole.arc.distance_to_circle(&point) < near
+            && whole
+                .arc
+                .contains(whole.arc.angle_of(&point), near / whole.arc.radius)
+    })
+}
