@@ -6,7 +6,8 @@
 //!
 //! No field, no run folder and, unless it is asked for, no confidence: the quickest way from a
 //! changed line of the assembler to its scores. A scene with `gt_wireframe.json` is measured as
-//! `scripts/measure_objects.py` does (neat-abc at 0.01, one to one), one with `truth/` as
+//! `scripts/measure_objects.py` does (neat-abc at 0.01, one to one; by length where there are
+//! true curves, too), one with `truth/` as
 //! `scripts/measure_photographs.py` does (surface-and-creases), one without truth by how much
 //! of the 2D segments it explains. With `--out` the wireframes are kept, and so are the 2D
 //! segments, which the next call takes from there. With `--structure` only edges are measured
@@ -18,9 +19,11 @@
 mod prepared;
 mod probabilities;
 
-use neat_core::{Camera, Scene, View};
-use neat_eval::{EvaluationInput, EvaluationOptions, NeatAbc, SceneTruth, Scores, foreign};
-use neat_eval::{Protocol, SurfaceAndCreases};
+use neat_core::{Camera, CircularArc, Scene, View};
+use neat_eval::{
+    CubicBezier, EdgeModel, EdgePoints, EdgeSampling, EvaluationInput, EvaluationOptions, NeatAbc,
+};
+use neat_eval::{Protocol, SceneTruth, Scores, SurfaceAndCreases, foreign};
 use neat_wireframe::confidence::{ConfidenceConfig, assess};
 use neat_wireframe::export::{WireframeDocument, write_json};
 use neat_wireframe::kinds::edge_kinds;
@@ -63,41 +66,23 @@ fn main() -> Result<()> {
         let seconds = start.elapsed().as_secs_f64();
         let original = |p: &_| scene.original_from_world.apply(p);
         let wireframe = built.wireframe.map(original);
+        let arcs: Vec<CircularArc> = built.arcs.iter().map(|arc| arc.map(original)).collect();
         let (text, score) = measured(dir, &scene, &built.wireframe, &wireframe)?;
+        let of_curves = curves(dir, &wireframe, &arcs)?;
         let of_edges = match &mut probabilities {
             Some(probabilities) => probabilities.add(dir, &scene, &built.wireframe)?,
             None => String::new(),
         };
         println!(
-            "{name:18} {text} {} edges{of_edges} {seconds:.1} s",
-            wireframe.edges.len()
+            "{name:18} {text} {} edges, {} arcs{of_curves}{of_edges} {seconds:.1} s",
+            wireframe.edges.len(),
+            arcs.len()
         );
-        eprintln!("   {name} {:?}", built.report);
         scores.extend(score);
         if let Some(kept) = &kept {
-            let arcs: Vec<String> = built
-                .arcs
-                .iter()
-                .map(|a| {
-                    let a = a.map(original);
-                    let p: Vec<String> = a
-                        .points(0.02)
-                        .iter()
-                        .map(|p| format!("[{},{},{}]", p.x, p.y, p.z))
-                        .collect();
-                    format!(
-                        "{{\"radius\":{},\"sweep\":{},\"points\":[{}]}}",
-                        a.radius,
-                        a.sweep(),
-                        p.join(",")
-                    )
-                })
-                .collect();
-            fs::write(kept.join("arcs.json"), format!("[{}]", arcs.join(",")))?;
-            write_json(
-                &kept.join("wireframe.json"),
-                &WireframeDocument::from(&wireframe),
-            )?;
+            let mut document = WireframeDocument::from(&wireframe);
+            document.arcs = arcs;
+            write_json(&kept.join("wireframe.json"), &document)?;
         }
     }
     if !scores.is_empty() {
@@ -132,6 +117,35 @@ fn structure_of(wireframe: &Wireframe3d, scene: &Scene) -> Result<Wireframe3d> {
             .map(|(edge, _)| *edge)
             .collect(),
     })
+}
+
+/// How much of the length of what was found lies within 0.01 of true edges and curves, and how
+/// much of those of it, where there are true curves.
+fn curves(dir: &Path, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Result<String> {
+    let truth = dir.join("gt_wireframe.json");
+    if !truth.exists() {
+        return Ok(String::new());
+    }
+    let truth = foreign::read_truth(&truth)?;
+    if truth.curves.is_empty() {
+        return Ok(String::new());
+    }
+    // True curves come in pieces of 0.005.
+    let protocol = EdgePoints {
+        prediction: EdgeSampling::Spacing(0.001),
+        truth: EdgeSampling::Spacing(0.001),
+        thresholds: vec![NeatAbc::default().thresholds[0]],
+        ..EdgePoints::edge_gaussians()
+    };
+    let found = EdgeModel {
+        wireframe: wireframe.clone(),
+        curves: arcs.iter().flat_map(CubicBezier::of_arc).collect(),
+    };
+    let score = protocol.evaluate(&found, &truth)?.thresholds[0];
+    Ok(format!(
+        ", edges and curves {:.3}/{:.3}",
+        score.precision, score.recall
+    ))
 }
 
 /// The scores as text, and F of segments and of junctions where there is a true wireframe.

@@ -25,11 +25,12 @@ pub use obj::parse_obj;
 pub use parametric_edges::parse_parametric_edges;
 pub use ply::parse_ply_edges;
 
-use crate::edge_model::EdgeModel;
+use crate::edge_model::{CubicBezier, EdgeModel};
 use crate::error::EvalError;
 use nalgebra::Vector3;
 use neat_core::ground_truth::{self, GroundTruth};
-use neat_core::{LineSegment3, SceneError, Wireframe3d, file};
+use neat_core::{CircularArc, LineSegment3, SceneError, Wireframe3d, file};
+use serde::Deserialize;
 use std::path::Path;
 
 const REMEDY: &str = "give a result as .json, .obj, .ply, .npz, .npy or Line3D++'s .txt";
@@ -76,7 +77,27 @@ fn parse_json(bytes: &[u8], path: &Path) -> Result<EdgeModel, SceneError> {
     if parametric_edges::is_parametric(bytes) {
         parse_parametric_edges(bytes, path)
     } else {
-        ground_truth::parse(bytes, path).map(|truth| truth.wireframe.into())
+        let truth = ground_truth::parse(bytes, path)?;
+        let arcs = arcs(bytes, path)?;
+        Ok(EdgeModel {
+            wireframe: truth.wireframe,
+            curves: arcs.iter().flat_map(CubicBezier::of_arc).collect(),
+        })
+    }
+}
+
+/// The arcs of a `wireframe.json`.
+fn arcs(bytes: &[u8], path: &Path) -> Result<Vec<CircularArc>, SceneError> {
+    #[derive(Deserialize)]
+    struct WithArcs {
+        #[serde(default)]
+        arcs: Vec<CircularArc>,
+    }
+    let WithArcs { arcs } =
+        serde_json::from_slice(bytes).map_err(|error| malformed(path, error.to_string()))?;
+    match arcs.iter().position(|arc| !arc.is_valid()) {
+        Some(arc) => Err(malformed(path, format!("arc {arc} is none"))),
+        None => Ok(arcs),
     }
 }
 
@@ -108,6 +129,32 @@ mod tests {
     use neat_core::npz::{NpyArray, write_npz};
     use neat_wireframe::export::{write_obj, write_ply};
     use proptest::prelude::*;
+
+    #[test]
+    fn arcs_of_a_wireframe_are_curves_and_must_be_arcs() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("wireframe.json");
+        let arc = CircularArc {
+            center: Vector3::new(1.0, 2.0, 3.0),
+            axes: [Vector3::x(), Vector3::y()],
+            radius: 2.0,
+            angles: [0.0, 1.5],
+        };
+        let mut document = neat_wireframe::export::WireframeDocument {
+            junctions: vec![Vector3::zeros(), Vector3::x()],
+            edges: vec![[0, 1]],
+            arcs: vec![arc],
+            ..Default::default()
+        };
+        neat_wireframe::export::write_json(&path, &document).unwrap();
+        let model = read(&path).unwrap();
+        assert_eq!(model.curves, CubicBezier::of_arc(&arc));
+        assert_eq!(model.wireframe.edges, [[0, 1]]);
+        document.arcs[0].radius = -1.0;
+        std::fs::write(&path, serde_json::to_vec(&document).unwrap()).unwrap();
+        assert!(read(&path).unwrap_err().to_string().contains("arc 0"));
+        assert!(neat_wireframe::export::write_json(&path, &document).is_err());
+    }
     use std::collections::BTreeMap;
     use std::fs;
 
