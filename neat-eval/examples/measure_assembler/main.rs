@@ -33,6 +33,7 @@ use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
 use probabilities::Probabilities;
 use std::env;
 use std::error::Error;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -120,7 +121,7 @@ fn structure_of(wireframe: &Wireframe3d, scene: &Scene) -> Result<Wireframe3d> {
 }
 
 /// How much of the length of what was found lies within 0.01 of true edges and curves, and how
-/// much of those of it, where there are true curves.
+/// much of those of it, without arcs and with them, where there are true curves.
 fn curves(dir: &Path, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Result<String> {
     let truth = dir.join("gt_wireframe.json");
     if !truth.exists() {
@@ -137,15 +138,16 @@ fn curves(dir: &Path, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Result<S
         thresholds: vec![NeatAbc::default().thresholds[0]],
         ..EdgePoints::edge_gaussians()
     };
-    let found = EdgeModel {
-        wireframe: wireframe.clone(),
-        curves: arcs.iter().flat_map(CubicBezier::of_arc).collect(),
-    };
-    let score = protocol.evaluate(&found, &truth)?.thresholds[0];
-    Ok(format!(
-        ", edges and curves {:.3}/{:.3}",
-        score.precision, score.recall
-    ))
+    let mut text = ", edges and curves".to_owned();
+    for arcs in [&[], arcs] {
+        let found = EdgeModel {
+            wireframe: wireframe.clone(),
+            curves: arcs.iter().flat_map(CubicBezier::of_arc).collect(),
+        };
+        let score = protocol.evaluate(&found, &truth)?.thresholds[0];
+        write!(text, " {:.3}/{:.3}", score.precision, score.recall)?;
+    }
+    Ok(text)
 }
 
 /// The scores as text, and F of segments and of junctions where there is a true wireframe.
