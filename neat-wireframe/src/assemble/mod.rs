@@ -5,8 +5,8 @@
 //! (Hofer, Maurer and Bischof, *Efficient 3D scene abstraction using line segments*,
 //! Line3D++, 2017), or by a field that says which of them show one edge. The images decide: the line that they speak for most is fitted to the
 //! edgels of all views at once, takes them, and the next one is chosen by those that are
-//! left. Lines that bend are curves, and those that move aside from view to view are outlines
-//! of round things. Ends that meet become corners, all corners are fitted to the edgels
+//! left. Lines that bend are chords of curves, of which arcs are followed, and those that move
+//! aside from view to view are outlines of round things. Ends that meet become corners, all corners are fitted to the edgels
 //! together, and edges are cut where others end on them or cross them; the pieces, each by
 //! what shows it, are fitted once more.
 //!
@@ -63,6 +63,7 @@ pub use report::{AssembleReport, Assembled};
 
 use crate::paper::NeatLine;
 use crate::{ViewObservation, Wireframe3d};
+use circle_fitting::FoundArc;
 use collinear_pieces::merge_pieces;
 use corners::find_corners;
 use curves::find_arcs;
@@ -75,7 +76,7 @@ use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Alternatives, Scoring, score_hypotheses};
 use line_continuation::continue_lines;
 use line_selection::{Selection, select_lines, sure_lines};
-use neat_core::{EdgelMap, LineSegment2};
+use neat_core::{CircularArc, EdgelMap, LineSegment2};
 use pose_fitting::fit_poses;
 use progress::part;
 use rayon::prelude::*;
@@ -87,11 +88,12 @@ use view_segments::PreparedView;
 /// Views that must agree on a position for it to be proposed; the images decide.
 const MIN_VIEWS: usize = 2;
 
-/// Shares of the time after which lines are proposed, the sure ones known and all selected: about
-/// those of a house.
+/// Shares of the time after which lines are proposed, the sure ones known, all selected and arcs
+/// followed: about those of a house.
 const PROPOSED: f64 = 0.05;
 const SURE: f64 = 0.2;
-const SELECTED: f64 = 0.8;
+const SELECTED: f64 = 0.7;
+const FOLLOWED: f64 = 0.85;
 /// Likewise, of the time for the graph, after which lines are cut where arcs begin, and continued.
 const ENDED: f64 = 0.25;
 const CONTINUED: f64 = 0.75;
@@ -142,12 +144,7 @@ pub fn assemble_with_progress(
         return ControlFlow::Continue(Assembled::default());
     }
     let _span = tracing::debug_span!("assemble", views = observations.len()).entered();
-    let views: Vec<PreparedView> = (observations.par_iter())
-        .map(|observation| {
-            let min_length = config.min_segment_length_in_pixels;
-            PreparedView::new(observation, scene_radius.recip(), min_length)
-        })
-        .collect();
+    let views = prepared_views(observations, scene_radius, config);
     let of_segments: Vec<EdgelMap>;
     let maps = if edgels.is_empty() {
         of_segments = views.iter().map(edgels_of_segments).collect();
@@ -158,19 +155,7 @@ pub fn assemble_with_progress(
     let field = field_lines.map(|lines| FieldLines::new(&views, lines, scene_radius.recip()));
     let alternatives = proposals(&views, field.as_ref(), config);
     progress(PROPOSED)?;
-    let mut report = AssembleReport {
-        usable_views: views
-            .iter()
-            .filter(|view| !view.segments.is_empty())
-            .count(),
-        usable_segments: views.iter().map(|view| view.segments.len()).sum(),
-        edgels: maps.iter().map(EdgelMap::len).sum(),
-        segments_with_hypotheses: (alternatives.iter().flatten())
-            .filter(|list| !list.is_empty())
-            .count(),
-        ..AssembleReport::default()
-    };
-
+    let mut report = counted(&views, maps, &alternatives);
     let mut images = Images::new(&views, maps);
     let mut sure = {
         let progress = &mut part(progress, [PROPOSED, SURE]);
@@ -193,15 +178,13 @@ pub fn assemble_with_progress(
     report.lines = selection.lines.len();
     report.curved_lines = selection.curved;
     report.outlines = selection.outlines;
-    let arcs = {
-        let progress = &mut part(progress, [SELECTED, SELECTED]);
-        find_arcs(&selection, config, progress)?
-    };
+    let arcs = find_arcs(
+        &selection,
+        config,
+        &mut part(progress, [SELECTED, FOLLOWED]),
+    )?;
     report.arcs = arcs.len();
-    let arcs = (arcs.iter())
-        .map(|found| found.arc.map(|point| point * scene_radius))
-        .collect();
-    let progress = &mut part(progress, [SELECTED, 1.0]);
+    let progress = &mut part(progress, [FOLLOWED, 1.0]);
     let wireframe = graph_of(selection, config, &mut report, progress)?;
     let wireframe = wireframe.map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
@@ -210,10 +193,47 @@ pub fn assemble_with_progress(
     let refined_cameras = poses.map(|poses| poses.cameras(scene_radius));
     ControlFlow::Continue(Assembled {
         wireframe,
-        arcs,
+        arcs: scaled_arcs(&arcs, scene_radius),
         report,
         refined_cameras,
     })
+}
+
+/// What there is to go by.
+fn counted(
+    views: &[PreparedView],
+    maps: &[EdgelMap],
+    alternatives: &Alternatives,
+) -> AssembleReport {
+    AssembleReport {
+        usable_views: views
+            .iter()
+            .filter(|view| !view.segments.is_empty())
+            .count(),
+        usable_segments: views.iter().map(|view| view.segments.len()).sum(),
+        edgels: maps.iter().map(EdgelMap::len).sum(),
+        segments_with_hypotheses: (alternatives.iter().flatten())
+            .filter(|list| !list.is_empty())
+            .count(),
+        ..AssembleReport::default()
+    }
+}
+
+fn scaled_arcs(arcs: &[FoundArc], factor: f64) -> Vec<CircularArc> {
+    let scaled = |found: &FoundArc| found.arc.map(|point| point * factor);
+    arcs.iter().map(scaled).collect()
+}
+
+/// The views in a world whose scene ball is the unit ball.
+fn prepared_views(
+    observations: &[ViewObservation],
+    scene_radius: f64,
+    config: &AssembleConfig,
+) -> Vec<PreparedView> {
+    let min_length = config.min_segment_length_in_pixels;
+    (observations.par_iter())
+        .map(|observation| PreparedView::new(observation, scene_radius.recip(), min_length))
+        .collect()
 }
 
 /// The positions in space of all 2D segments that some pair of views agrees on.
