@@ -95,11 +95,6 @@ impl CircularArc {
         self.angles[1] - self.angles[0]
     }
 
-    /// Whether it is a whole circle.
-    pub fn is_closed(&self) -> bool {
-        self.sweep() >= TAU
-    }
-
     /// Its length.
     pub fn length(&self) -> f64 {
         self.radius * self.sweep()

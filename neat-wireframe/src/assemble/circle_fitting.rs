@@ -1,21 +1,20 @@
 //! Circular arcs: followed from a chord along the edgels of all views, as far as these go.
 //!
 //! An arc is asked sector by sector, as a line is asked whole: a view shows the front of a rim
-//! and hides its back. It grows by sectors that speak for it, at most to twice its length, and is
-//! fitted to the edgels beside them, until it grows no more.
+//! and hides its back. It grows by sectors that speak for it, at most to three times its length in
+//! a round, and is fitted to the edgels beside them, until it grows no more.
 
 use super::curve_samples::{SPACING, distance_of_curve};
 use super::edge_samples::{Images, Sample};
 use super::line_evidence::{LineEvidence, Showing};
 use super::line_extent::{best_stretch, gain_of_sample};
 use super::line_fitting::change_by_edgels;
-use super::line_selection::CLAIM_COSINE;
+use super::line_selection::{CLAIM_DENSITY, take_beside};
 use crate::statistics::upper_median;
-use nalgebra::{SVector, Unit, UnitQuaternion};
+use nalgebra::{SVector, Unit, UnitQuaternion, Vector3};
 use neat_core::CircularArc;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 
 /// Length of a sector in pixels: the shortest that a line would be asked with …
 const SECTOR_IN_PIXELS: f64 = 12.0;
@@ -25,7 +24,7 @@ const MIN_SECTORS_OF_CIRCLE: f64 = 8.0;
 const MAX_SECTORS_OF_CIRCLE: f64 = 1e6;
 /// An arc has so many at most.
 const MAX_SECTORS: f64 = 400.0;
-/// Rounds of growth: a circle is full after seven doublings of a sector, and a few to settle.
+/// Rounds of growth: a sector is a circle of 240 after five, which leaves some to settle.
 const MAX_ROUNDS: usize = 12;
 /// Reaches of the fits of a round.
 const FITTING_REACHES: [f64; 2] = [1.5, 1.0];
@@ -35,8 +34,6 @@ const MIN_EDGELS: usize = 20;
 const RIDGE: f64 = 1e-6;
 /// A fit changes the radius by this factor at most: farther its rows do not hold.
 const MAX_CHANGE: f64 = 2.0;
-/// Distance between samples where an arc takes its edgels, in pixels: as for lines.
-const CLAIM_SPACING: f64 = 0.5;
 /// Pixels between places of which the ends are one.
 const END_STEP: f64 = 2.0;
 
@@ -55,9 +52,35 @@ pub(super) struct FoundArc {
 type Row = (SVector<f64, 6>, f64);
 
 /// A part of an arc, and what the images say about it.
-struct Sector {
-    angles: [f64; 2],
-    evidence: LineEvidence,
+pub(super) struct Sector {
+    pub angles: [f64; 2],
+    pub evidence: LineEvidence,
+}
+
+/// How a distance changes with a circle's centre, its radius and its turn around both axes (times
+/// a scale), where it changes so `by_point` at an angle of the circle. `arm` leads from the centre
+/// to that point, by the scale.
+pub(super) fn by_circle(
+    circle: &CircularArc,
+    angle: f64,
+    arm: &Vector3<f64>,
+    by_point: &Vector3<f64>,
+) -> SVector<f64, 6> {
+    let [x, y] = circle.axes.map(|axis| axis.cross(arm).dot(by_point));
+    let by_radius = by_point.dot(&circle.toward(angle));
+    SVector::from([by_point.x, by_point.y, by_point.z, by_radius, x, y])
+}
+
+/// The circle after a change of these parameters.
+pub(super) fn changed(circle: &CircularArc, change: &[f64], scale: f64) -> CircularArc {
+    let turn = change[4] * circle.axes[0] + change[5] * circle.axes[1];
+    let turn = UnitQuaternion::from_scaled_axis(turn / scale);
+    CircularArc {
+        center: circle.center + Vector3::new(change[0], change[1], change[2]),
+        radius: circle.radius + change[3],
+        axes: circle.axes.map(|axis| *Unit::new_normalize(turn * axis)),
+        ..*circle
+    }
 }
 
 fn angles_of(sectors: &[Sector]) -> [f64; 2] {
@@ -118,13 +141,10 @@ impl Images<'_> {
         taken.par_iter_mut().enumerate().for_each(|(view, taken)| {
             for part in 0..parts as usize {
                 let low = arc.angles[0] + part as f64 * width;
-                let samples = self.samples_of_sector(view, arc, [low, low + width], CLAIM_SPACING);
-                for Sample { pixel, normal, .. } in samples.unwrap_or_default() {
-                    self.maps[view].visit(&pixel, &normal, self.reach, CLAIM_COSINE, |_, edgel| {
-                        taken[edgel] = true;
-                        ControlFlow::Continue(())
-                    });
-                }
+                let spacing = 1.0 / CLAIM_DENSITY;
+                let samples = self.samples_of_sector(view, arc, [low, low + width], spacing);
+                let samples = samples.unwrap_or_default();
+                take_beside(&self.maps[view], &samples, self.reach, taken);
             }
         });
     }
@@ -220,15 +240,27 @@ impl Images<'_> {
         showing.iter().filter_map(gain).sum()
     }
 
-    fn evidence_of_sector(
+    /// What the images say about a part of a curve near an arc, which is `at` a place for each
+    /// view and angle.
+    pub(super) fn evidence_of_curve(
+        &self,
+        arc: &CircularArc,
+        angles: [f64; 2],
+        at: impl Fn(usize, f64) -> Option<Vector3<f64>> + Sync,
+        taken: Option<&[Vec<bool>]>,
+    ) -> LineEvidence {
+        let middle = arc.point_at(0.5 * (angles[0] + angles[1]));
+        let in_view = |view| self.samples_of_curve(view, angles, SPACING, |angle| at(view, angle));
+        self.evidence_of_samples(&middle, in_view, taken, f64::NEG_INFINITY, 1)
+    }
+
+    pub(super) fn evidence_of_sector(
         &self,
         arc: &CircularArc,
         angles: [f64; 2],
         taken: Option<&[Vec<bool>]>,
     ) -> LineEvidence {
-        let middle = arc.point_at(0.5 * (angles[0] + angles[1]));
-        let in_view = |view| self.samples_of_sector(view, arc, angles, SPACING);
-        self.evidence_of_samples(&middle, in_view, taken, f64::NEG_INFINITY, 1)
+        self.evidence_of_curve(arc, angles, |_, angle| Some(arc.point_at(angle)), taken)
     }
 
     /// Samples of a part of an arc in a view; `None` where it does not see enough of it.
@@ -259,17 +291,9 @@ impl Images<'_> {
             .collect();
         let pixel = self.pixel_of_arc(arc, parts.iter().flat_map(|(_, views)| views.clone()));
         let change = change_by_edgels(&rows, MIN_EDGELS, reach, RIDGE, pixel)?.solution;
-        let radius =
-            (arc.radius + change[3]).clamp(arc.radius / MAX_CHANGE, arc.radius * MAX_CHANGE);
-        let turn = change[4] * arc.axes[0] + change[5] * arc.axes[1];
-        let turn = UnitQuaternion::from_scaled_axis(turn / arc.radius);
-        let axes = arc.axes.map(|axis| *Unit::new_normalize(turn * axis));
-        Some(CircularArc {
-            center: arc.center + change.fixed_rows::<3>(0),
-            radius,
-            axes,
-            ..*arc
-        })
+        let mut fitted = changed(arc, change.as_slice(), arc.radius);
+        fitted.radius = (fitted.radius).clamp(arc.radius / MAX_CHANGE, arc.radius * MAX_CHANGE);
+        Some(fitted)
     }
 
     /// What the edgels beside samples of an arc in a view say.
@@ -287,17 +311,8 @@ impl Images<'_> {
             let (point, tangent) = (arc.point_at(sample.place), arc.tangent_at(sample.place));
             let (distance, by_point) =
                 distance_of_curve(camera, &point, &(arc.radius * tangent), &position)?;
-            let offset = arc.toward(sample.place);
-            let by_turn = arc.axes.map(|axis| axis.cross(&offset).dot(&by_point));
-            let row = [
-                by_point.x,
-                by_point.y,
-                by_point.z,
-                by_point.dot(&offset),
-                by_turn[0],
-                by_turn[1],
-            ];
-            Some((SVector::from(row), -distance))
+            let arm = arc.toward(sample.place);
+            Some((by_circle(arc, sample.place, &arm, &by_point), -distance))
         };
         samples.iter().filter_map(row).collect()
     }
@@ -309,7 +324,6 @@ pub(super) mod tests {
     use crate::assemble::test_views::TestViews;
     use crate::assemble::view_segments::PreparedView;
     use crate::test_scenes::{cameras_on_sphere, views_of_edges};
-    use nalgebra::Vector3;
     use neat_core::Camera;
 
     /// Views that show another arc each.

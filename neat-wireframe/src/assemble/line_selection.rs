@@ -11,7 +11,7 @@ use super::progress::OnProgress;
 use super::projected_line::ProjectedLine;
 use super::view_segments::SegmentId;
 use crate::statistics::{SIGMA_BY_MEDIAN, upper_median};
-use neat_core::{CircularArc, LineSegment2, LineSegment3};
+use neat_core::{CircularArc, EdgelMap, LineSegment2, LineSegment3};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
@@ -43,9 +43,9 @@ const MIN_SHOWING: usize = 3;
 /// An evidence that others have lowered by more goes back into the queue, in nats.
 const STALE: f64 = 0.5;
 /// A line has the edgels beside it whose normals have this cosine to its own …
-pub(super) const CLAIM_COSINE: f64 = 0.8;
+const CLAIM_COSINE: f64 = 0.8;
 /// … at so many samples for each of its pixels.
-const CLAIM_DENSITY: f64 = 2.0;
+pub(super) const CLAIM_DENSITY: f64 = 2.0;
 /// 2D segments whose ends lie within so many reaches of a line are its own: they propose
 /// nothing else.
 const SEGMENT_REACHES: f64 = 2.0;
@@ -96,9 +96,13 @@ pub(super) fn sure_lines(
     progress: OnProgress<'_>,
 ) -> ControlFlow<(), Vec<ChosenLine>> {
     let some = candidates(&images, alternatives, SEGMENTS_FOR_SURE_LINES);
-    let (least, most) = (config.min_evidence, SURE_LINES);
-    let taken = images.nothing_taken();
-    let sure = choose(images, &some, (least, most), LEAST_NOISE, taken, progress)?;
+    let wanted = Wanted {
+        min_evidence: config.min_evidence,
+        most: SURE_LINES,
+        noise: LEAST_NOISE,
+        kind,
+    };
+    let sure = choose(images, &some, &wanted, images.nothing_taken(), progress)?;
     ControlFlow::Continue(sure.lines)
 }
 
@@ -116,9 +120,13 @@ pub(super) fn select_lines<'a>(
     let images = Images { reach, ..images };
     let all = candidates(&images, alternatives, 1);
     tracing::debug!(noise, candidates = all.len(), "lines are proposed");
-    let (least, most) = (config.min_evidence, usize::MAX);
-    let taken = images.nothing_taken();
-    choose(images, &all, (least, most), noise, taken, progress)
+    let wanted = Wanted {
+        min_evidence: config.min_evidence,
+        most: usize::MAX,
+        noise,
+        kind,
+    };
+    choose(images, &all, &wanted, images.nothing_taken(), progress)
 }
 
 /// The chords among the lines that the images show, of all positions of pieces of curves, by the
@@ -131,9 +139,13 @@ pub(super) fn select_chords(
     progress: OnProgress<'_>,
 ) -> ControlFlow<(), Vec<Chord>> {
     let all = candidates(&images, alternatives, 1);
-    let bounds = (config.min_evidence, usize::MAX);
-    let taken = selection.taken.clone();
-    let found = choose(images, &all, bounds, selection.noise, taken, progress)?;
+    let wanted = Wanted {
+        min_evidence: config.min_evidence,
+        most: usize::MAX,
+        noise: selection.noise,
+        kind: curve_or_straight,
+    };
+    let found = choose(images, &all, &wanted, selection.taken.clone(), progress)?;
     ControlFlow::Continue(found.chords)
 }
 
@@ -186,6 +198,17 @@ enum Kind {
 
 fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
     let ChosenLine { line, evidence } = found;
+    match curve_or_straight(images, found, noise) {
+        Kind::Straight => images
+            .tube(line, evidence)
+            .map_or(Kind::Straight, Kind::Outline),
+        curve => curve,
+    }
+}
+
+/// Likewise, where nobody wants to know of outlines.
+fn curve_or_straight(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
+    let ChosenLine { line, evidence } = found;
     let bend = images.bend(line, evidence);
     let bow = bend.bow.as_ref();
     if images.is_curved(line, &bend, noise) {
@@ -193,20 +216,34 @@ fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
     } else if let Some(arc) = images.arc_of_chord(line, evidence, bow, noise) {
         Kind::Curve(Some(arc))
     } else {
-        images
-            .tube(line, evidence)
-            .map_or(Kind::Straight, Kind::Outline)
+        Kind::Straight
     }
+}
+
+/// Which lines are chosen.
+struct Wanted {
+    min_evidence: f64,
+    /// So many at most.
+    most: usize,
+    /// The standard deviation of an edgel, in pixels.
+    noise: f64,
+    /// What tells what one stands for.
+    kind: fn(&Images, &ChosenLine, f64) -> Kind,
 }
 
 fn choose<'a>(
     images: Images<'a>,
     candidates: &[Candidate],
-    (min_evidence, most): (f64, usize),
-    noise: f64,
+    wanted: &Wanted,
     taken: Vec<Vec<bool>>,
     progress: OnProgress<'_>,
 ) -> ControlFlow<(), Selection<'a>> {
+    let &Wanted {
+        min_evidence,
+        most,
+        noise,
+        kind,
+    } = wanted;
     let bounds: Vec<f64> = (candidates.par_iter())
         .map(|candidate| images.most_evidence(&candidate.line))
         .collect();
@@ -357,13 +394,18 @@ pub(super) fn claim_edgels(images: &Images, line: &LineSegment3, taken: &mut [Ve
             let Some(samples) = images.samples(view, line, [0.0, 1.0], Some(count as usize)) else {
                 return;
             };
-            for Sample { pixel, normal, .. } in &samples {
-                map.visit(pixel, normal, images.reach, CLAIM_COSINE, |_, edgel| {
-                    taken[edgel] = true;
-                    ControlFlow::Continue(())
-                });
-            }
+            take_beside(map, &samples, images.reach, taken);
         });
+}
+
+/// Takes the edgels of a view beside samples of a line or a curve.
+pub(super) fn take_beside(map: &EdgelMap, samples: &[Sample], reach: f64, taken: &mut [bool]) {
+    for Sample { pixel, normal, .. } in samples {
+        map.visit(pixel, normal, reach, CLAIM_COSINE, |_, edgel| {
+            taken[edgel] = true;
+            ControlFlow::Continue(())
+        });
+    }
 }
 
 /// Whether a 2D segment lies on another, for the most part of its length.

@@ -4,12 +4,12 @@
 //! than the arc does is the surface of which the arc is an outline, or nearly that surface. A
 //! sphere is one whose circle has no radius.
 
+use super::circle_fitting::{Sector, by_circle, changed};
 use super::curve_samples::{SPACING, distance_of_curve};
 use super::edge_samples::{Images, Sample};
-use super::line_evidence::LineEvidence;
 use super::line_fitting::change_by_edgels;
 use super::outlines::{ADVANTAGE, FOUND, MIN_EDGELS, MIN_REACHES, RADII, ROUNDS, shows_as_well};
-use nalgebra::{Matrix2, SVector, Unit, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Matrix2, SVector, Vector2, Vector3};
 use neat_core::CircularArc;
 use rayon::prelude::*;
 
@@ -69,19 +69,13 @@ impl SweptTube {
     }
 }
 
-/// A part of an arc, with what the views do there.
-struct Part {
-    angles: [f64; 2],
-    evidence: LineEvidence,
-}
-
 impl Images<'_> {
     /// Whether an arc is the outline of something round.
     pub(super) fn is_outline(&self, arc: &CircularArc, pixel: f64) -> bool {
-        let parts: Vec<Part> = (parts_of(arc, pixel).into_par_iter())
-            .map(|angles| Part {
+        let parts: Vec<Sector> = (parts_of(arc, pixel).into_par_iter())
+            .map(|angles| Sector {
                 angles,
-                evidence: self.evidence_of_part(arc, angles, |_, angle| Some(arc.point_at(angle))),
+                evidence: self.evidence_of_sector(arc, angles, None),
             })
             .collect();
         let of_arc: f64 = parts.iter().map(|part| part.evidence.gain).sum();
@@ -103,35 +97,25 @@ impl Images<'_> {
         &self,
         tube: &SweptTube,
         arc: &CircularArc,
-        parts: &[Part],
+        parts: &[Sector],
         of_arc: f64,
     ) -> bool {
         let (mut gain, mut as_well) = (0.0, 0);
         for part in parts {
-            let found = self.evidence_of_part(arc, part.angles, |view, angle| {
+            let outline = |view: usize, angle| {
                 let eye = &self.views[view].camera.center_in_world;
                 Some(tube.outline(angle, eye)?.0)
-            });
+            };
+            let found = self.evidence_of_curve(arc, part.angles, outline, None);
             gain += found.gain;
             as_well += usize::from(shows_as_well(&found, &part.evidence));
         }
         gain > of_arc + ADVANTAGE * parts.len() as f64 && 2 * as_well > parts.len()
     }
 
-    fn evidence_of_part(
-        &self,
-        arc: &CircularArc,
-        angles: [f64; 2],
-        at: impl Fn(usize, f64) -> Option<Vector3<f64>> + Sync,
-    ) -> LineEvidence {
-        let middle = arc.point_at(0.5 * (angles[0] + angles[1]));
-        let in_view = |view| self.samples_of_curve(view, angles, SPACING, |angle| at(view, angle));
-        self.evidence_of_samples(&middle, in_view, None, f64::NEG_INFINITY, 1)
-    }
-
     /// The direction, away from the circle's centre and along its axis, to which the sight of
     /// the views that show an arc is most nearly perpendicular.
-    fn tangent_normal_of_arc(&self, arc: &CircularArc, parts: &[Part]) -> Option<Vector2<f64>> {
+    fn tangent_normal_of_arc(&self, arc: &CircularArc, parts: &[Sector]) -> Option<Vector2<f64>> {
         let mut spread = Matrix2::zeros();
         for part in parts {
             let angle = 0.5 * (part.angles[0] + part.angles[1]);
@@ -152,7 +136,7 @@ impl Images<'_> {
         &self,
         start: &SweptTube,
         scale: f64,
-        parts: &[Part],
+        parts: &[Sector],
         pixel: f64,
     ) -> Option<SweptTube> {
         let mut tube = *start;
@@ -166,11 +150,7 @@ impl Images<'_> {
                 })
                 .collect();
             let change = change_by_edgels(&rows, MIN_EDGELS, reach, RIDGE, pixel)?.solution;
-            let turn = change[4] * tube.circle.axes[0] + change[5] * tube.circle.axes[1];
-            let turn = UnitQuaternion::from_scaled_axis(turn / scale);
-            tube.circle.axes = (tube.circle.axes).map(|axis| *Unit::new_normalize(turn * axis));
-            tube.circle.center += change.fixed_rows::<3>(0);
-            tube.circle.radius += change[3];
+            tube.circle = changed(&tube.circle, &change.as_slice()[..6], scale);
             tube.radius += change[6];
         }
         Some(tube)
@@ -207,17 +187,8 @@ impl Images<'_> {
             let tangent = scale * tube.circle.tangent_at(angle);
             let (distance, by_point) = distance_of_curve(camera, &point, &tangent, &position)?;
             let arm = (point - tube.circle.center) / scale;
-            let by_turn = (tube.circle.axes).map(|axis| axis.cross(&arm).dot(&by_point));
-            let row = [
-                by_point.x,
-                by_point.y,
-                by_point.z,
-                by_point.dot(&tube.circle.toward(angle)),
-                by_turn[0],
-                by_turn[1],
-                by_point.dot(&normal),
-            ];
-            Some((SVector::from(row), -distance))
+            let row = by_circle(&tube.circle, angle, &arm, &by_point);
+            Some((row.push(by_point.dot(&normal)), -distance))
         };
         let rows: Vec<_> = samples.iter().filter_map(row).collect();
         if (rows.len() as f64) < FOUND * samples.len() as f64 {
