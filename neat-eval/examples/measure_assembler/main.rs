@@ -131,10 +131,11 @@ fn curves(dir: &Path, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Result<S
     if truth.curves.is_empty() {
         return Ok(String::new());
     }
-    // True curves come in pieces of 0.005.
+    // True curves come in pieces of 0.005, of which only whole spacings count: a twenty-fifth may
+    // be lost.
     let protocol = EdgePoints {
-        prediction: EdgeSampling::Spacing(0.001),
-        truth: EdgeSampling::Spacing(0.001),
+        prediction: EdgeSampling::Spacing(0.0002),
+        truth: EdgeSampling::Spacing(0.0002),
         thresholds: vec![NeatAbc::default().thresholds[0]],
         ..EdgePoints::edge_gaussians()
     };
