@@ -5,6 +5,9 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
+/// An arc covers more, in radians, and one that lacks no more is a whole circle.
+const MIN_SWEEP: f64 = 1e-9;
+
 /// An arc of a circle, or a whole one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CircularArc {
@@ -100,11 +103,20 @@ impl CircularArc {
         self.radius * self.sweep()
     }
 
+    /// Whether it is a whole circle.
+    pub fn is_closed(&self) -> bool {
+        self.sweep() > TAU - MIN_SWEEP
+    }
+
     /// Points along it, from end to end, that turn by at most `most` radians from one to the next.
+    /// The first and the last of a whole circle are the same.
     pub fn points(&self, most: f64) -> Vec<Vector3<f64>> {
         let count = (self.sweep() / most).ceil().max(1.0);
-        (0..=count as usize)
-            .map(|k| self.point_at(self.angles[0] + self.sweep() * k as f64 / count))
+        let last = if self.is_closed() { 0.0 } else { count };
+        let angle = |k: f64| self.angles[0] + self.sweep() * k / count;
+        (0..count as usize)
+            .map(|k| self.point_at(angle(k as f64)))
+            .chain([self.point_at(angle(last))])
             .collect()
     }
 
@@ -125,7 +137,7 @@ impl CircularArc {
             && self.radius.is_normal()
             && self.radius > 0.0
             && self.angles[0].is_finite()
-            && (0.0..TAU + 1e-9).contains(&self.sweep())
+            && (MIN_SWEEP..TAU + MIN_SWEEP).contains(&self.sweep())
     }
 
     /// Chords along it, from end to end, that turn by at most `most` radians from one to the next.
@@ -193,6 +205,21 @@ mod tests {
         assert!((moved.point_at(1.0) - (3.0 * arc.point_at(1.0) + Vector3::z())).norm() < 1e-12);
         let points = moved.points(0.1);
         assert_eq!(points.len(), 33);
+        let whole = CircularArc {
+            angles: [0.3, 0.3 + TAU],
+            ..arc
+        };
+        let around = whole.points(0.1);
+        assert!(whole.is_closed() && !arc.is_closed());
+        assert_eq!((around.len(), around[0]), (64, around[63]));
+        assert!(
+            whole.is_valid()
+                && !CircularArc {
+                    angles: [1.0; 2],
+                    ..arc
+                }
+                .is_valid()
+        );
         assert!((points[32] - Vector3::new(-3.0, 0.0, 1.0)).norm() < 1e-12);
     }
 }

@@ -44,10 +44,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let report = |name: &str, format, options: &ExportOptions| {
         let written = export(&document, &out.join(name), format, options)?;
         println!(
-            "{name}: {} junctions, {} edges",
-            written.junctions, written.edges
+            "{name}: {} junctions, {} edges, {} arcs",
+            written.junctions, written.edges, written.arcs
         );
-        for sentence in written.left_out {
+        for sentence in written.remarks {
             println!("  {sentence}");
         }
         Ok::<_, Box<dyn std::error::Error>>(())

@@ -1,4 +1,4 @@
-//! DXF of AutoCAD Release 12: `LINE` entities on layers by confidence.
+//! DXF of AutoCAD Release 12: `LINE` entities on layers by confidence, and `ARC`s and `CIRCLE`s.
 //!
 //! Release 12 is the version that every CAD program reads. It states no unit and
 //! shares no vertices; lines that meet have the same numbers at their ends, and all
@@ -7,11 +7,14 @@
 use crate::target::Target;
 use crate::{Confidence, ExportError};
 use nalgebra::Vector3;
+use neat_core::CircularArc;
 use neat_wireframe::export::WireframeDocument;
 use std::fmt::{Display, Write};
 
-/// Layer of the junctions.
+/// Layer of the junctions …
 const JUNCTIONS: &str = "JUNCTIONS";
+/// … and of the arcs, whose confidence nobody knows.
+const ARCS: &str = "ARCS";
 
 /// Writes a DXF file.
 pub fn write(to: &mut Target) -> Result<(), ExportError> {
@@ -34,9 +37,10 @@ fn text(document: &WireframeDocument) -> String {
             dxf.group(73, 0);
             dxf.number(40, 0.0);
         });
-        dxf.table("LAYER", Confidence::ALL.len() + 2, |dxf| {
+        dxf.table("LAYER", Confidence::ALL.len() + 3, |dxf| {
             dxf.layer("0", 7);
             dxf.layer(JUNCTIONS, 8);
+            dxf.layer(ARCS, 3);
             for class in Confidence::ALL {
                 dxf.layer(layer(class), color_number(class));
             }
@@ -48,6 +52,9 @@ fn text(document: &WireframeDocument) -> String {
             dxf.group(8, layer(class));
             dxf.point(10, &document.junctions[*a]);
             dxf.point(11, &document.junctions[*b]);
+        }
+        for arc in &document.arcs {
+            dxf.arc(arc);
         }
         for junction in &document.junctions {
             dxf.group(0, "POINT");
@@ -100,6 +107,32 @@ impl Dxf {
         self.number(code, point.x);
         self.number(code + 10, point.y);
         self.number(code + 20, point.z);
+    }
+
+    /// Centre and angles are in the *object coordinate system*, whose third axis is the normal and
+    /// whose first one is that of the format's arbitrary axis algorithm.
+    fn arc(&mut self, arc: &CircularArc) {
+        let normal = arc.normal().normalize();
+        let is_along_z = normal.x.abs().max(normal.y.abs()) < 1.0 / 64.0;
+        let beside = if is_along_z {
+            Vector3::y()
+        } else {
+            Vector3::z()
+        };
+        let x = beside.cross(&normal).normalize();
+        let y = normal.cross(&x);
+        let center = [x, y, normal].map(|axis| axis.dot(&arc.center));
+        self.group(0, if arc.is_closed() { "CIRCLE" } else { "ARC" });
+        self.group(8, ARCS);
+        self.point(10, &center.into());
+        self.number(40, arc.radius);
+        if !arc.is_closed() {
+            let turn = arc.axes[0].dot(&y).atan2(arc.axes[0].dot(&x));
+            for (code, angle) in [(50, arc.angles[0]), (51, arc.angles[1])] {
+                self.number(code, (turn + angle).to_degrees().rem_euclid(360.0));
+            }
+        }
+        self.point(210, &normal);
     }
 
     fn layer(&mut self, name: &str, color: u8) {

@@ -40,8 +40,8 @@ impl EdgeFilter {
 
     /// The document with the edges that pass, in their order, and the junctions
     /// that they join. Fields, covariances and support follow; the metadata say
-    /// what was asked for. Without any minimum, the document as it is, junctions
-    /// without edges too.
+    /// what was asked for. Arcs all stay: nothing is known of them that a filter asks. Without any
+    /// minimum, the document as it is, junctions without edges too.
     ///
     /// The document must be valid, see [`WireframeDocument::check`].
     ///

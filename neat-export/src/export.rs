@@ -2,7 +2,7 @@
 
 use crate::format::Format;
 use crate::target::{Target, Written};
-use crate::{ExportError, ExportOptions};
+use crate::{EdgeFilter, ExportError, ExportOptions};
 use neat_wireframe::export::WireframeDocument;
 use std::path::Path;
 
@@ -32,9 +32,14 @@ pub fn export(
             files: vec![path.into()],
             junctions: document.junctions.len(),
             edges: document.edges.len(),
-            left_out: Vec::new(),
+            arcs: document.arcs.len(),
+            remarks: Vec::new(),
         },
     };
+    if options.filter != EdgeFilter::default() && !document.arcs.is_empty() {
+        let sentence = "arcs have neither a probability nor a kind, so the filter leaves out none";
+        target.written.remarks.push(sentence.to_owned());
+    }
     format.write(&mut target)?;
     Ok(target.written)
 }

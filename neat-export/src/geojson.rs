@@ -1,5 +1,5 @@
-//! GeoJSON (RFC 7946): a `LineString` with z per edge, a `Point` per junction
-//! without edges.
+//! GeoJSON (RFC 7946): a `LineString` with z per edge and one of many points per arc, a `Point`
+//! per junction without edges.
 //!
 //! The RFC means WGS 84 longitude and latitude. Coordinates are written as they are
 //! in the document instead, which programs accept when told the reference system;
@@ -8,6 +8,7 @@
 use crate::isolated::isolated_junctions;
 use crate::target::Target;
 use crate::{Confidence, ExportError};
+use neat_wireframe::export::WireframeDocument;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 
@@ -26,6 +27,17 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
         let line = json!({"type": "LineString", "coordinates": [position(*a), position(*b)]});
         feature(line, properties)
     });
+    let arcs = document.arcs.iter().enumerate().map(|(index, arc)| {
+        let points = arc.points(WireframeDocument::TURN_OF_DRAWN_ARCS);
+        let line = json!({"type": "LineString", "coordinates": points});
+        let properties = json!({
+            "arc": index,
+            "center": arc.center,
+            "normal": arc.normal(),
+            "radius": arc.radius,
+        });
+        json!({"type": "Feature", "geometry": line, "properties": properties})
+    });
     let isolated = isolated_junctions(document).into_iter().map(|junction| {
         let mut properties = fields(&junction_fields, junction);
         properties.insert("junction".into(), junction.into());
@@ -35,7 +47,7 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
     let collection = json!({
         "type": "FeatureCollection",
         "coordinate_frame": "the frame of the reconstructed scene, not WGS 84",
-        "features": edges.chain(isolated).collect::<Vec<_>>(),
+        "features": edges.chain(arcs).chain(isolated).collect::<Vec<_>>(),
     });
     to.write(format!("{collection}\n"))
 }

@@ -2,10 +2,11 @@
 //!
 //! Positions are 32-bit numbers from the centre of the wireframe, which is the
 //! translation of the node: coordinates far from the origin keep their accuracy.
-//! Every class of confidence is a primitive with a colour of its own; all use the
-//! same positions. Axes and unit are those of the document, although glTF means
+//! Every class of confidence and the arcs, as chains of straight pieces, are a primitive with a
+//! colour of its own; all use the same positions. Axes and unit are those of the document, although glTF means
 //! metres with +Y up.
 
+use crate::drawn::Drawn;
 use crate::isolated::isolated_junctions;
 use crate::target::Target;
 use crate::{Confidence, ExportError};
@@ -87,15 +88,16 @@ impl Asset {
             data: Vec::new(),
         };
         // Empty arrays are not allowed: a scene without nodes is.
-        if document.junctions.is_empty() {
+        let drawn = Drawn::new(document);
+        let junctions = &drawn.wireframe.junctions;
+        if junctions.is_empty() {
             return Some(asset);
         }
-        let (center, extent) = center_and_extent(&document.junctions);
+        let (center, extent) = center_and_extent(junctions);
         if extent > 0.0 && !EXTENTS.contains(&extent) {
             return None;
         }
-        let positions: Vec<Vector3<f32>> = document
-            .junctions
+        let positions: Vec<Vector3<f32>> = junctions
             .iter()
             .map(|p| (p - center).map(|x| x as f32))
             .collect();
@@ -106,17 +108,18 @@ impl Asset {
             "translation": [center.x, center.y, center.z],
         }]);
         let position = asset.add_positions(&positions);
-        let primitives = asset.add_primitives(document, position)?;
+        let primitives = asset.add_primitives(&drawn, &isolated_junctions(document), position)?;
         asset.json["meshes"] = json!([{"name": "wireframe", "primitives": primitives}]);
         asset.json["extensionsUsed"] = json!(["KHR_materials_unlit"]);
         asset.json["buffers"] = json!([{"byteLength": asset.data.len()}]);
         Some(asset)
     }
 
-    /// One primitive per class of confidence, and one for junctions without edges.
+    /// One primitive per group, and one for junctions without edges.
     fn add_primitives(
         &mut self,
-        document: &WireframeDocument,
+        drawn: &Drawn,
+        isolated: &[usize],
         position: usize,
     ) -> Option<Vec<Value>> {
         let mut primitives = Vec::new();
@@ -140,12 +143,11 @@ impl Asset {
             }));
             Some(())
         };
-        for (class, edges) in Confidence::groups(document) {
-            let ends: Vec<usize> = edges.iter().flat_map(|e| document.edges[*e]).collect();
-            add(class.name(), class.color(), LINES, &ends)?;
+        for (name, color, edges) in &drawn.groups {
+            let ends = edges.iter().flat_map(|e| drawn.wireframe.edges[*e]);
+            add(name, *color, LINES, &ends.collect::<Vec<_>>())?;
         }
-        let isolated = isolated_junctions(document);
-        add("isolated", Confidence::Unknown.color(), POINTS, &isolated)?;
+        add("isolated", Confidence::Unknown.color(), POINTS, isolated)?;
         self.json["materials"] = materials.into();
         Some(primitives)
     }

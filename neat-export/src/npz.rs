@@ -2,12 +2,15 @@
 
 use crate::ExportError;
 use crate::target::Target;
+use nalgebra::Vector3;
+use neat_core::CircularArc;
 use neat_core::npz::{NpyArray, NpyIntegers, write_npz_with_integers};
 use std::collections::BTreeMap;
 
 /// Writes `lines3d` `[E, 2, 3]`, the one array of the published code's
 /// `…-wfi_checked.npz` (`neat-final-parsing.py`), and beside it `junctions` `[J, 3]`
-/// and `edges` `[E, 2]`, by which lines share their ends. All numbers have 64 bits.
+/// and `edges` `[E, 2]`, by which lines share their ends; of arcs `arc_centers` `[A, 3]`,
+/// `arc_axes` `[A, 2, 3]`, `arc_radii` `[A]` and `arc_angles` `[A, 2]`. All numbers have 64 bits.
 pub fn write(to: &mut Target) -> Result<(), ExportError> {
     let document = to.document;
     let ends = document.edges.iter().flatten();
@@ -26,9 +29,21 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
         shape: vec![document.edges.len(), 2],
         values: ends.map(|end| *end as i64).collect(),
     };
+    let of_arcs = |shape: &[usize], values: &dyn Fn(&CircularArc) -> Vec<f64>| NpyArray {
+        shape: [&[document.arcs.len()], shape].concat(),
+        values: document.arcs.iter().flat_map(values).collect(),
+    };
+    let numbers = |points: &[Vector3<f64>]| points.iter().flatten().copied().collect();
     Ok(write_npz_with_integers(
         to.path,
-        &BTreeMap::from([("junctions", junctions), ("lines3d", lines3d)]),
+        &BTreeMap::from([
+            ("junctions", junctions),
+            ("lines3d", lines3d),
+            ("arc_centers", of_arcs(&[3], &|arc| numbers(&[arc.center]))),
+            ("arc_axes", of_arcs(&[2, 3], &|arc| numbers(&arc.axes))),
+            ("arc_radii", of_arcs(&[], &|arc| vec![arc.radius])),
+            ("arc_angles", of_arcs(&[2], &|arc| arc.angles.to_vec())),
+        ]),
         &BTreeMap::from([("edges", edges)]),
     )?)
 }

@@ -61,9 +61,6 @@ pub struct Drawing {
     /// What lies in the centre of the picture: right and up, in units of the
     /// document.
     pub center: Vector2<f64>,
-    /// The points in pixels: x to the right, y down, (0, 0) the corner at the top
-    /// left.
-    pub points: Vec<Vector2<f64>>,
 }
 
 impl Drawing {
@@ -89,19 +86,22 @@ impl Drawing {
         let scale = if fitting.is_finite() { fitting } else { 1.0 };
         let height = (extent.y * scale + 2.0 * margin).ceil().min(width.into());
         let center = low / 2.0 + high / 2.0;
-        let middle = Vector2::new(f64::from(width), height) / 2.0;
-        let to_pixel = |p: &Vector2<f64>| {
-            let from_middle = (p - center) * scale;
-            middle + Vector2::new(from_middle.x, -from_middle.y)
-        };
         Some(Self {
             direction,
             width,
             height: height as u32,
             scale,
             center,
-            points: projected.iter().map(to_pixel).collect(),
         })
+    }
+
+    /// Where a point lies in pixels: x to the right, y down, (0, 0) the corner at the top left.
+    pub fn project(&self, point: &Vector3<f64>) -> Vector2<f64> {
+        let [right, up] = self.direction.right_and_up();
+        let in_units = Vector2::new(right.dot(point), up.dot(point));
+        let from_middle = (in_units - self.center) * self.scale;
+        let middle = Vector2::new(f64::from(self.width), f64::from(self.height)) / 2.0;
+        middle + Vector2::new(from_middle.x, -from_middle.y)
     }
 
     /// A line width for so many edges: with many, thick lines would hide each other.
@@ -138,34 +138,29 @@ mod tests {
         let drawing = Drawing::new(&points, ViewDirection::Front, 1000).unwrap();
         assert_eq!((drawing.width, drawing.height), (1000, 310));
         let expected = [[40.0, 270.0], [960.0, 40.0]].map(Vector2::from);
-        for (pixel, expected) in drawing.points.iter().zip(expected) {
+        for (point, expected) in points.iter().zip(expected) {
+            let pixel = drawing.project(point);
             assert!((pixel - expected).norm() < 1e-9, "{pixel}");
         }
         // Taller than wide: the height is limited, the margin stays.
         let drawing = Drawing::new(&points, ViewDirection::Side, 1000).unwrap();
-        assert!(
-            drawing
-                .points
-                .iter()
-                .all(|p| p.min() > 39.9 && p.max() < 960.1)
-        );
+        for point in &points {
+            let pixel = drawing.project(point);
+            assert!(pixel.min() > 39.9 && pixel.max() < 960.1);
+        }
     }
 
     #[test]
     fn few_and_far_points_are_no_problem() {
         for points in [vec![], vec![Vector3::new(3.0, 4.0, 5.0)]] {
             let drawing = Drawing::new(&points, ViewDirection::Top, 100).unwrap();
-            assert_eq!(drawing.points.len(), points.len());
-            assert!(drawing.points.iter().all(|p| p.x == 50.0));
+            assert!(points.iter().all(|p| drawing.project(p).x == 50.0));
         }
         let close = [Vector3::zeros(), Vector3::repeat(5e-324)];
         let drawing = Drawing::new(&close, ViewDirection::Isometric, 100).unwrap();
-        assert!(
-            drawing
-                .points
-                .iter()
-                .all(|p| p.iter().all(|x| x.is_finite()))
-        );
+        for point in &close {
+            assert!(drawing.project(point).iter().all(|x| x.is_finite()));
+        }
         let far = [Vector3::repeat(f64::MAX), Vector3::repeat(-f64::MAX)];
         assert!(Drawing::new(&far, ViewDirection::Isometric, 100).is_none());
     }

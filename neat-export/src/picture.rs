@@ -1,8 +1,9 @@
 //! PNG: an orthographic view with smooth lines.
 
+use crate::ExportError;
+use crate::drawn::Drawn;
 use crate::orthographic::Drawing;
 use crate::target::Target;
-use crate::{Confidence, ExportError};
 use image::{Rgb, RgbImage};
 use nalgebra::Vector2;
 use neat_core::{LineSegment, LineSegment2, file};
@@ -20,15 +21,18 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
 fn draw(document: &WireframeDocument, drawing: &Drawing) -> RgbImage {
     let mut image = RgbImage::from_pixel(drawing.width, drawing.height, Rgb([255; 3]));
     let radius = drawing.line_width(document.edges.len()) / 2.0;
-    for (class, edges) in Confidence::groups(document) {
+    let Drawn { wireframe, groups } = Drawn::new(document);
+    for (_, color, edges) in groups {
         for edge in edges {
-            let [start, end] = document.edges[edge].map(|junction| drawing.points[junction]);
+            let ends = wireframe.edges[edge];
+            let [start, end] = ends.map(|end| drawing.project(&wireframe.junctions[end]));
             let segment = LineSegment::new(start, end);
-            draw_segment(&mut image, &segment, radius, class.color());
+            draw_segment(&mut image, &segment, radius, color);
         }
     }
-    for point in &drawing.points {
-        let dot = LineSegment::new(*point, *point);
+    for junction in &document.junctions {
+        let point = drawing.project(junction);
+        let dot = LineSegment::new(point, point);
         draw_segment(&mut image, &dot, 2.0 * radius, JUNCTION_COLOR);
     }
     image

@@ -1,6 +1,7 @@
 //! STEP (ISO 10303-21) with an edge-based wireframe of AP214.
 //!
-//! Every junction is one `VERTEX_POINT`, which its `EDGE_CURVE`s share. Open CASCADE
+//! Every junction is one `VERTEX_POINT`, which its `EDGE_CURVE`s share. Arcs are `EDGE_CURVE`s of
+//! `CIRCLE`s between vertices of their own; a whole circle begins and ends at one. Open CASCADE
 //! joins the edges of a `CONNECTED_EDGE_SET` to one wire and moves vertices where
 //! more than two edges meet; so every edge is a set of its own, and its reader keeps
 //! positions and shared vertices.
@@ -8,6 +9,7 @@
 use crate::target::Target;
 use crate::{ExportError, LengthUnit};
 use nalgebra::Vector3;
+use neat_core::CircularArc;
 use std::fmt::Write;
 
 /// Writes a STEP file.
@@ -47,6 +49,9 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
         sets.push(step.add(&format!("CONNECTED_EDGE_SET('',({edge}))")));
         (lonely[a], lonely[b]) = (false, false);
     }
+    let lines = sets.len();
+    sets.extend(document.arcs.iter().filter_map(|arc| step.arc(arc)));
+    let arcs = sets.len() - lines;
     let representation = if sets.is_empty() {
         format!("SHAPE_REPRESENTATION('',({placement}),{geometry})")
     } else {
@@ -63,13 +68,11 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
     // A line needs a direction, and a vertex an edge.
     let lonely = lonely.iter().filter(|lonely| **lonely).count();
     for (count, what) in [
-        (document.edges.len() - sets.len(), "edges without length"),
+        (document.edges.len() - lines, "edges without length"),
         (lonely, "junctions without edges"),
+        (document.arcs.len() - arcs, "arcs without length"),
     ] {
-        if count > 0 {
-            let sentence = format!("a STEP wireframe has no {what}: {count} left out");
-            to.written.left_out.push(sentence);
-        }
+        to.leave_out(count, &format!("a STEP wireframe has no {what}"));
     }
     to.write(step.file())
 }
@@ -99,6 +102,31 @@ impl Entities {
 
     fn point(&mut self, point: &Vector3<f64>) -> String {
         self.add(&format!("CARTESIAN_POINT('',{})", triple(point)))
+    }
+
+    /// An arc as a set of its own; `None` if its ends are the same numbers.
+    fn arc(&mut self, arc: &CircularArc) -> Option<String> {
+        let [start, end] = arc.angles.map(|angle| arc.point_at(angle));
+        if start == end && !arc.is_closed() {
+            return None;
+        }
+        let center = self.point(&arc.center);
+        let [normal, x] = [arc.normal().normalize(), arc.axes[0]]
+            .map(|axis| self.add(&format!("DIRECTION('',{})", triple(&axis))));
+        let placement = self.add(&format!("AXIS2_PLACEMENT_3D('',{center},{normal},{x})"));
+        let circle = self.add(&format!("CIRCLE('',{placement},{})", real(arc.radius)));
+        let mut vertex = |point| {
+            let point = self.point(point);
+            self.add(&format!("VERTEX_POINT('',{point})"))
+        };
+        let from = vertex(&start);
+        let to = if arc.is_closed() {
+            from.clone()
+        } else {
+            vertex(&end)
+        };
+        let edge = self.add(&format!("EDGE_CURVE('',{from},{to},{circle},.T.)"));
+        Some(self.add(&format!("CONNECTED_EDGE_SET('',({edge}))")))
     }
 
     /// The product whose shape the wireframe is.

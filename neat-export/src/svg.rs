@@ -1,9 +1,12 @@
-//! SVG 1.1: an orthographic view with a group per class of confidence.
+//! SVG 1.1: an orthographic view with a group per class of confidence and one of arcs, which are
+//! elliptical arcs.
 //!
 //! Coordinates are pixels, to a millionth; the attributes `data-scale` and
 //! `data-center` of the root lead back to the units of the document:
 //! right = center₀ + (x − width / 2) / scale, up = center₁ − (y − height / 2) / scale.
 
+use crate::drawn::{ARC_COLOR, ARCS};
+use crate::projected_arc::elliptical_path;
 use crate::target::Target;
 use crate::{Confidence, ExportError};
 use std::fmt::Write;
@@ -34,17 +37,22 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
         drawing.center.y,
         escaped(to.title()),
     );
-    for (class, edges) in Confidence::groups(document) {
-        let (name, [red, green, blue]) = (class.name(), class.color());
-        let _ = writeln!(
-            svg,
-            "<g id=\"confidence-{name}\" stroke=\"#{red:02x}{green:02x}{blue:02x}\" \
+    let group = |id: &str, title: &str, [red, green, blue]: [u8; 3]| {
+        format!(
+            "<g id=\"{id}\" fill=\"none\" stroke=\"#{red:02x}{green:02x}{blue:02x}\" \
              stroke-width=\"{line_width:.3}\" stroke-linecap=\"round\">\n\
-             <title>confidence: {name}</title>"
+             <title>{title}</title>\n"
+        )
+    };
+    for (class, edges) in Confidence::groups(document) {
+        let (id, title) = (
+            ["confidence-", class.name()],
+            ["confidence: ", class.name()],
         );
+        svg.push_str(&group(&id.concat(), &title.concat(), class.color()));
         for edge in edges {
             let [a, b] = document.edges[edge];
-            let [start, end] = [a, b].map(|junction| drawing.points[junction]);
+            let [start, end] = [a, b].map(|end| drawing.project(&document.junctions[end]));
             let _ = writeln!(
                 svg,
                 "<line data-edge=\"{edge}\" data-junctions=\"{a} {b}\" \
@@ -54,8 +62,16 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
         }
         svg.push_str("</g>\n");
     }
+    if !document.arcs.is_empty() {
+        svg.push_str(&group(ARCS, ARCS, ARC_COLOR));
+        for (index, arc) in document.arcs.iter().enumerate() {
+            let path = elliptical_path(arc, &drawing);
+            let _ = writeln!(svg, "<path data-arc=\"{index}\" d=\"{path}\"/>");
+        }
+        svg.push_str("</g>\n");
+    }
     svg.push_str("<g id=\"junctions\" fill=\"#111111\">\n");
-    for point in &drawing.points {
+    for point in document.junctions.iter().map(|p| drawing.project(p)) {
         let _ = writeln!(
             svg,
             "<circle cx=\"{:.6}\" cy=\"{:.6}\" r=\"{line_width:.3}\"/>",

@@ -15,9 +15,11 @@ pub struct Written {
     pub junctions: usize,
     /// Number of edges that passed the filter.
     pub edges: usize,
-    /// What the format has no words for and the files therefore lack, one sentence
-    /// each.
-    pub left_out: Vec<String>,
+    /// Number of arcs, which no filter leaves out.
+    pub arcs: usize,
+    /// What the format has no words for and the files therefore lack, and what no filter could
+    /// judge, one sentence each.
+    pub remarks: Vec<String>,
 }
 
 /// A valid document, and where and how to write it.
@@ -52,8 +54,19 @@ impl Target<'_> {
     /// If no picture can hold the extent of the wireframe.
     pub fn drawing(&self) -> Result<Drawing, ExportError> {
         let options = self.options;
-        Drawing::new(&self.document.junctions, options.direction, options.width)
-            .ok_or_else(|| self.out_of_range())
+        Drawing::new(
+            &self.document.drawn().junctions,
+            options.direction,
+            options.width,
+        )
+        .ok_or_else(|| self.out_of_range())
+    }
+
+    /// Says, if there are some, that so many things are not in the files.
+    pub fn leave_out(&mut self, count: usize, sentence: &str) {
+        if count > 0 {
+            (self.written.remarks).push(format!("{sentence}: {count} left out"));
+        }
     }
 
     /// That the format has no numbers for the extent of the wireframe.

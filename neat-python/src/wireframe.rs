@@ -230,7 +230,7 @@ impl Wireframe {
         let written = background::run(py, None, move || {
             Ok(write_as(&document, &path, format, &options)?)
         })?;
-        for sentence in written.left_out {
+        for sentence in written.remarks {
             warn(py, &sentence)?;
         }
         Ok(written.files)

@@ -196,12 +196,16 @@ impl ExportArgs {
         }
         let document = read_json(&json).map_err(ExportError::from)?;
         let written = export(&document, &out, format, &options)?;
-        for sentence in &written.left_out {
+        for sentence in &written.remarks {
             output::warning(sentence);
         }
         let (junctions, edges) = (written.junctions, written.edges);
+        let arcs = match written.arcs {
+            0 => String::new(),
+            arcs => format!(", {arcs} arcs"),
+        };
         output::print(&format!(
-            "{format}: {junctions} junctions, {edges} edges: {out}",
+            "{format}: {junctions} junctions, {edges} edges{arcs}: {out}",
             format = format.name(),
             out = out.display()
         ))

@@ -126,12 +126,11 @@ impl Session<'_> {
             metadata: self.metadata(distilled, agreement),
             ..distilled.document(&self.scene)
         };
-        let original = document.wireframe();
         let [json, obj, ply, png] =
             ["json", "obj", "ply", "png"].map(|extension| self.dir.wireframe(extension));
         write_json(&json, &document)?;
-        write_obj(&obj, &original)?;
-        write_ply(&ply, &original)?;
+        write_obj(&obj, &document.drawn())?;
+        write_ply(&ply, &document.drawn())?;
         write_png(&png, &draw_wireframe(in_world, arcs, &self.scene))?;
         let mut written = vec![json, obj, ply, png];
 
@@ -163,7 +162,7 @@ impl Session<'_> {
         for path in written {
             self.written(path);
         }
-        Ok((original, document))
+        Ok((document.wireframe(), document))
     }
 
     fn metadata(

@@ -71,9 +71,9 @@ pub struct SupportingSegment {
 }
 
 impl WireframeDocument {
-    /// What draws arcs as chains of straight pieces turns by so much at most, in radians: a
-    /// circle of 500 pixels is drawn to half a pixel.
-    pub const TURN_OF_DRAWN_ARCS: f64 = 0.09;
+    /// What draws arcs as chains of straight pieces turns by so much at most, in radians: they
+    /// leave the arc by less than a thousandth of its radius.
+    pub const TURN_OF_DRAWN_ARCS: f64 = 0.089;
 
     /// The bare graph, without fields or metadata.
     pub fn wireframe(&self) -> Wireframe3d {
@@ -81,6 +81,25 @@ impl WireframeDocument {
             junctions: self.junctions.clone(),
             edges: self.edges.clone(),
         }
+    }
+
+    /// The graph with arcs as chains of straight pieces, for what knows no arcs: behind the
+    /// junctions the points of one arc after the other, behind the edges their pieces. Arcs share
+    /// no points; the ends of a whole circle are one.
+    pub fn drawn(&self) -> Wireframe3d {
+        let mut drawn = self.wireframe();
+        for arc in &self.arcs {
+            let mut points = arc.points(Self::TURN_OF_DRAWN_ARCS);
+            if arc.is_closed() {
+                points.pop();
+            }
+            let (first, count) = (drawn.junctions.len(), points.len());
+            let pieces = count - usize::from(!arc.is_closed());
+            let piece = |k: usize| [first + k, first + (k + 1) % count];
+            drawn.edges.extend((0..pieces).map(piece));
+            drawn.junctions.extend(points);
+        }
+        drawn
     }
 
     /// Checks everything that [`write_json`] and every other export rely on; `path`
