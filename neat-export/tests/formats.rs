@@ -257,8 +257,8 @@ fn what_step_lacks_is_said() {
     let written = export(&document, &path, Format::Step, &options).unwrap();
     assert_eq!((written.junctions, written.edges), (4, 2));
     assert_eq!(written.files, std::slice::from_ref(&path));
-    let [edges, vertices] = &written.left_out[..] else {
-        panic!("{:?}", written.left_out);
+    let [edges, vertices] = &written.remarks[..] else {
+        panic!("{:?}", written.remarks);
     };
     assert!(edges.ends_with("edges without length: 1 left out"));
     // The junction of that edge is alone, too.
@@ -434,7 +434,7 @@ proptest! {
                 Ok(written) if EXACT.contains(&format) => {
                     let read = parse(&path, format);
                     prop_assert_eq!(bits(&read.junctions), bits(&document.junctions));
-                    if written.left_out.is_empty() {
+                    if written.remarks.is_empty() {
                         prop_assert_eq!(positions(&read), positions(&document.wireframe()));
                     }
                 }

@@ -157,7 +157,7 @@ impl Images<'_> {
 
     /// The run of sectors, of an arc and so much of it `beyond` each of its ends, that the images
     /// speak for most.
-    fn speaking_sectors(
+    pub(super) fn speaking_sectors(
         &self,
         arc: &CircularArc,
         pixel: f64,
@@ -264,7 +264,7 @@ impl Images<'_> {
     }
 
     /// Samples of a part of an arc in a view; `None` where it does not see enough of it.
-    fn samples_of_sector(
+    pub(super) fn samples_of_sector(
         &self,
         view: usize,
         arc: &CircularArc,

@@ -8,6 +8,7 @@ use super::line_selection::{Chord, Selection, claim_edgels, select_chords};
 use super::progress::OnProgress;
 use super::proposals;
 use super::view_segments::PreparedView;
+use super::wander::retain_steady;
 use neat_core::CircularArc;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -52,7 +53,9 @@ pub(super) fn find_arcs(
         claim_edgels(images, &line.line, &mut taken);
     }
     let grown = grown_arcs(images, &chords);
-    ControlFlow::Continue(chosen_arcs(images, grown, taken, config.min_evidence))
+    let mut arcs = chosen_arcs(images, grown, taken, config.min_evidence);
+    retain_steady(images, &mut arcs);
+    ControlFlow::Continue(arcs)
 }
 
 /// The arcs around chords, as far as the images show them.

@@ -52,6 +52,7 @@ mod straightness;
 mod swept_tubes;
 mod tangent_ends;
 mod view_segments;
+mod wander;
 
 #[cfg(test)]
 mod test_views;
