@@ -34,6 +34,7 @@ pub mod bundle_adjustment;
 pub mod confidence;
 pub mod dimensions;
 pub mod export;
+pub mod faces;
 pub mod kinds;
 pub mod metrics;
 pub mod paper;

@@ -1,0 +1,261 @@
+//! The exact geometry of a shell: its vertices and arcs where its surfaces meet, and what it
+//! encloses.
+//!
+//! Measured junctions lie off the planes of their faces by the noise of the measurement. A
+//! boundary representation wants them on all of them; they move by the shortest way that leads
+//! there.
+
+use super::curves::nearest_junctions;
+use super::face::{CurveIndex, Face, Shell, Step, Surface};
+use super::plane_fit::across;
+use nalgebra::{DMatrix, DVector, Vector3};
+use neat_core::{CircularArc, Wireframe3d};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// Surfaces whose normals differ by a smaller sine do not say where along them they meet.
+const MIN_SINGULAR: f64 = 0.05;
+/// Cylinders are not flat: the way to them is gone in so many steps.
+const STEPS: usize = 4;
+
+/// A curve as a shell has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShellCurve {
+    /// The junctions at its start and end; `None` for a whole circle.
+    pub ends: Option<[usize; 2]>,
+    /// The arc, if it is one. Whole circles of one axis start in the same direction.
+    pub arc: Option<CircularArc>,
+}
+
+/// Vertices and curves of one shell, by their indices in the wireframe.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ShellGeometry {
+    /// The junctions at which its curves end.
+    pub vertices: BTreeMap<usize, Vector3<f64>>,
+    /// Its edges and arcs.
+    pub curves: BTreeMap<CurveIndex, ShellCurve>,
+}
+
+impl ShellGeometry {
+    /// Of a shell of a wireframe in the same frame.
+    ///
+    /// # Panics
+    /// If the shell names curves that the wireframe does not have.
+    pub fn new(shell: &Shell, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Self {
+        let mut surfaces_of: BTreeMap<CurveIndex, Vec<Surface>> = BTreeMap::new();
+        let mut curves = BTreeMap::new();
+        for face in &shell.faces {
+            for steps in &face.loops {
+                for step in steps {
+                    surfaces_of.entry(step.curve).or_default().push(face.surface);
+                    let curve = match step.curve {
+                        CurveIndex::Edge(edge) => ShellCurve {
+                            ends: Some(wireframe.edges[edge]),
+                            arc: None,
+                        },
+                        CurveIndex::Arc(arc) => ShellCurve {
+                            ends: (steps.len() > 1)
+                                .then(|| nearest_junctions(&arcs[arc], &wireframe.junctions))
+                                .flatten(),
+                            arc: Some(arcs[arc]),
+                        },
+                    };
+                    curves.insert(step.curve, curve);
+                }
+            }
+        }
+        let mut surfaces_at: BTreeMap<usize, Vec<Surface>> = BTreeMap::new();
+        for (index, curve) in &curves {
+            for end in curve.ends.iter().flatten() {
+                surfaces_at.entry(*end).or_default().extend(&surfaces_of[index]);
+            }
+        }
+        let vertices = (surfaces_at.into_iter())
+            .map(|(j, surfaces)| (j, on_surfaces(wireframe.junctions[j], &surfaces)))
+            .collect();
+        for (index, curve) in &mut curves {
+            if let Some(arc) = &mut curve.arc {
+                *arc = arc_on_surfaces(arc, &surfaces_of[index]);
+                match curve.ends {
+                    None => *arc = whole_circle(arc),
+                    Some(ends) => *arc = between(arc, ends, &vertices),
+                }
+            }
+        }
+        Self { vertices, curves }
+    }
+
+    /// Points along a step, both ends among them; arcs turn by `most` radians at most from one to
+    /// the next. The first and the last of a circle are the same.
+    pub fn points(&self, step: &Step, most: f64) -> Vec<Vector3<f64>> {
+        let curve = &self.curves[&step.curve];
+        let mut points = match (&curve.arc, curve.ends) {
+            (Some(arc), _) => arc.points(most),
+            (None, ends) => ends.iter().flatten().map(|end| self.vertices[end]).collect(),
+        };
+        if let (Some(ends), [first, .., last]) = (curve.ends, &mut points[..]) {
+            [*first, *last] = ends.map(|end| self.vertices[&end]);
+        }
+        if step.reversed {
+            points.reverse();
+        }
+        points
+    }
+
+    /// Area of a face.
+    pub fn area(&self, face: &Face) -> f64 {
+        match face.surface {
+            Surface::Plane { normal, .. } => normal.dot(&self.area_vector(face)),
+            Surface::Cylinder { .. } => self.moments_of_cylinder(face).0,
+        }
+    }
+
+    /// The volume that faces with their normals outward enclose, by Gauss' theorem for the field
+    /// x / 3: for a shell that is not closed it means nothing.
+    pub fn volume(&self, shell: &Shell) -> f64 {
+        let flux = |face: &Face| match face.surface {
+            Surface::Plane { normal, offset } => offset * normal.dot(&self.area_vector(face)),
+            Surface::Cylinder { .. } => self.moments_of_cylinder(face).1,
+        };
+        shell.faces.iter().map(flux).sum::<f64>() / 3.0
+    }
+
+    /// Half the integral of x × dx around a face.
+    fn area_vector(&self, face: &Face) -> Vector3<f64> {
+        let of_step = |step: &Step| {
+            let curve = &self.curves[&step.curve];
+            let sign = if step.reversed { -0.5 } else { 0.5 };
+            let ends = curve.ends.map(|ends| ends.map(|end| self.vertices[&end]));
+            let twice = match (&curve.arc, ends) {
+                (Some(arc), ends) => {
+                    let [start, end] = ends.unwrap_or([arc.point_at(arc.angles[0]); 2]);
+                    arc.center.cross(&(end - start))
+                        + arc.normal() * arc.radius.powi(2) * arc.sweep()
+                }
+                (None, Some([start, end])) => start.cross(&end),
+                (None, None) => Vector3::zeros(),
+            };
+            sign * twice
+        };
+        face.steps().map(of_step).sum()
+    }
+
+    /// Area of a cylinder, and the flux of x through it.
+    fn moments_of_cylinder(&self, face: &Face) -> (f64, f64) {
+        let Surface::Cylinder {
+            point,
+            axis,
+            radius,
+            convex,
+        } = face.surface
+        else {
+            return (0.0, 0.0);
+        };
+        let rims = face.steps().filter_map(|step| self.curves[&step.curve].arc);
+        let rims: Vec<CircularArc> = rims.collect();
+        let [one, other] = rims[..] else {
+            return (0.0, 0.0);
+        };
+        let height = axis.dot(&(other.center - one.center)).abs();
+        let area = radius * one.sweep() * height;
+        // The integral of the direction from the axis, over the angle.
+        let [start, end] = one.angles;
+        let outward = one.toward(end - 0.25 * TAU) - one.toward(start - 0.25 * TAU);
+        let flux = radius * area + radius * height * point.dot(&outward);
+        (area, if convex { flux } else { -flux })
+    }
+}
+
+/// The nearest point on all surfaces, or the best one if there is none.
+fn on_surfaces(start: Vector3<f64>, surfaces: &[Surface]) -> Vector3<f64> {
+    let mut position = start;
+    for _ in 0..STEPS {
+        let rows = surfaces.iter().map(|surface| height_over(surface, &position));
+        let rows: Vec<(Vector3<f64>, f64)> = rows.collect();
+        let normals = DMatrix::from_fn(rows.len(), 3, |i, k| rows[i].0[k]);
+        let heights = DVector::from_fn(rows.len(), |i, _| -rows[i].1);
+        let Ok(step) = normals.svd(true, true).solve(&heights, MIN_SINGULAR) else {
+            break;
+        };
+        position += Vector3::new(step[0], step[1], step[2]);
+    }
+    position
+}
+
+/// The normal of a surface near a point, and how far over it the point lies.
+fn height_over(surface: &Surface, at: &Vector3<f64>) -> (Vector3<f64>, f64) {
+    match surface {
+        Surface::Plane { normal, offset } => (*normal, normal.dot(at) - offset),
+        Surface::Cylinder {
+            point,
+            axis,
+            radius,
+            ..
+        } => {
+            let offset = at - point;
+            let across = offset - axis * axis.dot(&offset);
+            (across.normalize(), across.norm() - radius)
+        }
+    }
+}
+
+/// The circle of an arc in the plane of a face and around the axis of another.
+fn arc_on_surfaces(arc: &CircularArc, surfaces: &[Surface]) -> CircularArc {
+    let mut placed = *arc;
+    for surface in surfaces {
+        if let Surface::Cylinder {
+            point,
+            axis,
+            radius,
+            ..
+        } = surface
+        {
+            placed.center = point + axis * axis.dot(&(placed.center - point));
+            placed.radius = *radius;
+        }
+    }
+    let axis = surfaces.iter().find_map(|surface| match surface {
+        Surface::Cylinder { axis, .. } => Some(*axis),
+        Surface::Plane { .. } => None,
+    });
+    let plane = surfaces.iter().find_map(|surface| match surface {
+        Surface::Plane { normal, offset } => Some((*normal, *offset)),
+        Surface::Cylinder { .. } => None,
+    });
+    if let Some((normal, offset)) = plane {
+        let along = axis.unwrap_or(normal);
+        let height = normal.dot(&placed.center) - offset;
+        placed.center -= along * height / normal.dot(&along);
+        let up = normal * normal.dot(&arc.normal()).signum();
+        let x = (placed.axes[0] - up * up.dot(&placed.axes[0])).normalize();
+        placed.axes = [x, up.cross(&x)];
+    }
+    placed
+}
+
+/// The whole circle, with its start where all circles of this axis have it.
+fn whole_circle(arc: &CircularArc) -> CircularArc {
+    let normal = arc.normal();
+    // The same for both directions of the axis.
+    let axis = normal * normal[normal.iamax()].signum();
+    let [x, _] = across(&axis);
+    let x = (x - normal * normal.dot(&x)).normalize();
+    CircularArc {
+        axes: [x, normal.cross(&x)],
+        angles: [0.0, TAU],
+        ..*arc
+    }
+}
+
+/// The arc from one vertex to the other, in its direction.
+fn between(
+    arc: &CircularArc,
+    ends: [usize; 2],
+    vertices: &BTreeMap<usize, Vector3<f64>>,
+) -> CircularArc {
+    let [start, end] = ends.map(|end| arc.angle_of(&vertices[&end]));
+    CircularArc {
+        angles: [start, start + (end - start).rem_euclid(TAU)],
+        ..*arc
+    }
+}

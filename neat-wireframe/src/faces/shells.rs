@@ -1,0 +1,149 @@
+//! Faces become shells: what hangs together, with its outer side found, and closed or not.
+
+use super::curves::{Curves, MeasuredGraph, TURN};
+use super::chain::point_along;
+use super::face::{CurveIndex, Face, Shell, Step, Surface};
+use super::geometry::ShellGeometry;
+use super::region::Region;
+use crate::ViewObservation;
+use nalgebra::Vector3;
+use pathfinding::undirected::connected_components::components;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+
+/// A direction that no edge of a usual object has: rays along it meet faces inside.
+const RAY: [f64; 3] = [0.538_1, 0.283_7, 0.793_7];
+/// Points of each curve that are asked whether they lie within a solid.
+const POINTS: usize = 7;
+/// Deeper ones, by the extent of the wireframe, are not on its faces.
+const DEPTH: f64 = 0.02;
+
+/// The shells of the chosen faces: closed ones first, then those with the most faces.
+pub(super) fn shells(
+    graph: &MeasuredGraph,
+    curves: &Curves,
+    faces: Vec<Face>,
+    views: &[ViewObservation],
+) -> Vec<Shell> {
+    let mut of_curve: BTreeMap<CurveIndex, Vec<usize>> = BTreeMap::new();
+    for (place, face) in faces.iter().enumerate() {
+        for step in face.steps() {
+            of_curve.entry(step.curve).or_default().push(place);
+        }
+    }
+    let mut joined: Vec<Vec<usize>> = of_curve.values().cloned().collect();
+    joined.extend((0..faces.len()).map(|place| vec![place]));
+    let mut groups: Vec<Vec<usize>> = (components(&joined).into_iter())
+        .map(|group| group.into_iter().collect())
+        .collect();
+    groups.iter_mut().for_each(|group| group.sort_unstable());
+    groups.sort_by(|a, b| b.len().cmp(&a.len()).then_with(|| a.cmp(b)));
+    let shell = |group: Vec<usize>| {
+        let mut faces: Vec<Face> = group.iter().map(|place| faces[*place].clone()).collect();
+        let orientable = orient(&mut faces);
+        let two_each = faces.iter().flat_map(Face::steps).all(|step| of_curve[&step.curve].len() == 2);
+        let mut shell = Shell {
+            closed: orientable && two_each,
+            faces,
+        };
+        face_outward(&mut shell, graph, views);
+        shell.closed = shell.closed && !holds_curves(&shell, curves);
+        shell
+    };
+    let mut shells: Vec<Shell> = groups.into_iter().map(shell).collect();
+    shells.sort_by_key(|shell| !shell.closed);
+    shells
+}
+
+/// Turns faces so that two that share a curve run along it in opposite directions, as far as one
+/// leads to the next; whether that holds for all.
+fn orient(faces: &mut [Face]) -> bool {
+    let mut oriented = vec![false; faces.len()];
+    let steps_of = |face: &Face| -> Vec<Step> { face.steps().copied().collect() };
+    let mut at_curve: BTreeMap<CurveIndex, Vec<usize>> = BTreeMap::new();
+    for (place, face) in faces.iter().enumerate() {
+        for step in face.steps() {
+            at_curve.entry(step.curve).or_default().push(place);
+        }
+    }
+    let mut consistent = true;
+    for first in 0..faces.len() {
+        if oriented[first] {
+            continue;
+        }
+        oriented[first] = true;
+        let mut queue = VecDeque::from([first]);
+        while let Some(place) = queue.pop_front() {
+            for step in steps_of(&faces[place]) {
+                for other in at_curve[&step.curve].iter().filter(|other| **other != place) {
+                    let same = faces[*other].steps().any(|s| *s == step);
+                    if !oriented[*other] {
+                        if same {
+                            faces[*other] = faces[*other].turned();
+                        }
+                        oriented[*other] = true;
+                        queue.push_back(*other);
+                    } else {
+                        consistent &= !same;
+                    }
+                }
+            }
+        }
+    }
+    consistent
+}
+
+/// Turns all faces if a closed shell has its normals inward, or more of a sheet is seen from
+/// behind.
+fn face_outward(shell: &mut Shell, graph: &MeasuredGraph, views: &[ViewObservation]) {
+    let geometry = ShellGeometry::new(shell, graph.wireframe, graph.arcs);
+    let outward = if shell.closed {
+        geometry.volume(shell)
+    } else {
+        let toward_cameras = |face: &Face| {
+            let Some((point, normal)) = middle(face, &geometry) else {
+                return 0.0;
+            };
+            let centers = views.iter().map(|view| view.camera.center_in_world);
+            centers.map(|center| normal.dot(&(center - point)).signum()).sum::<f64>()
+                * geometry.area(face)
+        };
+        shell.faces.iter().map(toward_cameras).sum()
+    };
+    if outward < 0.0 {
+        shell.faces = shell.faces.iter().map(Face::turned).collect();
+    }
+}
+
+/// The middle of the outer loop of a plane, and its normal.
+fn middle(face: &Face, geometry: &ShellGeometry) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    let Surface::Plane { normal, .. } = face.surface else {
+        return None;
+    };
+    let points: Vec<Vector3<f64>> = (face.loops.first()?.iter())
+        .flat_map(|step| geometry.points(step, TURN))
+        .collect();
+    Some((points.iter().sum::<Vector3<f64>>() / points.len() as f64, normal))
+}
+
+/// Whether other curves of the wireframe, which images show, lie within a closed shell: it is no
+/// solid, or lacks what they belong to.
+fn holds_curves(shell: &Shell, curves: &Curves) -> bool {
+    let own: BTreeSet<CurveIndex> =
+        (shell.faces.iter().flat_map(Face::steps)).map(|step| step.curve).collect();
+    let regions: Vec<Region> =
+        (shell.faces.iter()).filter_map(|face| Region::new(curves, face)).collect();
+    let depth = DEPTH * curves.extent;
+    let ray = Vector3::from(RAY);
+    let is_within = |point: &Vector3<f64>| {
+        let hits = regions.iter().flat_map(|region| region.hits(point, &ray));
+        hits.flatten().filter(|t| *t > 0.0).count() % 2 == 1
+            && regions.iter().all(|region| !region.is_near(point, depth))
+    };
+    let others = curves.all.iter().filter(|curve| !own.contains(&curve.index));
+    let mut chains = others.map(|curve| &curve.points).chain(&curves.loose);
+    chains.any(|points| {
+        let places = (0..POINTS).map(|k| (k as f64 + 0.5) / POINTS as f64);
+        let inside = places.filter(|place| is_within(&point_along(points, *place)));
+        2 * inside.count() > POINTS
+    })
+}
