@@ -17,12 +17,12 @@ pub(super) fn contains(polygon: &[Vector2<f64>], point: &Vector2<f64>) -> bool {
     crossings.count() % 2 == 1
 }
 
-/// Whether two sides that are no neighbours meet.
+/// Whether two sides cross. They may touch, and lie on one line.
 pub(super) fn crosses_itself(polygon: &[Vector2<f64>]) -> bool {
     let all: Vec<[Vector2<f64>; 2]> = sides(polygon).collect();
     let count = all.len();
     (0..count).any(|i| {
-        (i + 2..count).any(|j| (i, j) != (0, count - 1) && segments_meet(&all[i], &all[j]))
+        (i + 2..count).any(|j| (i, j) != (0, count - 1) && segments_cross(&all[i], &all[j]))
     })
 }
 
@@ -30,9 +30,9 @@ fn sides(polygon: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> + 
     (0..polygon.len()).map(|k| [polygon[k], polygon[(k + 1) % polygon.len()]])
 }
 
-fn segments_meet([a, b]: &[Vector2<f64>; 2], [c, d]: &[Vector2<f64>; 2]) -> bool {
+fn segments_cross([a, b]: &[Vector2<f64>; 2], [c, d]: &[Vector2<f64>; 2]) -> bool {
     let side = |from: &Vector2<f64>, to: &Vector2<f64>, p: &Vector2<f64>| (to - from).perp(&(p - from));
-    side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) <= 0.0
+    side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
 }
 
 #[cfg(test)]
@@ -50,5 +50,7 @@ mod tests {
         assert!(!crosses_itself(&square));
         let bow_tie = [0, 2, 1, 3].map(|k| square[k]);
         assert!(crosses_itself(&bow_tie));
+        let notched = [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        assert!(!crosses_itself(&notched.map(Vector2::from)));
     }
 }

@@ -91,6 +91,11 @@ fn inward(curves: &Curves, face: &Face, step: &Step) -> Option<Vector3<f64>> {
 }
 
 fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
+    // A plane that touches a cylinder goes on as another surface: the end of a slot.
+    let is_plane = |face: &Face| matches!(face.surface, Surface::Plane { .. });
+    if is_plane(faces[0]) != is_plane(faces[1]) {
+        return Pair::Crease;
+    }
     let [one, other] = [0, 1].map(|k| {
         // Both from the same end of the curve: a face to the left of its loop is to the
         // right of the same loop backwards.

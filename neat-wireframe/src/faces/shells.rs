@@ -1,7 +1,7 @@
 //! Faces become shells: what hangs together, with its outer side found, and closed or not.
 
-use super::curves::{Curves, MeasuredGraph, TURN};
-use super::chain::point_along;
+use super::curves::{Curve, Curves, MeasuredGraph, TURN};
+use super::chain::{distance_to_chain, point_along};
 use super::face::{CurveIndex, Face, Shell, Step, Surface};
 use super::geometry::ShellGeometry;
 use super::region::Region;
@@ -12,10 +12,10 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// A direction that no edge of a usual object has: rays along it meet faces inside.
 const RAY: [f64; 3] = [0.538_1, 0.283_7, 0.793_7];
-/// Points of each curve that are asked whether they lie within a solid.
+/// Points of each curve that are asked whether they lie within a solid or on it.
 const POINTS: usize = 7;
-/// Deeper ones, by the extent of the wireframe, are not on its faces.
-const DEPTH: f64 = 0.02;
+/// Points are on a face or an edge that are so near to it, by the extent of the wireframe.
+const MARGIN: f64 = 0.02;
 
 /// The shells of the chosen faces: closed ones first, then those with the most faces.
 pub(super) fn shells(
@@ -125,25 +125,29 @@ fn middle(face: &Face, geometry: &ShellGeometry) -> Option<(Vector3<f64>, Vector
     Some((points.iter().sum::<Vector3<f64>>() / points.len() as f64, normal))
 }
 
-/// Whether other curves of the wireframe, which images show, lie within a closed shell: it is no
-/// solid, or lacks what they belong to.
+/// Whether other curves of the wireframe lie within a closed shell or on it: nothing is seen within
+/// a solid, and what lies on a face is the rim of something that the shell lacks.
 fn holds_curves(shell: &Shell, curves: &Curves) -> bool {
     let own: BTreeSet<CurveIndex> =
         (shell.faces.iter().flat_map(Face::steps)).map(|step| step.curve).collect();
     let regions: Vec<Region> =
         (shell.faces.iter()).filter_map(|face| Region::new(curves, face)).collect();
-    let depth = DEPTH * curves.extent;
+    let (bounding, others): (Vec<&Curve>, Vec<&Curve>) =
+        (curves.all.iter()).partition(|curve| own.contains(&curve.index));
+    let margin = MARGIN * curves.extent;
     let ray = Vector3::from(RAY);
-    let is_within = |point: &Vector3<f64>| {
+    let is_held = |point: &Vector3<f64>| {
         let hits = regions.iter().flat_map(|region| region.hits(point, &ray));
-        hits.flatten().filter(|t| *t > 0.0).count() % 2 == 1
-            && regions.iter().all(|region| !region.is_near(point, depth))
+        let within = hits.flatten().filter(|t| *t > 0.0).count() % 2 == 1;
+        let on_face = || regions.iter().any(|region| region.is_near(point, margin));
+        // Beside an edge of the shell it may be that edge once more.
+        let apart = |curve: &&Curve| distance_to_chain(&curve.points, point) > margin;
+        (within || on_face()) && bounding.iter().all(apart)
     };
-    let others = curves.all.iter().filter(|curve| !own.contains(&curve.index));
-    let mut chains = others.map(|curve| &curve.points).chain(&curves.loose);
+    let mut chains = others.iter().map(|curve| &curve.points).chain(&curves.loose);
     chains.any(|points| {
         let places = (0..POINTS).map(|k| (k as f64 + 0.5) / POINTS as f64);
-        let inside = places.filter(|place| is_within(&point_along(points, *place)));
-        2 * inside.count() > POINTS
+        let held = places.filter(|place| is_held(&point_along(points, *place)));
+        2 * held.count() > POINTS
     })
 }

@@ -153,11 +153,15 @@ fn nothing_is_seen_within_a_solid() {
     hollow.wireframe.junctions.extend([[0.4, 0.4, 0.4], [0.6, 0.5, 0.6]].map(Vector3::from));
     hollow.wireframe.edges.push([8, 9]);
     assert!(!hollow.shells()[0].closed);
-    // On a face and outside, it is none of the solid's business.
-    for ends in [[[0.4, 0.4, 1.0], [0.6, 0.5, 1.0]], [[0.4, 0.4, 1.4], [0.6, 0.5, 1.6]]] {
+    // Nor is there a face without a hole where the rim of one is, …
+    let mut put = |ends: [[f64; 3]; 2]| {
         hollow.wireframe.junctions[8..].copy_from_slice(&ends.map(Vector3::from));
-        assert!(hollow.shells()[0].closed);
-    }
+        hollow.shells()[0].closed
+    };
+    assert!(!put([[0.4, 0.4, 1.0], [0.6, 0.5, 1.0]]));
+    // … but what lies outside, or is an edge once more, is none of the solid's business.
+    assert!(put([[0.4, 0.4, 1.4], [0.6, 0.5, 1.6]]));
+    assert!(put([[0.1, 0.005, 1.0], [0.7, 0.005, 1.0]]));
 }
 
 #[test]

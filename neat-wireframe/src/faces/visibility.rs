@@ -67,7 +67,8 @@ impl Sightings {
     }
 
     /// How much less likely the images are with the face than without, as a logarithm. That hidden
-    /// curves are hidden says nothing for it, as other faces may hide them.
+    /// curves are hidden says nothing for it, as other faces may hide them, and so many as are seen
+    /// by chance nothing against it.
     pub fn against(&self, region: &Region) -> f64 {
         let (mut seen, mut asked) = (0, 0);
         for (center, samples) in &self.views {
@@ -81,6 +82,9 @@ impl Sightings {
                     seen += usize::from(2 * shown >= count);
                 }
             }
+        }
+        if seen as f64 <= BY_CHANCE * asked as f64 {
+            return 0.0;
         }
         (-log_likelihood_ratio(seen, asked)).max(0.0)
     }
