@@ -5,10 +5,9 @@
 //! cargo run --release -p neat-eval --example measure_solids -- [--out DIR] [--kept DIR] SCENE…
 //! ```
 //!
-//! `--out` keeps documents with their shells, `NAME/true.json` and `NAME/wireframe.json`, and the
-//! 2D segments. With `--kept` wireframes and segments are those that `measure_assembler --out`
+//! `--out` keeps documents with their shells, `NAME/true.json` and `NAME/assembled.json`. With `--kept` wireframes and segments are those that `measure_assembler --out`
 //! has left there; a scene that it lacks is measured in the true wireframe only. A true wireframe
-//! gets no views: only its edges speak.
+//! gets no views: only its edges speak. Its curves that are no arcs of circles are left out.
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
 
@@ -17,14 +16,15 @@ mod prepared;
 mod truth;
 
 use nalgebra::{Matrix3, Vector3};
-use neat_core::{Camera, CircularArc, Scene, View, Wireframe3d};
+use neat_core::{Camera, CircularArc, Scene, Wireframe3d};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::confidence::{ConfidenceConfig, assess, transformed_covariance};
-use neat_wireframe::export::{WireframeDocument, read_json};
+use neat_wireframe::export::{WireframeDocument, read_json, write_json};
 use neat_wireframe::faces::{MeasuredGraph, Shell, ShellGeometry, find_shells};
 use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
 use std::env;
 use std::error::Error;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use truth::Truth;
@@ -68,11 +68,23 @@ fn main() -> Result<()> {
             truth.other_curves,
             truth.faces.len()
         );
-        println!("  true       {}", measured(&of_truth, &truth));
+        let folder = out.as_ref().map(|out| out.join(&*name));
+        let measure = |kind: &str, input: &Input| -> Result<()> {
+            let start = Instant::now();
+            let shells = input.shells();
+            let seconds = start.elapsed().as_secs_f64();
+            println!("  {kind:9} {}, {seconds:.3} s", scores(&shells, input, &truth));
+            if let Some(folder) = &folder {
+                fs::create_dir_all(folder)?;
+                let document = input.document(shells);
+                write_json(&folder.join(format!("{kind}.json")), &document)?;
+            }
+            Ok(())
+        };
+        measure("true", &of_truth)?;
         if let Some(input) = reconstructed(dir, &name, kept.as_deref())? {
-            println!("  assembled  {}", measured(&input, &truth));
+            measure("assembled", &input)?;
         }
-        let _ = &out;
     }
     Ok(())
 }
@@ -120,18 +132,29 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
     }))
 }
 
-/// Faces, shells, agreement with the true faces, and time, as text.
-fn measured(input: &Input, truth: &Truth) -> String {
-    let graph = MeasuredGraph {
-        wireframe: &input.wireframe,
-        arcs: &input.arcs,
-        covariances: &input.covariances,
-    };
-    let start = Instant::now();
-    let shells = find_shells(&graph, &input.views);
-    let seconds = start.elapsed().as_secs_f64();
+impl Input {
+    fn shells(&self) -> Vec<Shell> {
+        let graph = MeasuredGraph {
+            wireframe: &self.wireframe,
+            arcs: &self.arcs,
+            covariances: &self.covariances,
+        };
+        find_shells(&graph, &self.views)
+    }
+
+    fn document(&self, shells: Vec<Shell>) -> WireframeDocument {
+        WireframeDocument {
+            arcs: self.arcs.clone(),
+            shells,
+            ..WireframeDocument::from(&self.wireframe)
+        }
+    }
+}
+
+/// Faces, shells and agreement with the true faces, as text.
+fn scores(shells: &[Shell], input: &Input, truth: &Truth) -> String {
     let mut text = format!("{} faces", shells.iter().map(|shell| shell.faces.len()).sum::<usize>());
-    for shell in &shells {
+    for shell in shells {
         let geometry = ShellGeometry::new(shell, &input.wireframe, &input.arcs);
         let faces = shell.faces.len();
         text += &match (shell.closed, truth.volume) {
@@ -142,10 +165,10 @@ fn measured(input: &Input, truth: &Truth) -> String {
             }
         };
     }
-    if let Some([recall, precision]) = agreement(&shells, input, truth) {
+    if let Some([recall, precision]) = agreement(shells, input, truth) {
         text += &format!(", {recall:.3} of true area found, {precision:.3} of found area true");
     }
-    text + &format!(", {seconds:.3} s")
+    text
 }
 
 /// Share of the area of true faces that are found with the same surface and area, and of found

@@ -2,6 +2,7 @@
 
 use super::{EdgeFields, ExportError, JunctionFields, check};
 use crate::Wireframe3d;
+use crate::faces::{Face, Shell};
 use nalgebra::Vector3;
 use neat_core::{CircularArc, file};
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,9 @@ pub struct WireframeDocument {
     /// Arcs of circles beside the edges, in the frame of the user's files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub arcs: Vec<CircularArc>,
+    /// Faces between edges and arcs, closed shells first, in the frame of the user's files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shells: Vec<Shell>,
     /// Facts about every junction.
     #[serde(default, skip_serializing_if = "JunctionFields::is_empty")]
     pub junction_fields: JunctionFields,
@@ -114,6 +118,14 @@ impl WireframeDocument {
             return Err(ExportError::BadArc {
                 path: path.into(),
                 arc,
+            });
+        }
+        let wireframe = self.wireframe();
+        let is_valid = |face: &Face| face.is_valid(&wireframe, &self.arcs);
+        if let Some(shell) = (self.shells.iter()).position(|s| !s.faces.iter().all(is_valid)) {
+            return Err(ExportError::BadShell {
+                path: path.into(),
+                shell,
             });
         }
         let per_junction = (

@@ -61,6 +61,17 @@ pub enum ExportError {
         /// Its index.
         arc: usize,
     },
+    /// A shell has a face that is none.
+    #[error(
+        "{path}: shell {shell} has a face that is none: it needs a plane or a cylinder, and loops \
+         of edges and arcs that exist and join end to end"
+    )]
+    BadShell {
+        /// The file.
+        path: PathBuf,
+        /// Its index.
+        shell: usize,
+    },
     /// The text is not the JSON of a wireframe.
     #[error("{path} is not a wireframe in JSON; it may be truncated: export it again")]
     Json {

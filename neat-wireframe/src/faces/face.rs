@@ -1,6 +1,8 @@
 //! Faces and shells: what a boundary representation is made of.
 
+use super::curves::nearest_junctions;
 use nalgebra::Vector3;
+use neat_core::{CircularArc, Wireframe3d};
 use serde::{Deserialize, Serialize};
 
 /// Faces that hang together by the curves that they share.
@@ -79,7 +81,66 @@ impl Shell {
     }
 }
 
+impl Shell {
+    /// The same shell where edges have new indices, or none; `None` if no face is left. Without one
+    /// of its faces it is a sheet.
+    pub fn with_edges(&self, new_index: impl Fn(usize) -> Option<usize>) -> Option<Self> {
+        let step = |step: &Step| {
+            let curve = match step.curve {
+                CurveIndex::Edge(edge) => CurveIndex::Edge(new_index(edge)?),
+                arc @ CurveIndex::Arc(_) => arc,
+            };
+            Some(Step { curve, ..*step })
+        };
+        let face = |face: &Face| {
+            let steps = |steps: &Vec<Step>| steps.iter().map(step).collect::<Option<_>>();
+            Some(Face {
+                surface: face.surface,
+                loops: face.loops.iter().map(steps).collect::<Option<_>>()?,
+            })
+        };
+        let faces: Vec<Face> = self.faces.iter().filter_map(face).collect();
+        (!faces.is_empty()).then(|| Self {
+            closed: self.closed && faces.len() == self.faces.len(),
+            faces,
+        })
+    }
+}
+
 impl Face {
+    /// Whether its surface is one, and its loops are closed chains of curves that exist: any
+    /// number on a plane; on a cylinder two arcs, which are loops of their own or joined by two
+    /// edges.
+    pub(crate) fn is_valid(&self, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> bool {
+        let exists = |step: &Step| match step.curve {
+            CurveIndex::Edge(edge) => edge < wireframe.edges.len(),
+            CurveIndex::Arc(arc) => arc < arcs.len(),
+        };
+        let unit = |v: &Vector3<f64>| (v.norm() - 1.0).abs() < 1e-6;
+        let is_arc = |step: &Step| matches!(step.curve, CurveIndex::Arc(_));
+        let shape: Vec<Vec<bool>> =
+            (self.loops.iter()).map(|steps| steps.iter().map(is_arc).collect()).collect();
+        let surface = match &self.surface {
+            Surface::Plane { normal, offset } => {
+                unit(normal) && offset.is_finite() && !self.loops.is_empty()
+            }
+            Surface::Cylinder {
+                point,
+                axis,
+                radius,
+                ..
+            } => {
+                let finite = point.iter().all(|x| x.is_finite());
+                let joined = shape == [[true, false, true, false]];
+                unit(axis) && finite && radius.is_normal() && *radius > 0.0
+                    && (joined || shape == [[true], [true]])
+            }
+        };
+        surface
+            && self.steps().all(exists)
+            && (self.loops.iter()).all(|steps| is_closed(steps, wireframe, arcs))
+    }
+
     /// The steps of all loops.
     pub fn steps(&self) -> impl Iterator<Item = &Step> + Clone {
         self.loops.iter().flatten()
@@ -141,6 +202,26 @@ impl Step {
         Self {
             curve: self.curve,
             reversed: !self.reversed,
+        }
+    }
+}
+
+/// Whether each step begins where the one before it ends. A step alone is a circle.
+fn is_closed(steps: &[Step], wireframe: &Wireframe3d, arcs: &[CircularArc]) -> bool {
+    let ends = |step: &Step| {
+        let [start, end] = match step.curve {
+            CurveIndex::Edge(edge) => wireframe.edges[edge],
+            CurveIndex::Arc(arc) => nearest_junctions(&arcs[arc], &wireframe.junctions)?,
+        };
+        Some(if step.reversed { [end, start] } else { [start, end] })
+    };
+    match steps {
+        [] => false,
+        [step] => matches!(step.curve, CurveIndex::Arc(_)),
+        [.., last] => {
+            let before = std::iter::once(last).chain(steps);
+            let mut pairs = before.zip(steps).map(|(before, step)| (ends(before), ends(step)));
+            pairs.all(|(before, step)| before.zip(step).is_some_and(|(b, s)| b[1] == s[0]))
         }
     }
 }

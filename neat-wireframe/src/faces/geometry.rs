@@ -75,10 +75,12 @@ impl ShellGeometry {
             .collect();
         for (index, curve) in &mut curves {
             if let Some(arc) = &mut curve.arc {
-                *arc = arc_on_surfaces(arc, &surfaces_of[index]);
-                match curve.ends {
-                    None => *arc = whole_circle(arc),
-                    Some(ends) => *arc = between(arc, ends, &vertices),
+                *arc = match curve.ends {
+                    None => circle_on_surfaces(arc, &surfaces_of[index], true),
+                    Some(ends) => {
+                        let circle = circle_on_surfaces(arc, &surfaces_of[index], false);
+                        between(&circle, ends, &vertices)
+                    }
                 }
             }
         }
@@ -199,51 +201,37 @@ fn height_over(surface: &Surface, at: &Vector3<f64>) -> (Vector3<f64>, f64) {
     }
 }
 
-/// The circle of an arc in the plane of a face and around the axis of another.
-fn arc_on_surfaces(arc: &CircularArc, surfaces: &[Surface]) -> CircularArc {
-    let mut placed = *arc;
+/// The circle of an arc in the plane of a face and around the axis of another. A whole one begins
+/// where all circles around this axis do.
+fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> CircularArc {
+    let (mut center, mut radius) = (arc.center, arc.radius);
+    let (mut axis, mut plane) = (None, None);
     for surface in surfaces {
-        if let Surface::Cylinder {
-            point,
-            axis,
-            radius,
-            ..
-        } = surface
-        {
-            placed.center = point + axis * axis.dot(&(placed.center - point));
-            placed.radius = *radius;
+        match surface {
+            Surface::Plane { normal, offset } => plane = plane.or(Some((*normal, *offset))),
+            Surface::Cylinder {
+                point,
+                axis: along,
+                radius: of_cylinder,
+                ..
+            } => {
+                center = point + along * along.dot(&(center - point));
+                radius = *of_cylinder;
+                axis = Some(*along);
+            }
         }
     }
-    let axis = surfaces.iter().find_map(|surface| match surface {
-        Surface::Cylinder { axis, .. } => Some(*axis),
-        Surface::Plane { .. } => None,
-    });
-    let plane = surfaces.iter().find_map(|surface| match surface {
-        Surface::Plane { normal, offset } => Some((*normal, *offset)),
-        Surface::Cylinder { .. } => None,
-    });
-    if let Some((normal, offset)) = plane {
-        let along = axis.unwrap_or(normal);
-        let height = normal.dot(&placed.center) - offset;
-        placed.center -= along * height / normal.dot(&along);
-        let up = normal * normal.dot(&arc.normal()).signum();
-        let x = (placed.axes[0] - up * up.dot(&placed.axes[0])).normalize();
-        placed.axes = [x, up.cross(&x)];
-    }
-    placed
-}
-
-/// The whole circle, with its start where all circles of this axis have it.
-fn whole_circle(arc: &CircularArc) -> CircularArc {
-    let normal = arc.normal();
-    // The same for both directions of the axis.
-    let axis = normal * normal[normal.iamax()].signum();
-    let [x, _] = across(&axis);
-    let x = (x - normal * normal.dot(&x)).normalize();
+    let (normal, offset) = plane.unwrap_or((arc.normal(), arc.normal().dot(&center)));
+    let along = axis.unwrap_or(normal);
+    center += along * (offset - normal.dot(&center)) / normal.dot(&along);
+    let up = normal * normal.dot(&arc.normal()).signum();
+    let toward = if whole { across(&along)[0] } else { arc.axes[0] };
+    let x = (toward - up * up.dot(&toward)).normalize();
     CircularArc {
-        axes: [x, normal.cross(&x)],
-        angles: [0.0, TAU],
-        ..*arc
+        center,
+        axes: [x, up.cross(&x)],
+        radius,
+        angles: if whole { [0.0, TAU] } else { arc.angles },
     }
 }
 

@@ -46,10 +46,13 @@ pub(super) fn shells(
             faces,
         };
         face_outward(&mut shell, graph, views);
-        shell.closed = shell.closed && !holds_curves(&shell, curves);
+        if shell.closed {
+            open_where_curves_are(&mut shell, curves);
+        }
         shell
     };
     let mut shells: Vec<Shell> = groups.into_iter().map(shell).collect();
+    shells.retain(|shell| !shell.faces.is_empty());
     shells.sort_by_key(|shell| !shell.closed);
     shells
 }
@@ -125,29 +128,45 @@ fn middle(face: &Face, geometry: &ShellGeometry) -> Option<(Vector3<f64>, Vector
     Some((points.iter().sum::<Vector3<f64>>() / points.len() as f64, normal))
 }
 
-/// Whether other curves of the wireframe lie within a closed shell or on it: nothing is seen within
-/// a solid, and what lies on a face is the rim of something that the shell lacks.
-fn holds_curves(shell: &Shell, curves: &Curves) -> bool {
+/// Makes a sheet of a closed shell if other curves of the wireframe lie within it or on it: nothing
+/// is seen within a solid, and what lies on a face is the rim of something that the shell lacks.
+/// The faces on which they lie are left out.
+fn open_where_curves_are(shell: &mut Shell, curves: &Curves) {
     let own: BTreeSet<CurveIndex> =
         (shell.faces.iter().flat_map(Face::steps)).map(|step| step.curve).collect();
-    let regions: Vec<Region> =
-        (shell.faces.iter()).filter_map(|face| Region::new(curves, face)).collect();
     let (bounding, others): (Vec<&Curve>, Vec<&Curve>) =
         (curves.all.iter()).partition(|curve| own.contains(&curve.index));
     let margin = MARGIN * curves.extent;
-    let ray = Vector3::from(RAY);
-    let is_held = |point: &Vector3<f64>| {
-        let hits = regions.iter().flat_map(|region| region.hits(point, &ray));
-        let within = hits.flatten().filter(|t| *t > 0.0).count() % 2 == 1;
-        let on_face = || regions.iter().any(|region| region.is_near(point, margin));
-        // Beside an edge of the shell it may be that edge once more.
-        let apart = |curve: &&Curve| distance_to_chain(&curve.points, point) > margin;
-        (within || on_face()) && bounding.iter().all(apart)
+    // Beside an edge of the shell another one may be that edge once more.
+    let apart = |point: &Vector3<f64>| {
+        (bounding.iter()).all(|curve| distance_to_chain(&curve.points, point) > margin)
     };
-    let mut chains = others.iter().map(|curve| &curve.points).chain(&curves.loose);
-    chains.any(|points| {
-        let places = (0..POINTS).map(|k| (k as f64 + 0.5) / POINTS as f64);
-        let held = places.filter(|place| is_held(&point_along(points, *place)));
-        2 * held.count() > POINTS
-    })
+    let chains = others.iter().map(|curve| &curve.points).chain(&curves.loose);
+    let samples: Vec<Vec<Vector3<f64>>> = chains
+        .map(|points| {
+            let places = (0..POINTS).map(|k| (k as f64 + 0.5) / POINTS as f64);
+            places.map(|place| point_along(points, place)).filter(apart).collect()
+        })
+        .collect();
+    let most = |of_curve: &Vec<Vector3<f64>>, holds: &dyn Fn(&Vector3<f64>) -> bool| {
+        2 * of_curve.iter().filter(|point| holds(point)).count() > POINTS
+    };
+    let regions: Vec<Option<Region>> =
+        (shell.faces.iter()).map(|face| Region::new(curves, face)).collect();
+    let ray = Vector3::from(RAY);
+    let within = |point: &Vector3<f64>| {
+        let hits = regions.iter().flatten().flat_map(|region| region.hits(point, &ray));
+        hits.flatten().filter(|t| *t > 0.0).count() % 2 == 1
+    };
+    let is_free = |region: &Option<Region>| {
+        let on_face = |point: &Vector3<f64>| {
+            region.as_ref().is_some_and(|region| region.is_near(point, margin))
+        };
+        !samples.iter().any(|of_curve| most(of_curve, &on_face))
+    };
+    let free: Vec<bool> = regions.iter().map(is_free).collect();
+    shell.closed =
+        free.iter().all(|free| *free) && !samples.iter().any(|of_curve| most(of_curve, &within));
+    let mut free = free.into_iter();
+    shell.faces.retain(|_| free.next().unwrap_or(true));
 }
