@@ -8,7 +8,9 @@ OUT is the folder that
     cargo run --release -p neat-export --example export_all -- WIREFRAME.json OUT
 
 has filled. Every format must hold as many vertices and edges as WIREFRAME.json, the
-same edges, and the same coordinates to 1e-6 of the wireframe's extent. Prints a line
+same edges, and the same coordinates to 1e-6 of the wireframe's extent; arcs are chains of
+edges, or left out where the format has them as arcs. Closed shells must be valid solids in
+STEP and watertight meshes elsewhere, of the volume that their loops enclose. Prints a line
 per file; the exit code is 1 if one differs. Needs scripts/requirements-readers.txt.
 """
 
@@ -24,8 +26,15 @@ TOLERANCE = 1e-6
 SCHEMA = Path(__file__).resolve().parent.parent / "docs" / "wireframe.schema.json"
 
 
+# Junctions move onto the planes of their faces by what is noise, and chords cut off segments.
+VOLUME_TOLERANCE = 0.01
+
+
 class Wireframe:
-    """Vertices [V, 3] and index pairs [E, 2]."""
+    """Vertices [V, 3] and index pairs [E, 2], and the shells between them and the arcs."""
+
+    shells = ()
+    arcs = ()
 
     def __init__(self, vertices, edges):
         self.vertices = np.asarray(vertices, dtype=float).reshape(-1, 3)
@@ -47,6 +56,59 @@ class Wireframe:
         pairs = [[new_index[a], new_index[b]]
                  for i, (a, b) in enumerate(self.edges.tolist()) if i not in set(edges)]
         return Wireframe(self.vertices[kept], pairs)
+
+
+def volume(shell, wireframe):
+    """What a closed shell encloses: a third of the flux of x through its faces."""
+    def flux(face):
+        if "plane" in face:
+            area = sum((area_of_step(step, wireframe) for loop in face["loops"] for step in loop),
+                       np.zeros(3))
+            return face["plane"]["offset"] * float(np.dot(face["plane"]["normal"], area))
+        cylinder = face["cylinder"]
+        rims = [wireframe.arcs[step["arc"]] for loop in face["loops"] for step in loop
+                if "arc" in step]
+        axis, sign = np.array(cylinder["axis"]), 1.0 if cylinder["convex"] else -1.0
+        height = abs(float(np.dot(axis, np.subtract(rims[1]["center"], rims[0]["center"]))))
+        start, end = rims[0]["angles"]
+        x, y = np.array(rims[0]["axes"])
+        outward = (math.sin(end) - math.sin(start)) * x - (math.cos(end) - math.cos(start)) * y
+        radius = cylinder["radius"]
+        return sign * radius * height * (radius * (end - start)
+                                         + float(np.dot(cylinder["point"], outward)))
+
+    return sum(flux(face) for face in shell["faces"]) / 3.0
+
+
+def area_of_step(step, wireframe):
+    """Half the integral of x × dx along an edge or an arc."""
+    sign = -0.5 if step.get("reversed") else 0.5
+    if "edge" in step:
+        start, end = wireframe.vertices[wireframe.edges[step["edge"]]]
+        return sign * np.cross(start, end)
+    arc = wireframe.arcs[step["arc"]]
+    center, axes, radius = np.array(arc["center"]), np.array(arc["axes"]), arc["radius"]
+    start, end = (center + radius * (math.cos(a) * axes[0] + math.sin(a) * axes[1])
+                  for a in arc["angles"])
+    swept = radius**2 * (arc["angles"][1] - arc["angles"][0])
+    return sign * (np.cross(center, end - start) + swept * np.cross(*axes))
+
+
+def check_volume(found, expected, what):
+    total = sum(volume(shell, expected) for shell in expected.shells if shell["closed"])
+    check(abs(found - total) <= VOLUME_TOLERANCE * abs(total),
+          f"{what} of volume {found}, not {total}")
+
+
+def check_mesh(vertices, triangles, expected):
+    """Triangles of closed shells are watertight; of sheets nothing is known."""
+    check((len(triangles) > 0) == (len(expected.shells) > 0), "shells and triangles")
+    if expected.shells and all(shell["closed"] for shell in expected.shells):
+        import trimesh
+
+        mesh = trimesh.Trimesh(vertices, triangles, process=False)
+        check(mesh.is_watertight and mesh.is_winding_consistent, "the mesh has holes")
+        check_volume(mesh.volume, expected, "a mesh")
 
 
 def check(condition, sentence):

@@ -12,6 +12,7 @@ use neat_train::TrainedField;
 use neat_wireframe::assemble::{AssembleReport, Assembled, assemble_with_progress};
 use neat_wireframe::confidence::{Confidence, assess};
 use neat_wireframe::export::WireframeDocument;
+use neat_wireframe::faces::{MeasuredGraph, Shell, find_shells};
 use neat_wireframe::kinds::{EdgeKinds, curved_chains, edge_kinds, fill_kinds, junction_types};
 use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 use neat_wireframe::paper::{NeatLine, PaperBackEndCounts, PaperBackEndError, neat_lines};
@@ -66,6 +67,8 @@ pub struct Distilled {
     pub wireframe: Wireframe3d,
     /// Arcs of circles beside its edges, likewise.
     pub arcs: Vec<CircularArc>,
+    /// Faces between edges and arcs, likewise.
+    pub shells: Vec<Shell>,
     /// How sure every junction and edge is, and by which 2D segments.
     pub confidence: Confidence,
     /// What each edge is: of the shape of things, or on it.
@@ -159,6 +162,9 @@ impl Distilled {
         document.arcs = (self.arcs.iter())
             .map(|arc| arc.map(|point| original_from_world.apply(point)))
             .collect();
+        document.shells = (self.shells.iter())
+            .map(|shell| shell.map(|point| original_from_world.apply(point)))
+            .collect();
         self.confidence
             .fill(&mut document, &names, original_from_world);
         fill_kinds(&mut document, &self.kinds, &junction_types(&self.wireframe));
@@ -225,9 +231,18 @@ pub fn distill(
     let edges = confidence.edges.iter();
     let shown: Vec<Vec<usize>> = edges.map(|edge| edge.showing_views.clone()).collect();
     let kinds = edge_kinds(&wireframe, scene, &shown)?;
+    let junctions = confidence.junctions.iter();
+    let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
+    let graph = MeasuredGraph {
+        wireframe: &wireframe,
+        arcs: &arcs,
+        covariances: &covariances,
+    };
+    let shells = find_shells(&graph, &views);
     Ok(Distilled {
         wireframe,
         arcs,
+        shells,
         confidence,
         kinds,
         report,

@@ -73,7 +73,10 @@ fn main() -> Result<()> {
             let start = Instant::now();
             let shells = input.shells();
             let seconds = start.elapsed().as_secs_f64();
-            println!("  {kind:9} {}, {seconds:.3} s", scores(&shells, input, &truth));
+            println!(
+                "  {kind:9} {}, {seconds:.3} s",
+                scores(&shells, input, &truth)
+            );
             if let Some(folder) = &folder {
                 fs::create_dir_all(folder)?;
                 let document = input.document(shells);
@@ -92,7 +95,10 @@ fn main() -> Result<()> {
 /// What the assembler makes of a scene, or has made of it; `None` if it is not among those kept.
 fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<Input>> {
     let folder = kept.map(|kept| kept.join(name));
-    if folder.as_ref().is_some_and(|folder| !folder.join("wireframe.json").exists()) {
+    if folder
+        .as_ref()
+        .is_some_and(|folder| !folder.join("wireframe.json").exists())
+    {
         return Ok(None);
     }
     let mut scene = prepared(dir, folder.as_deref())?;
@@ -108,13 +114,17 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
             if let Some(cameras) = &built.refined_cameras {
                 scene = scene.with_cameras(cameras);
             }
-            let arcs = built.arcs.iter().map(|arc| arc.map(|p| original(&scene, p)));
+            let arcs = built
+                .arcs
+                .iter()
+                .map(|arc| arc.map(|p| original(&scene, p)));
             (built.wireframe, arcs.collect())
         }
     };
     let views = ViewObservation::from_scene(&scene, MIN_SEGMENT_SCORE);
     let confidence = assess(&wireframe, &views, None, 1.0, &ConfidenceConfig::default())?;
-    let covariance = |covariance: &Matrix3<f64>| transformed_covariance(covariance, &scene.original_from_world);
+    let covariance =
+        |covariance: &Matrix3<f64>| transformed_covariance(covariance, &scene.original_from_world);
     let in_original = |view: ViewObservation| ViewObservation {
         camera: Camera {
             center_in_world: original(&scene, &view.camera.center_in_world),
@@ -153,7 +163,10 @@ impl Input {
 
 /// Faces, shells and agreement with the true faces, as text.
 fn scores(shells: &[Shell], input: &Input, truth: &Truth) -> String {
-    let mut text = format!("{} faces", shells.iter().map(|shell| shell.faces.len()).sum::<usize>());
+    let mut text = format!(
+        "{} faces",
+        shells.iter().map(|shell| shell.faces.len()).sum::<usize>()
+    );
     for shell in shells {
         let geometry = ShellGeometry::new(shell, &input.wireframe, &input.arcs);
         let faces = shell.faces.len();
@@ -161,7 +174,10 @@ fn scores(shells: &[Shell], input: &Input, truth: &Truth) -> String {
             (false, _) => format!(", sheet of {faces}"),
             (true, None) => format!(", closed of {faces}, volume {:.5}", geometry.volume(shell)),
             (true, Some(volume)) => {
-                format!(", closed of {faces}, volume ratio {:.4}", geometry.volume(shell) / volume)
+                format!(
+                    ", closed of {faces}, volume ratio {:.4}",
+                    geometry.volume(shell) / volume
+                )
             }
         };
     }

@@ -82,7 +82,9 @@ impl TrueFace {
         match (surface, self.kind.as_str()) {
             (Surface::Plane { normal, offset }, "plane") => {
                 let truth = self.normal.zip(self.offset);
-                truth.is_some_and(|(n, d)| near(n.dot(normal).abs(), 1.0) && near(n.dot(normal) * d, *offset))
+                truth.is_some_and(|(n, d)| {
+                    near(n.dot(normal).abs(), 1.0) && near(n.dot(normal) * d, *offset)
+                })
             }
             (
                 Surface::Cylinder {
@@ -113,7 +115,10 @@ fn joined(mut curves: Vec<Vec<Vector3<f64>>>) -> Vec<Vec<Vector3<f64>>> {
         let (first, last) = (curves[k][0], curves[k][curves[k].len() - 1]);
         let goes_on = |other: &Vec<Vector3<f64>>| {
             let ends = [other[0], other[other.len() - 1]];
-            ends.iter().filter(|end| near(end, &first) || near(end, &last)).count() == 2
+            ends.iter()
+                .filter(|end| near(end, &first) || near(end, &last))
+                .count()
+                == 2
         };
         let open = !near(&first, &last);
         match (k + 1..curves.len()).find(|other| open && goes_on(&curves[*other])) {
@@ -152,11 +157,16 @@ fn mesh_volume(path: &Path) -> Result<f64> {
     for line in text.lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words[..] {
-            ["v", x, y, z] => vertices.push(Vector3::new(x.parse()?, y.parse()?, z.parse::<f64>()?)),
+            ["v", x, y, z] => {
+                vertices.push(Vector3::new(x.parse()?, y.parse()?, z.parse::<f64>()?))
+            }
             ["f", a, b, c] => {
                 let vertex = |word: &str| -> Result<Vector3<f64>> {
                     let index: usize = word.split('/').next().unwrap_or(word).parse()?;
-                    vertices.get(index.wrapping_sub(1)).copied().ok_or_else(|| format!("{}: no vertex {index}", path.display()).into())
+                    vertices
+                        .get(index.wrapping_sub(1))
+                        .copied()
+                        .ok_or_else(|| format!("{}: no vertex {index}", path.display()).into())
                 };
                 six_fold += vertex(a)?.dot(&vertex(b)?.cross(&vertex(c)?));
             }

@@ -33,7 +33,12 @@ impl Entities {
     }
 
     /// A place with its z axis and its x axis.
-    pub fn placement(&mut self, origin: &Vector3<f64>, z: &Vector3<f64>, x: &Vector3<f64>) -> String {
+    pub fn placement(
+        &mut self,
+        origin: &Vector3<f64>,
+        z: &Vector3<f64>,
+        x: &Vector3<f64>,
+    ) -> String {
         let origin = self.point(origin);
         let [z, x] = [z, x].map(|axis| self.add(&format!("DIRECTION('',{})", triple(axis))));
         self.add(&format!("AXIS2_PLACEMENT_3D('',{origin},{z},{x})"))

@@ -47,11 +47,11 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
     // expect what is of several kinds.
     let main = match &representations[..] {
         [only] => only.clone(),
-        _ => step.add(&format!("SHAPE_REPRESENTATION('',({placement}),{geometry})")),
+        _ => step.add(&format!(
+            "SHAPE_REPRESENTATION('',({placement}),{geometry})"
+        )),
     };
-    step.add(&format!(
-        "SHAPE_DEFINITION_REPRESENTATION({shape},{main})"
-    ));
+    step.add(&format!("SHAPE_DEFINITION_REPRESENTATION({shape},{main})"));
     for part in representations.iter().filter(|part| **part != main) {
         step.add(&format!(
             "SHAPE_REPRESENTATION_RELATIONSHIP('','',{main},{part})"

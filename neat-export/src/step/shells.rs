@@ -59,7 +59,13 @@ impl<'a> ShellWriter<'a> {
         let vertices: BTreeMap<usize, Corner> = (geometry.vertices.iter())
             .map(|(junction, point)| {
                 let name = step.vertex(point);
-                (*junction, Corner { name, point: *point })
+                (
+                    *junction,
+                    Corner {
+                        name,
+                        point: *point,
+                    },
+                )
             })
             .collect();
         let mut edges = BTreeMap::new();
@@ -69,7 +75,13 @@ impl<'a> ShellWriter<'a> {
                 (None, Some(circle)) => {
                     let point = circle.point_at(circle.angles[0]);
                     let name = step.vertex(&point);
-                    [Corner { name: name.clone(), point }, Corner { name, point }]
+                    [
+                        Corner {
+                            name: name.clone(),
+                            point,
+                        },
+                        Corner { name, point },
+                    ]
                 }
                 (None, None) => continue,
             };
@@ -101,24 +113,31 @@ impl<'a> ShellWriter<'a> {
         };
         let mut bounds = Vec::new();
         for (place, edges) in loops.into_iter().enumerate() {
-            let edges = self.step.add(&format!("EDGE_LOOP('',({}))", edges.join(",")));
-            let kind = if place == 0 { "FACE_OUTER_BOUND" } else { "FACE_BOUND" };
+            let edges = self
+                .step
+                .add(&format!("EDGE_LOOP('',({}))", edges.join(",")));
+            let kind = if place == 0 {
+                "FACE_OUTER_BOUND"
+            } else {
+                "FACE_BOUND"
+            };
             bounds.push(self.step.add(&format!("{kind}('',{edges},.T.)")));
         }
         let bounds = bounds.join(",");
         let sense = if same_sense { ".T." } else { ".F." };
-        self.step.add(&format!("ADVANCED_FACE('',({bounds}),{surface},{sense})"))
+        self.step
+            .add(&format!("ADVANCED_FACE('',({bounds}),{surface},{sense})"))
     }
 
     /// The surface, and whether the face's normal is its own.
     fn surface(&mut self, face: &Face) -> (String, bool) {
-        // Any point and any direction along it will do: those of its first curve.
+        // Any point will do as origin, and any direction as x axis.
         let points = self.geometry.points(&face.loops[0][0], 0.5);
-        let toward = points[1] - points[0];
         match &face.surface {
             Surface::Plane { normal, offset } => {
                 let origin = points[0] - normal * (normal.dot(&points[0]) - offset);
-                let x = (toward - normal * normal.dot(&toward)).normalize();
+                let along = points[1] - points[0];
+                let x = (along - normal * normal.dot(&along)).normalize();
                 let placement = self.step.placement(&origin, normal, &x);
                 (self.step.add(&format!("PLANE('',{placement})")), true)
             }
@@ -128,10 +147,13 @@ impl<'a> ShellWriter<'a> {
                 radius,
                 convex,
             } => {
-                let x = (toward - axis * axis.dot(&toward)).normalize();
+                let outward = points[0] - point;
+                let x = (outward - axis * axis.dot(&outward)).normalize();
                 let placement = self.step.placement(point, axis, &x);
                 let radius = real(*radius);
-                let surface = self.step.add(&format!("CYLINDRICAL_SURFACE('',{placement},{radius})"));
+                let surface = self
+                    .step
+                    .add(&format!("CYLINDRICAL_SURFACE('',{placement},{radius})"));
                 (surface, *convex)
             }
         }
@@ -142,7 +164,10 @@ impl<'a> ShellWriter<'a> {
         for step in steps {
             if let Some((edge, _)) = self.edges.get(&step.curve) {
                 let forward = if step.reversed { ".F." } else { ".T." };
-                written.push(self.step.add(&format!("ORIENTED_EDGE('',*,*,{edge},{forward})")));
+                written.push(
+                    self.step
+                        .add(&format!("ORIENTED_EDGE('',*,*,{edge},{forward})")),
+                );
             }
         }
         written
@@ -153,11 +178,13 @@ impl<'a> ShellWriter<'a> {
         let corner = |steps: &[Step]| Some(self.edges.get(&steps.first()?.curve)?.1[0].clone());
         let corners = corner(first).zip(corner(second));
         let seam = corners.and_then(|(a, b)| {
-            self.step.straight_edge([&a.name, &b.name], [&a.point, &b.point])
+            self.step
+                .straight_edge([&a.name, &b.name], [&a.point, &b.point])
         });
         let mut edges = self.oriented(first);
         let along = |step: &mut Entities, forward: &str| {
-            seam.as_ref().map(|seam| step.add(&format!("ORIENTED_EDGE('',*,*,{seam},{forward})")))
+            seam.as_ref()
+                .map(|seam| step.add(&format!("ORIENTED_EDGE('',*,*,{seam},{forward})")))
         };
         edges.extend(along(self.step, ".T."));
         edges.extend(self.oriented(second));

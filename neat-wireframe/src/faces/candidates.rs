@@ -33,14 +33,19 @@ pub(super) fn candidates(curves: &Curves) -> Vec<Face> {
 
 /// The face in the plane of its own curves, if there is one that holds all of them.
 fn planar_face(curves: &Curves, loops: Vec<Vec<Step>>, frame: &PlaneFrame) -> Option<Face> {
-    let of_loops = loops.iter().flatten().filter_map(|step| curves.find(step.curve));
+    let of_loops = loops
+        .iter()
+        .flatten()
+        .filter_map(|step| curves.find(step.curve));
     let measured = of_loops.flat_map(|curve| &curve.measured);
     let fit = PlaneFit::through(measured.clone(), curves.extent)?;
     let (mut normal, mut offset) = fit.plane()?;
     if normal.dot(&frame.normal) < 0.0 {
         (normal, offset) = (-normal, -offset);
     }
-    let holds = measured.clone().all(|(point, covariance)| fit.holds(point, covariance));
+    let holds = measured
+        .clone()
+        .all(|(point, covariance)| fit.holds(point, covariance));
     holds.then_some(Face {
         surface: Surface::Plane { normal, offset },
         loops,
@@ -98,7 +103,9 @@ fn loops_between(
     };
     let around = |curve: &Curve, axis: Vector3<f64>| {
         let reversed = curve.arc?.normal().dot(&axis) < 0.0;
-        let ends = curve.ends.map(|[a, b]| if reversed { [b, a] } else { [a, b] });
+        let ends = curve
+            .ends
+            .map(|[a, b]| if reversed { [b, a] } else { [a, b] });
         let curve = curve.index;
         Some((Step { curve, reversed }, ends))
     };

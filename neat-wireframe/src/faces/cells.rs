@@ -94,7 +94,11 @@ fn half_edge_cycles(curves: &Curves, open: &[&Curve], frame: &PlaneFrame) -> Vec
     // Steps that leave each junction, counterclockwise.
     let mut leaving: BTreeMap<usize, Vec<(f64, Step)>> = BTreeMap::new();
     for curve in open {
-        for (reversed, from) in curve.ends.iter().flat_map(|ends| [(false, ends[0]), (true, ends[1])]) {
+        for (reversed, from) in curve
+            .ends
+            .iter()
+            .flat_map(|ends| [(false, ends[0]), (true, ends[1])])
+        {
             let step = Step {
                 curve: curve.index,
                 reversed,
@@ -133,10 +137,16 @@ fn half_edge_cycles(curves: &Curves, open: &[&Curve], frame: &PlaneFrame) -> Vec
 
 /// A number for every curve, the same for those that junctions join.
 fn components(open: &[&Curve]) -> BTreeMap<CurveIndex, usize> {
-    let ends: Vec<Vec<usize>> = open.iter().filter_map(|c| c.ends.map(|e| e.to_vec())).collect();
+    let ends: Vec<Vec<usize>> = open
+        .iter()
+        .filter_map(|c| c.ends.map(|e| e.to_vec()))
+        .collect();
     let groups = pathfinding::undirected::connected_components::components(&ends);
     let mut component_of_junction = BTreeMap::new();
-    let mut groups: Vec<Vec<usize>> = groups.into_iter().map(|g| g.into_iter().collect()).collect();
+    let mut groups: Vec<Vec<usize>> = groups
+        .into_iter()
+        .map(|g| g.into_iter().collect())
+        .collect();
     groups.iter_mut().for_each(|group| group.sort_unstable());
     groups.sort();
     for (number, group) in groups.iter().enumerate() {
@@ -150,7 +160,10 @@ fn components(open: &[&Curve]) -> BTreeMap<CurveIndex, usize> {
 fn nested(cycles: &[Cycle]) -> Vec<Cell> {
     let mut bounded: Vec<&Cycle> = cycles.iter().filter(|cycle| cycle.area > 0.0).collect();
     bounded.sort_by(|a, b| a.area.total_cmp(&b.area));
-    let mut cells: Vec<Cell> = bounded.iter().map(|cycle| vec![cycle.steps.clone()]).collect();
+    let mut cells: Vec<Cell> = bounded
+        .iter()
+        .map(|cycle| vec![cycle.steps.clone()])
+        .collect();
     for inner in cycles.iter().filter(|cycle| cycle.area < 0.0) {
         let holds = |outer: &&Cycle| {
             outer.component != inner.component

@@ -19,8 +19,12 @@ pub(super) fn point_along(chain: &[Vector3<f64>], share: f64) -> Vector3<f64> {
 
 /// Distance of a point from the nearest of a chain.
 pub(super) fn distance_to_chain(chain: &[Vector3<f64>], point: &Vector3<f64>) -> f64 {
-    let pieces = chain.windows(2).map(|ends| LineSegment3::new(ends[0], ends[1]));
-    pieces.map(|piece| piece.distance_to_point(point)).fold(f64::INFINITY, f64::min)
+    let pieces = chain
+        .windows(2)
+        .map(|ends| LineSegment3::new(ends[0], ends[1]));
+    pieces
+        .map(|piece| piece.distance_to_point(point))
+        .fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -33,6 +37,9 @@ mod tests {
         assert_eq!(point_along(&corner, 0.5), Vector3::new(2.0, 0.0, 0.0));
         assert_eq!(point_along(&corner, 0.875), Vector3::new(3.0, 0.5, 0.0));
         assert_eq!(point_along(&corner, 1.0), corner[2]);
-        assert_eq!(distance_to_chain(&corner, &Vector3::new(1.0, 0.0, 2.0)), 2.0);
+        assert_eq!(
+            distance_to_chain(&corner, &Vector3::new(1.0, 0.0, 2.0)),
+            2.0
+        );
     }
 }

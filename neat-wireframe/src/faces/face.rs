@@ -72,7 +72,8 @@ pub enum CurveIndex {
 }
 
 impl Shell {
-    /// The same shell where a similarity that does not turn has moved the wireframe.
+    /// The same shell where a similarity has moved the wireframe: one that does not turn it, but
+    /// may mirror it at a point.
     pub fn map(&self, f: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
         Self {
             closed: self.closed,
@@ -118,8 +119,9 @@ impl Face {
         };
         let unit = |v: &Vector3<f64>| (v.norm() - 1.0).abs() < 1e-6;
         let is_arc = |step: &Step| matches!(step.curve, CurveIndex::Arc(_));
-        let shape: Vec<Vec<bool>> =
-            (self.loops.iter()).map(|steps| steps.iter().map(is_arc).collect()).collect();
+        let shape: Vec<Vec<bool>> = (self.loops.iter())
+            .map(|steps| steps.iter().map(is_arc).collect())
+            .collect();
         let surface = match &self.surface {
             Surface::Plane { normal, offset } => {
                 unit(normal) && offset.is_finite() && !self.loops.is_empty()
@@ -131,8 +133,12 @@ impl Face {
                 ..
             } => {
                 let finite = point.iter().all(|x| x.is_finite());
-                let joined = shape == [[true, false, true, false]];
-                unit(axis) && finite && radius.is_normal() && *radius > 0.0
+                let joined =
+                    shape == [[true, false, true, false]] || shape == [[false, true, false, true]];
+                unit(axis)
+                    && finite
+                    && radius.is_normal()
+                    && *radius > 0.0
                     && (joined || shape == [[true], [true]])
             }
         };
@@ -147,11 +153,16 @@ impl Face {
     }
 
     fn map(&self, f: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
+        let origin = f(&Vector3::zeros());
+        let scale = (f(&Vector3::x()) - origin).x;
         let surface = match self.surface {
-            Surface::Plane { normal, offset } => Surface::Plane {
-                normal,
-                offset: normal.dot(&f(&(normal * offset))),
-            },
+            Surface::Plane { normal, offset } => {
+                let outward = normal * scale.signum();
+                Surface::Plane {
+                    normal: outward,
+                    offset: outward.dot(&f(&(normal * offset))),
+                }
+            }
             Surface::Cylinder {
                 point,
                 axis,
@@ -159,15 +170,18 @@ impl Face {
                 convex,
             } => Surface::Cylinder {
                 point: f(&point),
-                axis,
-                radius: (f(&(point + axis * radius)) - f(&point)).norm(),
+                axis: axis * scale.signum(),
+                radius: radius * scale.abs(),
                 convex,
             },
         };
-        Self {
-            surface,
-            loops: self.loops.clone(),
-        }
+        // In the mirror, left is right.
+        let loops = if scale < 0.0 {
+            self.turned().loops
+        } else {
+            self.loops.clone()
+        };
+        Self { surface, loops }
     }
 
     /// The same face with its normal on the other side.
@@ -213,14 +227,23 @@ fn is_closed(steps: &[Step], wireframe: &Wireframe3d, arcs: &[CircularArc]) -> b
             CurveIndex::Edge(edge) => wireframe.edges[edge],
             CurveIndex::Arc(arc) => nearest_junctions(&arcs[arc], &wireframe.junctions)?,
         };
-        Some(if step.reversed { [end, start] } else { [start, end] })
+        Some(if step.reversed {
+            [end, start]
+        } else {
+            [start, end]
+        })
     };
     match steps {
         [] => false,
-        [step] => matches!(step.curve, CurveIndex::Arc(_)),
+        [step] => match step.curve {
+            CurveIndex::Edge(_) => false,
+            CurveIndex::Arc(arc) => arcs[arc].is_closed(),
+        },
         [.., last] => {
             let before = std::iter::once(last).chain(steps);
-            let mut pairs = before.zip(steps).map(|(before, step)| (ends(before), ends(step)));
+            let mut pairs = before
+                .zip(steps)
+                .map(|(before, step)| (ends(before), ends(step)));
             pairs.all(|(before, step)| before.zip(step).is_some_and(|(b, s)| b[1] == s[0]))
         }
     }

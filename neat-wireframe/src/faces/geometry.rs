@@ -34,6 +34,8 @@ pub struct ShellGeometry {
     pub vertices: BTreeMap<usize, Vector3<f64>>,
     /// Its edges and arcs.
     pub curves: BTreeMap<CurveIndex, ShellCurve>,
+    /// A point of it: far from the origin of the frame, areas and volumes would lose their digits.
+    origin: Vector3<f64>,
 }
 
 impl ShellGeometry {
@@ -47,7 +49,10 @@ impl ShellGeometry {
         for face in &shell.faces {
             for steps in &face.loops {
                 for step in steps {
-                    surfaces_of.entry(step.curve).or_default().push(face.surface);
+                    surfaces_of
+                        .entry(step.curve)
+                        .or_default()
+                        .push(face.surface);
                     let curve = match step.curve {
                         CurveIndex::Edge(edge) => ShellCurve {
                             ends: Some(wireframe.edges[edge]),
@@ -67,7 +72,10 @@ impl ShellGeometry {
         let mut surfaces_at: BTreeMap<usize, Vec<Surface>> = BTreeMap::new();
         for (index, curve) in &curves {
             for end in curve.ends.iter().flatten() {
-                surfaces_at.entry(*end).or_default().extend(&surfaces_of[index]);
+                surfaces_at
+                    .entry(*end)
+                    .or_default()
+                    .extend(&surfaces_of[index]);
             }
         }
         let vertices = (surfaces_at.into_iter())
@@ -84,7 +92,18 @@ impl ShellGeometry {
                 }
             }
         }
-        Self { vertices, curves }
+        let centers = curves.values().filter_map(|curve| Some(curve.arc?.center));
+        let origin = vertices
+            .values()
+            .copied()
+            .chain(centers)
+            .next()
+            .unwrap_or_default();
+        Self {
+            vertices,
+            curves,
+            origin,
+        }
     }
 
     /// Points along a step, both ends among them; arcs turn by `most` radians at most from one to
@@ -93,7 +112,11 @@ impl ShellGeometry {
         let curve = &self.curves[&step.curve];
         let mut points = match (&curve.arc, curve.ends) {
             (Some(arc), _) => arc.points(most),
-            (None, ends) => ends.iter().flatten().map(|end| self.vertices[end]).collect(),
+            (None, ends) => ends
+                .iter()
+                .flatten()
+                .map(|end| self.vertices[end])
+                .collect(),
         };
         if let (Some(ends), [first, .., last]) = (curve.ends, &mut points[..]) {
             [*first, *last] = ends.map(|end| self.vertices[&end]);
@@ -116,22 +139,26 @@ impl ShellGeometry {
     /// x / 3: for a shell that is not closed it means nothing.
     pub fn volume(&self, shell: &Shell) -> f64 {
         let flux = |face: &Face| match face.surface {
-            Surface::Plane { normal, offset } => offset * normal.dot(&self.area_vector(face)),
+            Surface::Plane { normal, offset } => {
+                (offset - normal.dot(&self.origin)) * normal.dot(&self.area_vector(face))
+            }
             Surface::Cylinder { .. } => self.moments_of_cylinder(face).1,
         };
         shell.faces.iter().map(flux).sum::<f64>() / 3.0
     }
 
-    /// Half the integral of x × dx around a face.
+    /// Half the integral of x × dx around a face, with x from the origin.
     fn area_vector(&self, face: &Face) -> Vector3<f64> {
         let of_step = |step: &Step| {
             let curve = &self.curves[&step.curve];
             let sign = if step.reversed { -0.5 } else { 0.5 };
-            let ends = curve.ends.map(|ends| ends.map(|end| self.vertices[&end]));
+            let ends = curve
+                .ends
+                .map(|ends| ends.map(|end| self.vertices[&end] - self.origin));
             let twice = match (&curve.arc, ends) {
                 (Some(arc), ends) => {
-                    let [start, end] = ends.unwrap_or([arc.point_at(arc.angles[0]); 2]);
-                    arc.center.cross(&(end - start))
+                    let [start, end] = ends.unwrap_or_default();
+                    (arc.center - self.origin).cross(&(end - start))
                         + arc.normal() * arc.radius.powi(2) * arc.sweep()
                 }
                 (None, Some([start, end])) => start.cross(&end),
@@ -163,7 +190,7 @@ impl ShellGeometry {
         // The integral of the direction from the axis, over the angle.
         let [start, end] = one.angles;
         let outward = one.toward(end - 0.25 * TAU) - one.toward(start - 0.25 * TAU);
-        let flux = radius * area + radius * height * point.dot(&outward);
+        let flux = radius * area + radius * height * (point - self.origin).dot(&outward);
         (area, if convex { flux } else { -flux })
     }
 }
@@ -172,7 +199,9 @@ impl ShellGeometry {
 fn on_surfaces(start: Vector3<f64>, surfaces: &[Surface]) -> Vector3<f64> {
     let mut position = start;
     for _ in 0..STEPS {
-        let rows = surfaces.iter().map(|surface| height_over(surface, &position));
+        let rows = surfaces
+            .iter()
+            .map(|surface| height_over(surface, &position));
         let rows: Vec<(Vector3<f64>, f64)> = rows.collect();
         let normals = DMatrix::from_fn(rows.len(), 3, |i, k| rows[i].0[k]);
         let heights = DVector::from_fn(rows.len(), |i, _| -rows[i].1);
@@ -225,7 +254,11 @@ fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> C
     let along = axis.unwrap_or(normal);
     center += along * (offset - normal.dot(&center)) / normal.dot(&along);
     let up = normal * normal.dot(&arc.normal()).signum();
-    let toward = if whole { across(&along)[0] } else { arc.axes[0] };
+    let toward = if whole {
+        across(&along)[0]
+    } else {
+        arc.axes[0]
+    };
     let x = (toward - up * up.dot(&toward)).normalize();
     CircularArc {
         center,

@@ -40,6 +40,7 @@ mod polygon;
 mod region;
 mod selection;
 mod shells;
+mod triangulation;
 mod visibility;
 
 #[cfg(test)]
@@ -47,6 +48,8 @@ mod tests;
 
 pub use curves::MeasuredGraph;
 pub use face::{CurveIndex, Face, Shell, Step, Surface};
+pub(crate) use triangulation::triangles;
+
 pub use geometry::{ShellCurve, ShellGeometry};
 
 use crate::ViewObservation;
@@ -68,7 +71,9 @@ pub fn find_shells(graph: &MeasuredGraph, views: &[ViewObservation]) -> Vec<Shel
     let _span = tracing::debug_span!("find_shells", faces = faces.len()).entered();
     let sightings = Sightings::new(&curves, views);
     let against: Vec<f64> = (faces.par_iter())
-        .map(|face| Region::new(&curves, face).map_or(f64::MAX, |region| sightings.against(&region)))
+        .map(|face| {
+            Region::new(&curves, face).map_or(f64::MAX, |region| sightings.against(&region))
+        })
         .collect();
     let chosen = selection::select(&curves, &faces, &against);
     let chosen = chosen.into_iter().map(|face| faces[face].clone()).collect();

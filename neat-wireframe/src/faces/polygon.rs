@@ -31,7 +31,8 @@ fn sides(polygon: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> + 
 }
 
 fn segments_cross([a, b]: &[Vector2<f64>; 2], [c, d]: &[Vector2<f64>; 2]) -> bool {
-    let side = |from: &Vector2<f64>, to: &Vector2<f64>, p: &Vector2<f64>| (to - from).perp(&(p - from));
+    let side =
+        |from: &Vector2<f64>, to: &Vector2<f64>, p: &Vector2<f64>| (to - from).perp(&(p - from));
     side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0
 }
 
@@ -50,7 +51,16 @@ mod tests {
         assert!(!crosses_itself(&square));
         let bow_tie = [0, 2, 1, 3].map(|k| square[k]);
         assert!(crosses_itself(&bow_tie));
-        let notched = [[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        let notched = [
+            [0.0, 0.0],
+            [3.0, 0.0],
+            [3.0, 2.0],
+            [2.0, 2.0],
+            [2.0, 1.0],
+            [1.0, 1.0],
+            [1.0, 2.0],
+            [0.0, 2.0],
+        ];
         assert!(!crosses_itself(&notched.map(Vector2::from)));
     }
 }

@@ -33,7 +33,12 @@ impl Region {
                     polygons: face.loops.iter().map(polygon).collect(),
                 })
             }
-            Surface::Cylinder { axis, point, radius, .. } => {
+            Surface::Cylinder {
+                axis,
+                point,
+                radius,
+                ..
+            } => {
                 let mut rims = face.steps().filter_map(|step| curves.find(step.curve)?.arc);
                 let [one, other] = [rims.next()?, rims.next()?];
                 let center = |arc: &CircularArc| point + axis * axis.dot(&(arc.center - point));

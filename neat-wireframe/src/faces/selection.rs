@@ -35,8 +35,9 @@ enum Pair {
 
 /// The places of the chosen faces, ascending; `against` is what images say against each.
 pub(super) fn select(curves: &Curves, faces: &[Face], against: &[f64]) -> Vec<usize> {
-    let possible: Vec<usize> =
-        (0..faces.len()).filter(|face| against[*face] <= MOST_AGAINST).collect();
+    let possible: Vec<usize> = (0..faces.len())
+        .filter(|face| against[*face] <= MOST_AGAINST)
+        .collect();
     let mut at_curve: BTreeMap<CurveIndex, Vec<(usize, Step)>> = BTreeMap::new();
     for face in &possible {
         for step in faces[*face].steps() {
@@ -99,7 +100,11 @@ fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
     let [one, other] = [0, 1].map(|k| {
         // Both from the same end of the curve: a face to the left of its loop is to the
         // right of the same loop backwards.
-        let forward = if steps[k].reversed { faces[k].turned() } else { faces[k].clone() };
+        let forward = if steps[k].reversed {
+            faces[k].turned()
+        } else {
+            faces[k].clone()
+        };
         let step = Step {
             curve: steps[k].curve,
             reversed: false,
@@ -133,7 +138,8 @@ impl<'a> Search<'a> {
         group: Vec<usize>,
     ) -> Self {
         let gain = |face: usize| MISSING_FACE * faces[face].steps().count() as f64 - against[face];
-        let mut order: Vec<(f64, usize)> = group.into_iter().map(|face| (gain(face), face)).collect();
+        let mut order: Vec<(f64, usize)> =
+            group.into_iter().map(|face| (gain(face), face)).collect();
         order.retain(|(gain, _)| *gain > 0.0);
         order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         Self {
@@ -188,7 +194,12 @@ impl<'a> Search<'a> {
         }
         let mut cost = 0.0;
         for other in &self.taken {
-            for (_, pair) in self.pairs.get(&[face.min(*other), face.max(*other)]).into_iter().flatten() {
+            for (_, pair) in self
+                .pairs
+                .get(&[face.min(*other), face.max(*other)])
+                .into_iter()
+                .flatten()
+            {
                 match pair {
                     Pair::Folded => return None,
                     _ => cost += FLAT,

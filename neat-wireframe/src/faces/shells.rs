@@ -1,7 +1,7 @@
 //! Faces become shells: what hangs together, with its outer side found, and closed or not.
 
-use super::curves::{Curve, Curves, MeasuredGraph, TURN};
 use super::chain::{distance_to_chain, point_along};
+use super::curves::{Curve, Curves, MeasuredGraph, TURN};
 use super::face::{CurveIndex, Face, Shell, Step, Surface};
 use super::geometry::ShellGeometry;
 use super::region::Region;
@@ -40,7 +40,10 @@ pub(super) fn shells(
     let shell = |group: Vec<usize>| {
         let mut faces: Vec<Face> = group.iter().map(|place| faces[*place].clone()).collect();
         let orientable = orient(&mut faces);
-        let two_each = faces.iter().flat_map(Face::steps).all(|step| of_curve[&step.curve].len() == 2);
+        let two_each = faces
+            .iter()
+            .flat_map(Face::steps)
+            .all(|step| of_curve[&step.curve].len() == 2);
         let mut shell = Shell {
             closed: orientable && two_each,
             faces,
@@ -77,7 +80,10 @@ fn orient(faces: &mut [Face]) -> bool {
         let mut queue = VecDeque::from([first]);
         while let Some(place) = queue.pop_front() {
             for step in steps_of(&faces[place]) {
-                for other in at_curve[&step.curve].iter().filter(|other| **other != place) {
+                for other in at_curve[&step.curve]
+                    .iter()
+                    .filter(|other| **other != place)
+                {
                     let same = faces[*other].steps().any(|s| *s == step);
                     if !oriented[*other] {
                         if same {
@@ -107,7 +113,9 @@ fn face_outward(shell: &mut Shell, graph: &MeasuredGraph, views: &[ViewObservati
                 return 0.0;
             };
             let centers = views.iter().map(|view| view.camera.center_in_world);
-            centers.map(|center| normal.dot(&(center - point)).signum()).sum::<f64>()
+            centers
+                .map(|center| normal.dot(&(center - point)).signum())
+                .sum::<f64>()
                 * geometry.area(face)
         };
         shell.faces.iter().map(toward_cameras).sum()
@@ -125,15 +133,19 @@ fn middle(face: &Face, geometry: &ShellGeometry) -> Option<(Vector3<f64>, Vector
     let points: Vec<Vector3<f64>> = (face.loops.first()?.iter())
         .flat_map(|step| geometry.points(step, TURN))
         .collect();
-    Some((points.iter().sum::<Vector3<f64>>() / points.len() as f64, normal))
+    Some((
+        points.iter().sum::<Vector3<f64>>() / points.len() as f64,
+        normal,
+    ))
 }
 
 /// Makes a sheet of a closed shell if other curves of the wireframe lie within it or on it: nothing
 /// is seen within a solid, and what lies on a face is the rim of something that the shell lacks.
 /// The faces on which they lie are left out.
 fn open_where_curves_are(shell: &mut Shell, curves: &Curves) {
-    let own: BTreeSet<CurveIndex> =
-        (shell.faces.iter().flat_map(Face::steps)).map(|step| step.curve).collect();
+    let own: BTreeSet<CurveIndex> = (shell.faces.iter().flat_map(Face::steps))
+        .map(|step| step.curve)
+        .collect();
     let (bounding, others): (Vec<&Curve>, Vec<&Curve>) =
         (curves.all.iter()).partition(|curve| own.contains(&curve.index));
     let margin = MARGIN * curves.extent;
@@ -141,26 +153,38 @@ fn open_where_curves_are(shell: &mut Shell, curves: &Curves) {
     let apart = |point: &Vector3<f64>| {
         (bounding.iter()).all(|curve| distance_to_chain(&curve.points, point) > margin)
     };
-    let chains = others.iter().map(|curve| &curve.points).chain(&curves.loose);
+    let chains = others
+        .iter()
+        .map(|curve| &curve.points)
+        .chain(&curves.loose);
     let samples: Vec<Vec<Vector3<f64>>> = chains
         .map(|points| {
             let places = (0..POINTS).map(|k| (k as f64 + 0.5) / POINTS as f64);
-            places.map(|place| point_along(points, place)).filter(apart).collect()
+            places
+                .map(|place| point_along(points, place))
+                .filter(apart)
+                .collect()
         })
         .collect();
     let most = |of_curve: &Vec<Vector3<f64>>, holds: &dyn Fn(&Vector3<f64>) -> bool| {
         2 * of_curve.iter().filter(|point| holds(point)).count() > POINTS
     };
-    let regions: Vec<Option<Region>> =
-        (shell.faces.iter()).map(|face| Region::new(curves, face)).collect();
+    let regions: Vec<Option<Region>> = (shell.faces.iter())
+        .map(|face| Region::new(curves, face))
+        .collect();
     let ray = Vector3::from(RAY);
     let within = |point: &Vector3<f64>| {
-        let hits = regions.iter().flatten().flat_map(|region| region.hits(point, &ray));
+        let hits = regions
+            .iter()
+            .flatten()
+            .flat_map(|region| region.hits(point, &ray));
         hits.flatten().filter(|t| *t > 0.0).count() % 2 == 1
     };
     let is_free = |region: &Option<Region>| {
         let on_face = |point: &Vector3<f64>| {
-            region.as_ref().is_some_and(|region| region.is_near(point, margin))
+            region
+                .as_ref()
+                .is_some_and(|region| region.is_near(point, margin))
         };
         !samples.iter().any(|of_curve| most(of_curve, &on_face))
     };

@@ -57,7 +57,11 @@ impl Sightings {
             let valid = view.camera.validate().is_ok();
             (
                 view.camera.center_in_world,
-                if valid { samples(&chains, view) } else { Vec::new() },
+                if valid {
+                    samples(&chains, view)
+                } else {
+                    Vec::new()
+                },
             )
         };
         Self {
@@ -73,7 +77,9 @@ impl Sightings {
         let (mut seen, mut asked) = (0, 0);
         for (center, samples) in &self.views {
             for of_curve in samples.chunk_by(|a, b| a.curve == b.curve) {
-                let hidden = of_curve.iter().filter(|sample| self.is_behind(region, center, sample));
+                let hidden = of_curve
+                    .iter()
+                    .filter(|sample| self.is_behind(region, center, sample));
                 let (count, shown) = hidden.fold((0, 0), |(count, shown), sample| {
                     (count + 1, shown + usize::from(sample.seen))
                 });
