@@ -30,6 +30,10 @@ SCHEMA = Path(__file__).resolve().parent.parent / "docs" / "wireframe.schema.jso
 VOLUME_TOLERANCE = 0.01
 
 
+# Arcs are drawn in pieces that turn by so much at most, in radians.
+TURN_OF_DRAWN_ARCS = 0.089
+
+
 class Wireframe:
     """Vertices [V, 3] and index pairs [E, 2], and the shells between them and the arcs."""
 
@@ -49,6 +53,19 @@ class Wireframe:
         """Indices of the vertices without edges."""
         return sorted(set(range(len(self.vertices))) - set(self.edges.ravel().tolist()))
 
+    def drawn(self):
+        """The same with arcs as chains of edges."""
+        vertices, edges = self.vertices.tolist(), self.edges.tolist()
+        for arc in self.arcs:
+            start, end = arc["angles"]
+            pieces = max(math.ceil((end - start) / TURN_OF_DRAWN_ARCS), 1)
+            count = pieces if end - start > math.tau - 1e-9 else pieces + 1
+            edges += [[len(vertices) + k, len(vertices) + (k + 1) % count] for k in range(pieces)]
+            vertices += [point_of_arc(arc, start + (end - start) * k / pieces).tolist()
+                         for k in range(count)]
+        drawn = Wireframe(vertices, edges)
+        return drawn
+
     def without(self, vertices=(), edges=()):
         """The same without some vertices and edges."""
         kept = [v for v in range(len(self.vertices)) if v not in set(vertices)]
@@ -56,6 +73,11 @@ class Wireframe:
         pairs = [[new_index[a], new_index[b]]
                  for i, (a, b) in enumerate(self.edges.tolist()) if i not in set(edges)]
         return Wireframe(self.vertices[kept], pairs)
+
+
+def point_of_arc(arc, angle):
+    x, y = np.array(arc["axes"])
+    return np.array(arc["center"]) + arc["radius"] * (math.cos(angle) * x + math.sin(angle) * y)
 
 
 def volume(shell, wireframe):
@@ -87,11 +109,9 @@ def area_of_step(step, wireframe):
         start, end = wireframe.vertices[wireframe.edges[step["edge"]]]
         return sign * np.cross(start, end)
     arc = wireframe.arcs[step["arc"]]
-    center, axes, radius = np.array(arc["center"]), np.array(arc["axes"]), arc["radius"]
-    start, end = (center + radius * (math.cos(a) * axes[0] + math.sin(a) * axes[1])
-                  for a in arc["angles"])
-    swept = radius**2 * (arc["angles"][1] - arc["angles"][0])
-    return sign * (np.cross(center, end - start) + swept * np.cross(*axes))
+    start, end = (point_of_arc(arc, angle) for angle in arc["angles"])
+    swept = arc["radius"]**2 * (arc["angles"][1] - arc["angles"][0])
+    return sign * (np.cross(arc["center"], end - start) + swept * np.cross(*arc["axes"]))
 
 
 def check_volume(found, expected, what):
@@ -171,11 +191,16 @@ def vtk_wireframe(data):
 
 def read_obj(path, expected):
     import vtk
+    from vtk.util.numpy_support import vtk_to_numpy
 
     reader = vtk.vtkOBJReader()
     reader.SetFileName(str(path))
     reader.Update()
-    same_graph(vtk_wireframe(reader.GetOutput()), expected)
+    drawn = expected.drawn()
+    same_graph(vtk_wireframe(reader.GetOutput()), drawn)
+    polygons = reader.GetOutput().GetPolys()
+    corners = vtk_to_numpy(polygons.GetConnectivityArray()) if polygons.GetNumberOfCells() else []
+    check_mesh(drawn.vertices, np.reshape(corners, (-1, 3)), expected)
     return "VTK"
 
 
@@ -185,7 +210,9 @@ def read_ply(path, expected):
     ply = PlyData.read(str(path))
     vertex, edge = ply["vertex"], ply["edge"]
     same_graph(Wireframe(np.stack([vertex[axis] for axis in "xyz"], axis=-1),
-                         np.stack([edge["vertex1"], edge["vertex2"]], axis=-1)), expected)
+                         np.stack([edge["vertex1"], edge["vertex2"]], axis=-1)), expected.drawn())
+    faces = [e["vertex_indices"].tolist() for e in ply if e.name == "face"]
+    check_mesh(expected.drawn().vertices, np.reshape(sum(faces, []), (-1, 3)).astype(int), expected)
     return "plyfile"
 
 
@@ -219,10 +246,13 @@ def read_gltf(path, expected):
     primitives = gltf.meshes[node.mesh].primitives
     (positions,) = {primitive.attributes.POSITION for primitive in primitives}
     vertices = data(positions).astype(float) + np.asarray(node.translation)
+    bare, expected = expected, expected.drawn()
+    triangles = [data(p.indices).reshape(-1, 3) for p in primitives if p.mode == 4]
+    check_mesh(vertices, np.concatenate(triangles) if triangles else [], bare)
     lines = [data(p.indices).reshape(-1, 2) for p in primitives if p.mode == 1]
     points = [data(p.indices).ravel().tolist() for p in primitives if p.mode == 0]
     same_graph(Wireframe(vertices, np.concatenate(lines) if lines else []), expected)
-    check(sum(points, []) == expected.isolated(), "isolated junctions")
+    check(sum(points, []) == bare.isolated(), "isolated junctions")
 
     # A second reader, that applies the translation itself, in 32 bits. (trimesh takes
     # the vertices of GL_LINES in their order and ignores the indices.)
@@ -261,34 +291,67 @@ def read_dxf(path, expected):
     return "ezdxf, audit clean"
 
 
+def check_shells(shape, parts, expected):
+    """Closed shells are valid solids of their volume, the others valid sheets."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+    from OCP.TopAbs import TopAbs_ShapeEnum
+
+    closed = [shell for shell in expected.shells if shell["closed"]]
+    solids = list(parts(shape, TopAbs_ShapeEnum.TopAbs_SOLID))
+    check(len(solids) == len(closed), f"{len(solids)} solids, not {len(closed)}")
+    shells = list(parts(shape, TopAbs_ShapeEnum.TopAbs_SHELL))
+    check(len(shells) == len(expected.shells), f"{len(shells)} shells")
+    check(sum(BRep_Tool.IsClosed_s(shell) for shell in shells) == len(closed), "open shells")
+    faces = sum(len(shell["faces"]) for shell in expected.shells)
+    found = len(list(parts(shape, TopAbs_ShapeEnum.TopAbs_FACE)))
+    check(found == faces, f"{found} faces, not {faces}")
+    for part in shells + solids:
+        check(BRepCheck_Analyzer(part).IsValid(), "Open CASCADE finds a shell not valid")
+    if closed:
+        total = 0.0
+        for solid in solids:
+            properties = GProp_GProps()
+            BRepGProp.VolumeProperties_s(solid, properties)
+            total += properties.Mass()
+        check_volume(total, expected, "solids")
+
+
 def read_step(path, expected):
     from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.GeomAbs import GeomAbs_CurveType
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.STEPControl import STEPControl_Reader
     from OCP.TopAbs import TopAbs_ShapeEnum
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopoDS import TopoDS
 
-    lengths = [np.linalg.norm(np.subtract(*expected.vertices[edge])) for edge in expected.edges]
-    flat = [i for i, length in enumerate(lengths) if length == 0.0]
-    expected = expected.without(edges=flat)
-    expected = expected.without(vertices=expected.isolated())
-
     reader = STEPControl_Reader()
     check(reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone, "not read")
     reader.TransferRoots()
     shape = reader.OneShape()
-    if len(expected.edges) == 0:
-        return "Open CASCADE"
 
-    def parts(shape, kind):
-        explorer = TopExp_Explorer(shape, kind)
+    def parts(shape, kind, outside=TopAbs_ShapeEnum.TopAbs_SHAPE):
+        explorer = TopExp_Explorer(shape, kind, outside)
         while explorer.More():
             yield explorer.Current()
             explorer.Next()
 
+    check_shells(shape, parts, expected)
+    steps = [step for shell in expected.shells for face in shell["faces"]
+             for loop in face["loops"] for step in loop]
+    lengths = [np.linalg.norm(np.subtract(*expected.vertices[edge])) for edge in expected.edges]
+    left_out = [i for i, length in enumerate(lengths) if length == 0.0]
+    expected = expected.without(edges=left_out + [s["edge"] for s in steps if "edge" in s])
+    expected = expected.without(vertices=expected.isolated())
+    if len(expected.edges) == 0:
+        return "Open CASCADE"
     vertex_kind, edge_kind = TopAbs_ShapeEnum.TopAbs_VERTEX, TopAbs_ShapeEnum.TopAbs_EDGE
     as_vertex = getattr(TopoDS, "Vertex_s", None) or TopoDS.Vertex
+    as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
     vertices = []
     buckets = {}
 
@@ -304,7 +367,8 @@ def read_step(path, expected):
         return len(vertices) - 1
 
     edges = [[index(vertex) for vertex in parts(edge, vertex_kind)]
-             for edge in parts(shape, edge_kind)]
+             for edge in parts(shape, edge_kind, TopAbs_ShapeEnum.TopAbs_FACE)
+             if BRepAdaptor_Curve(as_edge(edge)).GetType() == GeomAbs_CurveType.GeomAbs_Line]
     found = Wireframe(vertices, edges)
     check(len(vertices) == len(expected.vertices),
           f"{len(vertices)} vertices, not {len(expected.vertices)}")
@@ -419,6 +483,7 @@ def main(arguments):
     truth = json.loads(Path(arguments[0]).read_text())
     directory = Path(arguments[1])
     expected = Wireframe(truth["junctions"], truth.get("edges", truth.get("lines", [])))
+    expected.shells, expected.arcs = truth.get("shells", []), truth.get("arcs", [])
     readers = [("wireframe.json", read_json), ("wireframe.obj", read_obj),
                ("wireframe.ply", read_ply), ("wireframe.gltf", read_gltf),
                ("wireframe.glb", read_gltf), ("wireframe.dxf", read_dxf),
