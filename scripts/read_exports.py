@@ -428,6 +428,9 @@ def read_geojson(path, expected):
     collection = json.loads(path.read_text())
     check(collection["type"] == "FeatureCollection", "type")
     features = collection["features"]
+    arcs = [f for f in features if "arc" in f["properties"]]
+    check(len(arcs) == len(expected.arcs), "arcs")
+    features = [f for f in features if "arc" not in f["properties"]]
     lines = [f for f in features if f["geometry"]["type"] == "LineString"]
     points = [f for f in features if f["geometry"]["type"] == "Point"]
     check(len(lines) + len(points) == len(features), "other features")

@@ -39,13 +39,14 @@ fn planar_face(curves: &Curves, loops: Vec<Vec<Step>>, frame: &PlaneFrame) -> Op
         .filter_map(|step| curves.find(step.curve));
     let measured = of_loops.flat_map(|curve| &curve.measured);
     let fit = PlaneFit::through(measured.clone(), curves.extent)?;
-    let (mut normal, mut offset) = fit.plane()?;
+    let plane = fit.solved()?;
+    let (mut normal, mut offset) = plane.plane();
     if normal.dot(&frame.normal) < 0.0 {
         (normal, offset) = (-normal, -offset);
     }
     let holds = measured
         .clone()
-        .all(|(point, covariance)| fit.holds(point, covariance));
+        .all(|(point, covariance)| plane.holds(point, covariance));
     holds.then_some(Face {
         surface: Surface::Plane { normal, offset },
         loops,

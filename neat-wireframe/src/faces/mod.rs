@@ -72,7 +72,10 @@ pub fn find_shells(graph: &MeasuredGraph, views: &[ViewObservation]) -> Vec<Shel
     let sightings = Sightings::new(&curves, views);
     let against: Vec<f64> = (faces.par_iter())
         .map(|face| {
-            Region::new(&curves, face).map_or(f64::MAX, |region| sightings.against(&region))
+            let of_steps = face.steps().filter_map(|step| curves.find(step.curve));
+            let outline: Vec<_> = of_steps.flat_map(|curve| curve.points.clone()).collect();
+            let region = Region::new(&curves, face);
+            region.map_or(f64::MAX, |region| sightings.against(&region, &outline))
         })
         .collect();
     let chosen = selection::select(&curves, &faces, &against);

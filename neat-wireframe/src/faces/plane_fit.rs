@@ -69,29 +69,45 @@ impl PlaneFit {
         self.right += row * weight * (point - self.origin).dot(&self.axes[2]);
     }
 
-    /// Variance of the height of the fitted plane at a point; `None` if it is not determined.
-    pub fn uncertainty(&self, point: &Vector3<f64>) -> Option<f64> {
-        let row = self.row(point);
-        Some(row.dot(&(self.information.try_inverse()? * row)))
+    /// The fitted plane; `None` if the points do not determine it.
+    pub fn solved(&self) -> Option<FittedPlane<'_>> {
+        let covariance = self.information.try_inverse()?;
+        Some(FittedPlane {
+            fit: self,
+            height: covariance * self.right,
+            covariance,
+        })
+    }
+}
+
+/// The solution of a [`PlaneFit`].
+pub(super) struct FittedPlane<'a> {
+    fit: &'a PlaneFit,
+    /// Over the reference plane: at its origin, and how much it grows along its axes.
+    height: Vector3<f64>,
+    covariance: Matrix3<f64>,
+}
+
+impl FittedPlane<'_> {
+    /// Variance of the height of the plane at a point.
+    pub fn variance(&self, point: &Vector3<f64>) -> f64 {
+        let row = self.fit.row(point);
+        row.dot(&(self.covariance * row))
     }
 
     /// Whether a point may lie in the plane.
     pub fn holds(&self, point: &Vector3<f64>, covariance: &Matrix3<f64>) -> bool {
-        let Some(inverse) = self.information.try_inverse() else {
-            return false;
-        };
-        let row = self.row(point);
-        let off = (point - self.origin).dot(&self.axes[2]) - row.dot(&(inverse * self.right));
-        let variance = row.dot(&(inverse * row)) + self.variance(covariance);
-        off * off <= CHI_SQUARE * variance
+        let over = (point - self.fit.origin).dot(&self.fit.axes[2]);
+        let off = over - self.fit.row(point).dot(&self.height);
+        off * off <= CHI_SQUARE * (self.variance(point) + self.fit.variance(covariance))
     }
 
-    /// Normal and offset of the fitted plane.
-    pub fn plane(&self) -> Option<(Vector3<f64>, f64)> {
-        let height = self.information.try_inverse()? * self.right;
-        let [u, v, n] = self.axes;
-        let normal = (n - (u * height.y + v * height.z) / self.scale).normalize();
-        Some((normal, normal.dot(&(self.origin + n * height.x))))
+    /// Normal and offset of the plane.
+    pub fn plane(&self) -> (Vector3<f64>, f64) {
+        let [u, v, n] = self.fit.axes;
+        let slope = (u * self.height.y + v * self.height.z) / self.fit.scale;
+        let normal = (n - slope).normalize();
+        (normal, normal.dot(&(self.fit.origin + n * self.height.x)))
     }
 }
 

@@ -2,7 +2,7 @@
 //! known of their positions.
 
 use super::curves::{Curve, Curves};
-use super::plane_fit::PlaneFit;
+use super::plane_fit::{FittedPlane, PlaneFit};
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
 
@@ -78,22 +78,14 @@ fn grown(curves: &Curves, seed: &[usize]) -> Option<CoplanarCurves> {
         let points = members.iter().flat_map(|m| curves.all[*m].measured.iter());
         PlaneFit::through(points, curves.extent)
     };
-    let holds = |fit: &PlaneFit, curve: &Curve| {
-        (curve.measured.iter()).all(|(point, covariance)| fit.holds(point, covariance))
+    let holds = |plane: &FittedPlane, curve: &Curve| {
+        (curve.measured.iter()).all(|(point, covariance)| plane.holds(point, covariance))
     };
     let mut fit = fit_of(seed)?;
-    let unsure = |curve: &Curve| {
-        let of_points = curve.measured.iter();
-        let variances = of_points.map(|(point, _)| fit.uncertainty(point).unwrap_or(f64::MAX));
-        variances.fold(0.0, f64::max)
-    };
-    let mut order: Vec<(f64, usize)> = (curves.all.iter().enumerate())
-        .map(|(place, curve)| (unsure(curve), place))
-        .collect();
-    order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let order = most_certain_first(curves, &fit.solved()?);
     let mut members = seed.to_vec();
-    for (_, place) in order {
-        if !seed.contains(&place) && holds(&fit, &curves.all[place]) {
+    for place in order.into_iter().filter(|place| !seed.contains(place)) {
+        if holds(&fit.solved()?, &curves.all[place]) {
             for (point, covariance) in &curves.all[place].measured {
                 fit.add(point, covariance);
             }
@@ -102,18 +94,34 @@ fn grown(curves: &Curves, seed: &[usize]) -> Option<CoplanarCurves> {
     }
     for _ in 0..ROUNDS {
         members.sort_unstable();
-        fit = fit_of(&members)?;
-        let kept = (0..curves.all.len()).filter(|place| holds(&fit, &curves.all[*place]));
+        let fit = fit_of(&members)?;
+        let plane = fit.solved()?;
+        let kept = (0..curves.all.len()).filter(|place| holds(&plane, &curves.all[*place]));
         let kept: Vec<usize> = kept.collect();
         if kept == members {
             break;
         }
         members = kept;
     }
-    let (normal, offset) = fit_of(&members)?.plane()?;
+    let (normal, offset) = fit_of(&members)?.solved()?.plane();
     Some(CoplanarCurves {
         curves: members,
         normal,
         offset,
     })
+}
+
+/// The places of all curves, those first where a plane is known best.
+fn most_certain_first(curves: &Curves, plane: &FittedPlane) -> Vec<usize> {
+    let variance = |curve: &Curve| {
+        let of_points = curve
+            .measured
+            .iter()
+            .map(|(point, _)| plane.variance(point));
+        of_points.fold(0.0, f64::max)
+    };
+    let variances: Vec<f64> = curves.all.iter().map(variance).collect();
+    let mut order: Vec<usize> = (0..variances.len()).collect();
+    order.sort_by(|a, b| variances[*a].total_cmp(&variances[*b]).then(a.cmp(b)));
+    order
 }

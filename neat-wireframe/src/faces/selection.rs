@@ -10,7 +10,7 @@ use super::curves::Curves;
 use super::face::{CurveIndex, Face, Step, Surface};
 use nalgebra::Vector3;
 use pathfinding::undirected::connected_components::components;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Edges of a solid have two faces: that one lacks one is as likely as that a line of the
 /// wireframe is paint, 1 in 20.
@@ -23,7 +23,7 @@ const MOST_AGAINST: f64 = 3.0;
 const SAME_PLANE: f64 = 0.9986;
 /// States that are looked at for one set of faces that exclude each other. What was best by then
 /// is taken.
-const MOST_STATES: usize = 200_000;
+const MOST_STATES: usize = 20_000;
 
 /// How two faces at one curve lie to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,15 +44,15 @@ pub(super) fn select(curves: &Curves, faces: &[Face], against: &[f64]) -> Vec<us
             at_curve.entry(step.curve).or_default().push((*face, *step));
         }
     }
-    let mut pairs: BTreeMap<[usize; 2], Vec<(CurveIndex, Pair)>> = BTreeMap::new();
+    let mut beside: Vec<Vec<(usize, Pair)>> = vec![Vec::new(); faces.len()];
     let mut contended: Vec<Vec<usize>> = possible.iter().map(|face| vec![*face]).collect();
-    for (curve, at) in &at_curve {
+    for at in at_curve.values() {
         for (k, (one, step)) in at.iter().enumerate() {
             for (other, other_step) in &at[k + 1..] {
                 let pair = pair(curves, [&faces[*one], &faces[*other]], [step, other_step]);
                 if pair != Pair::Crease {
-                    let of_pair = pairs.entry([*one.min(other), *one.max(other)]).or_default();
-                    of_pair.push((*curve, pair));
+                    beside[*one].push((*other, pair));
+                    beside[*other].push((*one, pair));
                 }
                 if at.len() > 2 || pair != Pair::Crease {
                     contended.push(vec![*one, *other]);
@@ -65,7 +65,7 @@ pub(super) fn select(curves: &Curves, faces: &[Face], against: &[f64]) -> Vec<us
         .collect();
     groups.iter_mut().for_each(|group| group.sort_unstable());
     let mut chosen: Vec<usize> = (groups.into_iter())
-        .flat_map(|group| Search::new(faces, against, &pairs, group).best())
+        .flat_map(|group| Search::new(faces, against, &beside, group).best())
         .collect();
     chosen.sort_unstable();
     chosen
@@ -121,10 +121,11 @@ fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
 /// Branch and bound over the faces of one group.
 struct Search<'a> {
     faces: &'a [Face],
-    pairs: &'a BTreeMap<[usize; 2], Vec<(CurveIndex, Pair)>>,
+    /// For each face those that go on as its plane or lie on it.
+    beside: &'a [Vec<(usize, Pair)>],
     /// In the order in which they are decided on, each with what it wins at most.
     order: Vec<(f64, usize)>,
-    taken: Vec<usize>,
+    taken: BTreeSet<usize>,
     count: BTreeMap<CurveIndex, usize>,
     best: (f64, Vec<usize>),
     states: usize,
@@ -134,19 +135,18 @@ impl<'a> Search<'a> {
     fn new(
         faces: &'a [Face],
         against: &[f64],
-        pairs: &'a BTreeMap<[usize; 2], Vec<(CurveIndex, Pair)>>,
+        beside: &'a [Vec<(usize, Pair)>],
         group: Vec<usize>,
     ) -> Self {
         let gain = |face: usize| MISSING_FACE * faces[face].steps().count() as f64 - against[face];
-        let mut order: Vec<(f64, usize)> =
-            group.into_iter().map(|face| (gain(face), face)).collect();
-        order.retain(|(gain, _)| *gain > 0.0);
+        let gains = group.into_iter().map(|face| (gain(face), face));
+        let mut order: Vec<(f64, usize)> = gains.filter(|(gain, _)| *gain > 0.0).collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         Self {
             faces,
-            pairs,
+            beside,
             order,
-            taken: Vec::new(),
+            taken: BTreeSet::new(),
             count: BTreeMap::new(),
             best: (0.0, Vec::new()),
             states: 0,
@@ -162,7 +162,7 @@ impl<'a> Search<'a> {
     /// Decides on the faces from the `next` one on, which win `left` at most, after `won`.
     fn descend(&mut self, next: usize, won: f64, left: f64) {
         if won > self.best.0 {
-            self.best = (won, self.taken.clone());
+            self.best = (won, self.taken.iter().copied().collect());
         }
         self.states += 1;
         if next == self.order.len() || won + left <= self.best.0 || self.states > MOST_STATES {
@@ -170,11 +170,11 @@ impl<'a> Search<'a> {
         }
         let (gain, face) = self.order[next];
         if let Some(cost) = self.cost_beside_taken(face) {
-            self.taken.push(face);
+            self.taken.insert(face);
             self.add(face, 1);
             self.descend(next + 1, won + gain - cost, left - gain);
             self.add(face, -1);
-            self.taken.pop();
+            self.taken.remove(&face);
         }
         self.descend(next + 1, won, left - gain);
     }
@@ -192,20 +192,11 @@ impl<'a> Search<'a> {
         if self.faces[face].steps().any(full) {
             return None;
         }
-        let mut cost = 0.0;
-        for other in &self.taken {
-            for (_, pair) in self
-                .pairs
-                .get(&[face.min(*other), face.max(*other)])
-                .into_iter()
-                .flatten()
-            {
-                match pair {
-                    Pair::Folded => return None,
-                    _ => cost += FLAT,
-                }
-            }
-        }
-        Some(cost)
+        let beside = self.beside[face]
+            .iter()
+            .filter(|(other, _)| self.taken.contains(other));
+        beside
+            .map(|(_, pair)| (*pair != Pair::Folded).then_some(FLAT))
+            .sum()
     }
 }

@@ -13,7 +13,7 @@ use crate::ViewObservation;
 use crate::projection::project_in_front;
 use crate::segment_grid::SegmentGrid;
 use nalgebra::{Vector2, Vector3};
-use neat_core::LineSegment2;
+use neat_core::{Camera, LineSegment2};
 use rayon::prelude::*;
 
 /// Probability that 2D segments lie along a hidden curve nevertheless. At 0.02 and 0.1 the same
@@ -36,15 +36,20 @@ const BEHIND: f64 = 0.02;
 
 /// A point of a curve in a view where no other curve is near.
 struct Sample {
-    /// The curve, among those that are asked for.
-    curve: usize,
     point: Vector3<f64>,
+    pixel: Vector2<f64>,
     seen: bool,
+}
+
+/// One view, with its samples curve by curve.
+struct ViewSightings {
+    camera: Camera,
+    of_curves: Vec<(Bounds, Vec<Sample>)>,
 }
 
 /// What every view shows of the curves.
 pub(super) struct Sightings {
-    views: Vec<(Vector3<f64>, Vec<Sample>)>,
+    views: Vec<ViewSightings>,
     behind: f64,
 }
 
@@ -53,30 +58,44 @@ impl Sightings {
         let chains: Vec<&[Vector3<f64>]> = (curves.all.iter().map(|curve| &curve.points[..]))
             .chain(curves.loose.iter().map(|points| &points[..]))
             .collect();
+        let usable = views
+            .par_iter()
+            .filter(|view| view.camera.validate().is_ok());
         let in_view = |view: &ViewObservation| {
-            let valid = view.camera.validate().is_ok();
-            (
-                view.camera.center_in_world,
-                if valid {
-                    samples(&chains, view)
-                } else {
-                    Vec::new()
-                },
-            )
+            let samples = samples(&chains, view);
+            let of_curves = samples
+                .into_iter()
+                .filter(|of_curve| of_curve.len() >= MIN_SAMPLES);
+            let with_bounds = |of_curve: Vec<Sample>| {
+                let bounds = Bounds::of(of_curve.iter().map(|sample| Some(sample.pixel)));
+                (bounds, of_curve)
+            };
+            ViewSightings {
+                camera: view.camera,
+                of_curves: of_curves.map(with_bounds).collect(),
+            }
         };
         Self {
-            views: views.par_iter().map(in_view).collect(),
+            views: usable.map(in_view).collect(),
             behind: BEHIND * curves.extent,
         }
     }
 
-    /// How much less likely the images are with the face than without, as a logarithm. That hidden
+    /// How much less likely the images are with a face than without, as a logarithm. That hidden
     /// curves are hidden says nothing for it, as other faces may hide them, and so many as are seen
     /// by chance nothing against it.
-    pub fn against(&self, region: &Region) -> f64 {
+    ///
+    /// `outline` are the points of the face's boundary.
+    pub fn against(&self, region: &Region, outline: &[Vector3<f64>]) -> f64 {
         let (mut seen, mut asked) = (0, 0);
-        for (center, samples) in &self.views {
-            for of_curve in samples.chunk_by(|a, b| a.curve == b.curve) {
+        for view in &self.views {
+            let bounds = Bounds::of(outline.iter().map(|p| project_in_front(&view.camera, p)));
+            let beside = view
+                .of_curves
+                .iter()
+                .filter(|(other, _)| bounds.meets(other));
+            for (_, of_curve) in beside {
+                let center = &view.camera.center_in_world;
                 let hidden = of_curve
                     .iter()
                     .filter(|sample| self.is_behind(region, center, sample));
@@ -102,6 +121,26 @@ impl Sightings {
     }
 }
 
+/// A rectangle in an image, or all of it.
+#[derive(Clone, Copy)]
+struct Bounds([Vector2<f64>; 2]);
+
+impl Bounds {
+    /// Around points; of those behind the camera nobody knows where they are.
+    fn of(pixels: impl Iterator<Item = Option<Vector2<f64>>>) -> Self {
+        let none = [Vector2::repeat(f64::MAX), Vector2::repeat(f64::MIN)];
+        let all = [Vector2::repeat(f64::MIN), Vector2::repeat(f64::MAX)];
+        Self(pixels.fold(none, |[low, high], pixel| match pixel {
+            Some(pixel) => [low.inf(&pixel), high.sup(&pixel)],
+            None => all,
+        }))
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        (0..2).all(|k| self.0[0][k] <= other.0[1][k] && other.0[0][k] <= self.0[1][k])
+    }
+}
+
 /// Of `seen` out of `asked`, with the face by without it.
 fn log_likelihood_ratio(seen: usize, asked: usize) -> f64 {
     let hidden = asked - seen;
@@ -113,8 +152,8 @@ fn log_likelihood_ratio(seen: usize, asked: usize) -> f64 {
     with + ((asked + 1) as f64).ln() + binomial
 }
 
-/// The points of all curves, in their order, that the view shows or hides without doubt.
-fn samples(chains: &[&[Vector3<f64>]], view: &ViewObservation) -> Vec<Sample> {
+/// The points of each curve that the view shows or hides without doubt.
+fn samples(chains: &[&[Vector3<f64>]], view: &ViewObservation) -> Vec<Vec<Sample>> {
     let camera = &view.camera;
     let segments: Vec<LineSegment2> = view.segments.iter().map(|s| s.segment).collect();
     let detected = SegmentGrid::new(&segments, camera.width, camera.height);
@@ -129,8 +168,9 @@ fn samples(chains: &[&[Vector3<f64>]], view: &ViewObservation) -> Vec<Sample> {
         }
     }
     let projected = SegmentGrid::new(&pieces, camera.width, camera.height);
-    let mut samples = Vec::new();
+    let mut samples: Vec<Vec<Sample>> = Vec::with_capacity(chains.len());
     for (curve, chain) in chains.iter().enumerate() {
+        let mut of_curve = Vec::new();
         for k in 0..SAMPLES {
             let place = (k as f64 + 0.5) / SAMPLES as f64;
             let [point, next] = [place, place + STEP].map(|place| point_along(chain, place));
@@ -148,9 +188,10 @@ fn samples(chains: &[&[Vector3<f64>]], view: &ViewObservation) -> Vec<Sample> {
             });
             if alone {
                 let seen = is_shown(&detected, &segments, &pixel, &(next - pixel));
-                samples.push(Sample { curve, point, seen });
+                of_curve.push(Sample { point, pixel, seen });
             }
         }
+        samples.push(of_curve);
     }
     samples
 }
