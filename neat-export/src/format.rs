@@ -120,6 +120,14 @@ impl Format {
         self.endings().is_empty()
     }
 
+    /// Whether it has faces beside edges.
+    pub fn holds_faces(self) -> bool {
+        matches!(
+            self,
+            Self::Json | Self::Obj | Self::Ply | Self::Gltf | Self::Glb | Self::Step
+        )
+    }
+
     /// What it is for, in one line.
     pub fn explanation(self) -> &'static str {
         self.row().explanation

@@ -111,6 +111,19 @@ fn triangles_of_a_solid_share_their_sides() {
 }
 
 #[test]
+fn what_has_no_faces_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    for (format, remarks) in [(Format::Dxf, 1), (Format::Step, 0)] {
+        let path = dir.path().join(format.name());
+        let options = ExportOptions::default();
+        let written = export(&document(), &path, format, &options).unwrap();
+        assert_eq!(written.remarks.len(), remarks, "{:?}", written.remarks);
+        let said = |remark: &String| remark == "dxf has no faces: 8 left out";
+        assert!(written.remarks.iter().all(said));
+    }
+}
+
+#[test]
 fn shells_read_back_and_broken_ones_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("w.json");

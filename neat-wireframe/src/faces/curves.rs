@@ -10,10 +10,11 @@ pub(super) const TURN: f64 = 0.1;
 /// Points of an arc that say in which plane it lies.
 const POINTS_OF_ARC: usize = 8;
 /// Standard deviation of a junction where none is known, and what is added to the known one, by
-/// the extent of the wireframe: corners of the assembler's wireframes of ten objects lie 0.0004
-/// from their planes.
+/// the extent of the wireframe: junctions of six solids that the assembler made lie 0.00001 to
+/// 0.0003 off their planes (root mean square).
 const JUNCTION_NOISE: f64 = 5e-4;
-/// The same for points of arcs, which are fitted one by one and have no covariance.
+/// The same for points of arcs, which are fitted one by one and have no covariance: the radii of
+/// the two rims of the toy's hole differ by 0.003.
 const ARC_NOISE: f64 = 3e-3;
 /// An end of an arc is a junction within so many standard deviations of an arc.
 const REACH: f64 = 4.0;
