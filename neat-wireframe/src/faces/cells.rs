@@ -37,7 +37,7 @@ pub(super) fn cells(curves: &Curves, members: &[usize], frame: &PlaneFrame) -> V
             cycles.push(Cycle::new(curves, vec![step], component, frame));
         }
     }
-    // What is on a cycle's both sides divides nothing: it is taken away until there is none.
+    // A curve with the same cycle on both sides divides nothing.
     let of_graph = loop {
         let found = half_edge_cycles(curves, &open, frame);
         let bridges: BTreeSet<CurveIndex> = found.iter().flat_map(|cycle| twice(cycle)).collect();
@@ -94,11 +94,8 @@ fn half_edge_cycles(curves: &Curves, open: &[&Curve], frame: &PlaneFrame) -> Vec
     // Steps that leave each junction, counterclockwise.
     let mut leaving: BTreeMap<usize, Vec<(f64, Step)>> = BTreeMap::new();
     for curve in open {
-        for (reversed, from) in curve
-            .ends
-            .iter()
-            .flat_map(|ends| [(false, ends[0]), (true, ends[1])])
-        {
+        let ends = curve.ends.iter();
+        for (reversed, from) in ends.flat_map(|[start, end]| [(false, *start), (true, *end)]) {
             let step = Step {
                 curve: curve.index,
                 reversed,

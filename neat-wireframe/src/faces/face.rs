@@ -101,7 +101,7 @@ impl Shell {
             })
         };
         let faces: Vec<Face> = self.faces.iter().filter_map(face).collect();
-        (!faces.is_empty()).then(|| Self {
+        (!faces.is_empty()).then_some(Self {
             closed: self.closed && faces.len() == self.faces.len(),
             faces,
         })

@@ -10,8 +10,8 @@ use nalgebra::Vector3;
 use pathfinding::undirected::connected_components::components;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-/// A direction that no edge of a usual object has: rays along it meet faces inside.
-const RAY: [f64; 3] = [0.538_1, 0.283_7, 0.793_7];
+/// Rays along it hardly meet edges: it is no direction that objects prefer.
+const RAY: [f64; 3] = [0.5381, 0.2837, 0.7937];
 /// Points of each curve that are asked whether they lie within a solid or on it.
 const POINTS: usize = 7;
 /// Points are on a face or an edge that are so near to it, by the extent of the wireframe.
