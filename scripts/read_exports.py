@@ -8,8 +8,9 @@ OUT is the folder that
     cargo run --release -p neat-export --example export_all -- WIREFRAME.json OUT
 
 has filled. Every format must hold as many vertices and edges as WIREFRAME.json, the
-same edges, and the same coordinates to 1e-6 of the wireframe's extent. Prints a line
-per file; the exit code is 1 if one differs. Needs scripts/requirements-readers.txt.
+same edges, and the same coordinates to 1e-6 of the wireframe's extent; and its arcs, as
+arcs or as chains of straight pieces, where the format has them. Prints a line per file;
+the exit code is 1 if one differs. Needs scripts/requirements-readers.txt.
 """
 
 import json
@@ -21,15 +22,50 @@ from pathlib import Path
 import numpy as np
 
 TOLERANCE = 1e-6
+# Pieces of arcs that are drawn as chains turn by no more, in radians.
+TURN = 0.089
 SCHEMA = Path(__file__).resolve().parent.parent / "docs" / "wireframe.schema.json"
 
 
-class Wireframe:
-    """Vertices [V, 3] and index pairs [E, 2]."""
+class Arc:
+    """A part of a circle, or a whole one, as wireframe.json has it."""
 
-    def __init__(self, vertices, edges):
+    def __init__(self, center, axes, radius, angles):
+        self.center, self.axes = np.asarray(center, dtype=float), np.asarray(axes, dtype=float)
+        self.radius, self.angles = radius, angles
+        self.sweep = angles[1] - angles[0]
+        self.is_closed = self.sweep > 2 * math.pi - 1e-9
+
+    def points(self, shares):
+        """At these shares of its length, [N, 3]."""
+        angles = self.angles[0] + self.sweep * np.asarray(shares)[:, None]
+        return self.center + self.radius * (np.cos(angles) * self.axes[0]
+                                            + np.sin(angles) * self.axes[1])
+
+    def chain(self):
+        """Points of the straight pieces that draw it."""
+        count = max(math.ceil(self.sweep / TURN), 1)
+        return self.points(np.arange(count if self.is_closed else count + 1) / count)
+
+
+class Wireframe:
+    """Vertices [V, 3], index pairs [E, 2] and arcs."""
+
+    def __init__(self, vertices, edges, arcs=()):
         self.vertices = np.asarray(vertices, dtype=float).reshape(-1, 3)
         self.edges = np.asarray(edges, dtype=int).reshape(-1, 2)
+        self.arcs = arcs
+
+    def drawn(self):
+        """With arcs as chains of straight pieces, for formats without curves."""
+        vertices, edges = self.vertices, self.edges
+        for arc in self.arcs:
+            points = arc.chain()
+            start = np.arange(len(points) if arc.is_closed else len(points) - 1)
+            pieces = np.stack([start, (start + 1) % len(points)], axis=-1)
+            edges = np.concatenate([edges, len(vertices) + pieces])
+            vertices = np.concatenate([vertices, points])
+        return Wireframe(vertices, edges)
 
     def extent(self):
         if len(self.vertices) == 0:
@@ -46,7 +82,7 @@ class Wireframe:
         new_index = {old: new for new, old in enumerate(kept)}
         pairs = [[new_index[a], new_index[b]]
                  for i, (a, b) in enumerate(self.edges.tolist()) if i not in set(edges)]
-        return Wireframe(self.vertices[kept], pairs)
+        return Wireframe(self.vertices[kept], pairs, self.arcs)
 
 
 def check(condition, sentence):
@@ -79,6 +115,25 @@ def same_lines(ends, expected, extent):
                 expected.vertices[expected.edges], extent, "ends of lines")
 
 
+def same_arcs(found, expected):
+    """Points [3, 3] at the begin, the middle and the end of arcs, in their order; circles, which
+    begin where they like, as centre, normal of either sign and radius."""
+    check(len(found) == len(expected.arcs), f"{len(found)} arcs, not {len(expected.arcs)}")
+    for arc, (points, circle) in zip(expected.arcs, found):
+        if arc.is_closed:
+            center, normal, radius = circle
+            expected_normal = np.cross(*arc.axes)
+            normal = np.asarray(normal) * np.sign(np.dot(normal, expected_normal))
+            check_close(np.asarray(center), arc.center, expected.extent(), "centre of a circle")
+            check_close(normal, expected_normal, 1.0, "normal of a circle")
+            check_close(np.asarray([radius]), np.asarray([arc.radius]), expected.extent(), "radius")
+        else:
+            points = np.asarray(points)
+            if np.abs(points[0] - arc.points([0.0])).max() > np.abs(points[2] - arc.points([0.0])).max():
+                points = points[::-1]
+            check_close(points, arc.points([0.0, 0.5, 1.0]), expected.extent(), "points of an arc")
+
+
 def read_json(path, expected):
     import jsonschema
 
@@ -88,7 +143,8 @@ def read_json(path, expected):
     jsonschema.Draft202012Validator(schema).validate(document)
     for broken in ({}, {"junctions": [[0, 0]], "edges": []},
                    {"junctions": [], "edges": [[0, -1]]},
-                   dict(document, views=[1]), dict(document, junction_covariances=[[0] * 5])):
+                   dict(document, views=[1]), dict(document, junction_covariances=[[0] * 5]),
+                   dict(document, arcs=[{"center": [0, 0, 0], "radius": 1}])):
         check(not jsonschema.Draft202012Validator(schema).is_valid(broken),
               f"the schema accepts {str(broken)[:80]}")
     same_graph(Wireframe(document["junctions"], document["edges"]), expected)
@@ -110,6 +166,7 @@ def vtk_wireframe(data):
 def read_obj(path, expected):
     import vtk
 
+    expected = expected.drawn()
     reader = vtk.vtkOBJReader()
     reader.SetFileName(str(path))
     reader.Update()
@@ -120,6 +177,7 @@ def read_obj(path, expected):
 def read_ply(path, expected):
     from plyfile import PlyData
 
+    expected = expected.drawn()
     ply = PlyData.read(str(path))
     vertex, edge = ply["vertex"], ply["edge"]
     same_graph(Wireframe(np.stack([vertex[axis] for axis in "xyz"], axis=-1),
@@ -131,6 +189,7 @@ def read_gltf(path, expected):
     import pygltflib
     import vtk
 
+    expected = expected.drawn()
     gltf = pygltflib.GLTF2().load(str(path))
     if len(expected.vertices) == 0:
         check(not gltf.nodes and not gltf.meshes, "an empty scene has nodes")
@@ -189,11 +248,21 @@ def read_dxf(path, expected):
           f"ezdxf finds {auditor.errors} and fixes {auditor.fixes}")
     space = dxf.modelspace()
     layers = {layer.dxf.name for layer in dxf.layers}
-    check({"JUNCTIONS", "CONFIDENCE_HIGH", "CONFIDENCE_MEDIUM", "CONFIDENCE_LOW",
+    check({"JUNCTIONS", "ARCS", "CONFIDENCE_HIGH", "CONFIDENCE_MEDIUM", "CONFIDENCE_LOW",
            "CONFIDENCE_UNKNOWN"} <= layers, f"layers {layers}")
     check({entity.dxf.layer for entity in space} <= layers, "an entity on no layer")
     same_lines([[line.dxf.start, line.dxf.end] for line in space.query("LINE")],
                expected, expected.extent())
+    arcs = []
+    for arc in space.query("ARC CIRCLE"):
+        points = None
+        if arc.dxftype() == "ARC":
+            start, end = arc.dxf.start_angle, arc.dxf.end_angle
+            middle = start + 0.5 * ((end - start) % 360.0)
+            points = [list(point) for point in arc.vertices([start, middle, end])]
+        center = list(arc.ocs().to_wcs(arc.dxf.center))
+        arcs.append((points, (center, list(arc.dxf.extrusion), arc.dxf.radius)))
+    same_arcs(arcs, expected)
     points = [point.dxf.location for point in space.query("POINT")]
     same_graph(Wireframe([list(point) for point in points], expected.edges), expected)
     return "ezdxf, audit clean"
@@ -201,6 +270,8 @@ def read_dxf(path, expected):
 
 def read_step(path, expected):
     from OCP.BRep import BRep_Tool
+    from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.GeomAbs import GeomAbs_CurveType
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.STEPControl import STEPControl_Reader
     from OCP.TopAbs import TopAbs_ShapeEnum
@@ -216,7 +287,7 @@ def read_step(path, expected):
     check(reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone, "not read")
     reader.TransferRoots()
     shape = reader.OneShape()
-    if len(expected.edges) == 0:
+    if len(expected.edges) + len(expected.arcs) == 0:
         return "Open CASCADE"
 
     def parts(shape, kind):
@@ -241,8 +312,21 @@ def read_step(path, expected):
         candidates.append((vertex, len(vertices) - 1))
         return len(vertices) - 1
 
-    edges = [[index(vertex) for vertex in parts(edge, vertex_kind)]
-             for edge in parts(shape, edge_kind)]
+    as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
+    edges, arcs = [], []
+    for edge in parts(shape, edge_kind):
+        curve = BRepAdaptor_Curve(as_edge(edge))
+        if curve.GetType() != GeomAbs_CurveType.GeomAbs_Circle:
+            edges.append([index(vertex) for vertex in parts(edge, vertex_kind)])
+            continue
+        first, last = curve.FirstParameter(), curve.LastParameter()
+        points = [curve.Value(first + share * (last - first)) for share in (0.0, 0.5, 1.0)]
+        axis = curve.Circle().Axis()
+        center, normal = axis.Location(), axis.Direction()
+        arcs.append(([[p.X(), p.Y(), p.Z()] for p in points],
+                     ([center.X(), center.Y(), center.Z()], [normal.X(), normal.Y(), normal.Z()],
+                      curve.Circle().Radius())))
+    same_arcs(arcs, expected)
     found = Wireframe(vertices, edges)
     check(len(vertices) == len(expected.vertices),
           f"{len(vertices)} vertices, not {len(expected.vertices)}")
@@ -256,6 +340,8 @@ def read_step(path, expected):
 
 
 def read_svg(path, expected):
+    from svgelements import Path as SvgPath
+
     root = ElementTree.parse(path).getroot()
     space = "{http://www.w3.org/2000/svg}"
     check(root.tag == space + "svg", "the root is no svg")
@@ -277,7 +363,22 @@ def read_svg(path, expected):
              in_units(float(l.attrib["x2"]), float(l.attrib["y2"]))] for l in lines]
     check_close(np.reshape(ends, (-1, 2, 2)), projected[expected.edges],
                 expected.extent(), "lines")
-    return "ElementTree"
+
+    # Ends and the middle of each elliptical piece lie on the arc as one looks at it; pieces that
+    # are thinner than a hundredth of a pixel are straight.
+    paths = list(root.iter(space + "path"))
+    check(len(paths) == len(expected.arcs), "number of arcs")
+    for arc, element in zip(expected.arcs, paths):
+        segments = [s for s in SvgPath(element.attrib["d"]) if type(s).__name__ in ("Arc", "Line")]
+        points = [in_units(*segment.point(t)) for segment in segments for t in (0.0, 0.5, 1.0)]
+        truth = arc.points([0.0, 1.0]) @ axes.T
+        check_close(np.stack([points[0], points[-1]]), truth, expected.extent(), "ends of an arc")
+        dense = arc.points(np.linspace(0.0, 1.0, 20001)) @ axes.T
+        for point in points:
+            off = np.linalg.norm(dense - point, axis=-1).min()
+            check(off < 0.02 / numbers["scale"][0] + 1e-4 * arc.radius,
+                  f"arc {element.attrib['data-arc']} passes {off} beside itself")
+    return "ElementTree and svgelements"
 
 
 def read_png(path, expected):
@@ -302,9 +403,18 @@ def read_geojson(path, expected):
     collection = json.loads(path.read_text())
     check(collection["type"] == "FeatureCollection", "type")
     features = collection["features"]
-    lines = [f for f in features if f["geometry"]["type"] == "LineString"]
+    drawn = [f for f in features if f["geometry"]["type"] == "LineString"]
+    lines = [f for f in drawn if "arc" not in f["properties"]]
+    arcs = [f for f in drawn if "arc" in f["properties"]]
+    for arc, feature in zip(expected.arcs, arcs, strict=True):
+        found = np.asarray(feature["geometry"]["coordinates"])
+        chain = arc.chain()
+        if arc.is_closed:
+            chain = np.concatenate([chain, chain[:1]])
+        check_close(found, chain, expected.extent(), "points of an arc")
+        check(feature["properties"]["radius"] == arc.radius, "radius")
     points = [f for f in features if f["geometry"]["type"] == "Point"]
-    check(len(lines) + len(points) == len(features), "other features")
+    check(len(drawn) + len(points) == len(features), "other features")
     same_lines([line["geometry"]["coordinates"] for line in lines],
                expected, expected.extent())
     check([line["properties"]["junctions"] for line in lines] == expected.edges.tolist(),
@@ -324,6 +434,10 @@ def read_npz(path, expected):
     same_graph(Wireframe(arrays["junctions"], arrays["edges"]), expected)
     check(np.array_equal(arrays["junctions"][arrays["edges"]], arrays["lines3d"]),
           "edges do not lead to lines3d")
+    arcs = [Arc(*numbers) for numbers in zip(arrays["arc_centers"], arrays["arc_axes"],
+                                             arrays["arc_radii"], arrays["arc_angles"])]
+    same_arcs([(arc.points([0.0, 0.5, 1.0]), (arc.center, np.cross(*arc.axes), arc.radius))
+               for arc in arcs], expected)
     return "numpy"
 
 
@@ -356,7 +470,8 @@ def main(arguments):
         sys.exit(__doc__)
     truth = json.loads(Path(arguments[0]).read_text())
     directory = Path(arguments[1])
-    expected = Wireframe(truth["junctions"], truth.get("edges", truth.get("lines", [])))
+    expected = Wireframe(truth["junctions"], truth.get("edges", truth.get("lines", [])),
+                         [Arc(**arc) for arc in truth.get("arcs", [])])
     readers = [("wireframe.json", read_json), ("wireframe.obj", read_obj),
                ("wireframe.ply", read_ply), ("wireframe.gltf", read_gltf),
                ("wireframe.glb", read_gltf), ("wireframe.dxf", read_dxf),
@@ -372,7 +487,8 @@ def main(arguments):
         except Exception as error:  # One bad file must not hide the next.
             failed += 1
             print(f"{name}: FAILED: {type(error).__name__}: {error}")
-    print(f"{len(expected.vertices)} vertices, {len(expected.edges)} edges: "
+    print(f"{len(expected.vertices)} vertices, {len(expected.edges)} edges, "
+          f"{len(expected.arcs)} arcs: "
           f"{len(readers) - failed} of {len(readers)} files agree")
     return 1 if failed else 0
 
