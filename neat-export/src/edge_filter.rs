@@ -113,6 +113,7 @@ fn with_edges(document: &WireframeDocument, passes: &[bool]) -> WireframeDocumen
     }
     WireframeDocument {
         arcs: document.arcs.clone(),
+        arc_covariances: document.arc_covariances.clone(),
         metadata: document.metadata.clone(),
         junctions: chosen(&document.junctions, &joined),
         edges: passing

@@ -297,7 +297,7 @@ impl Images<'_> {
     }
 
     /// What the edgels beside samples of an arc in a view say.
-    fn rows_of_samples(
+    pub(super) fn rows_of_samples(
         &self,
         arc: &CircularArc,
         view: usize,
