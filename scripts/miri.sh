@@ -28,20 +28,22 @@ for crate in "${crates[@]}"; do
     passed=0 slow=0 unable=0
     started=$SECONDS
     for test in "${tests[@]}"; do
+        began=$SECONDS
         output=$(timeout "$seconds" cargo +nightly miri test -q -p "$crate" --lib -- --exact "$test" 2>&1)
         case $? in
-            0) passed=$((passed + 1)) ;;
-            124) slow=$((slow + 1)) ;;
+            0) passed=$((passed + 1)) said=passed ;;
+            124) slow=$((slow + 1)) said='too slow' ;;
             *)
                 # What Miri has no shim for (processes, system calls) is no finding.
                 if grep -q "unsupported operation" <<<"$output"; then
-                    unable=$((unable + 1))
+                    unable=$((unable + 1)) said='not possible'
                 else
-                    found+=("$crate $test")
+                    found+=("$crate $test") said=FAILED
                     echo "$output" | tail -40
                 fi
                 ;;
         esac
+        echo "$crate $test: $said, $((SECONDS - began)) s"
     done
     echo "$crate: ${#tests[@]} tests, $passed passed, $slow longer than $seconds s, $unable not possible, $((SECONDS - started)) s"
 done

@@ -8,10 +8,10 @@ OUT is the folder that
     cargo run --release -p neat-export --example export_all -- WIREFRAME.json OUT
 
 has filled. Every format must hold as many vertices and edges as WIREFRAME.json, the
-same edges, and the same coordinates to 1e-6 of the wireframe's extent; arcs are chains of
-edges, or left out where the format has them as arcs. Closed shells must be valid solids in
-STEP and watertight meshes elsewhere, of the volume that their loops enclose. Prints a line
-per file; the exit code is 1 if one differs. Needs scripts/requirements-readers.txt.
+same edges, and the same coordinates to 1e-6 of the wireframe's extent; and its arcs, as
+arcs or as chains of straight pieces, where the format has them. Closed shells must be valid
+solids in STEP and watertight triangles elsewhere, of the volume that their loops enclose.
+Prints a line per file; the exit code is 1 if one differs. Needs scripts/requirements-readers.txt.
 """
 
 import json
@@ -23,6 +23,8 @@ from pathlib import Path
 import numpy as np
 
 TOLERANCE = 1e-6
+# Pieces of arcs that are drawn as chains turn by no more, in radians.
+TURN = 0.089
 SCHEMA = Path(__file__).resolve().parent.parent / "docs" / "wireframe.schema.json"
 
 
@@ -30,19 +32,45 @@ SCHEMA = Path(__file__).resolve().parent.parent / "docs" / "wireframe.schema.jso
 VOLUME_TOLERANCE = 0.01
 
 
-# Arcs are drawn in pieces that turn by so much at most, in radians.
-TURN_OF_DRAWN_ARCS = 0.089
+class Arc:
+    """A part of a circle, or a whole one, as wireframe.json has it."""
+
+    def __init__(self, center, axes, radius, angles):
+        self.center, self.axes = np.asarray(center, dtype=float), np.asarray(axes, dtype=float)
+        self.radius, self.angles = radius, angles
+        self.sweep = angles[1] - angles[0]
+        self.is_closed = self.sweep > 2 * math.pi - 1e-9
+
+    def points(self, shares):
+        """At these shares of its length, [N, 3]."""
+        angles = self.angles[0] + self.sweep * np.asarray(shares)[:, None]
+        return self.center + self.radius * (np.cos(angles) * self.axes[0]
+                                            + np.sin(angles) * self.axes[1])
+
+    def chain(self):
+        """Points of the straight pieces that draw it."""
+        count = max(math.ceil(self.sweep / TURN), 1)
+        return self.points(np.arange(count if self.is_closed else count + 1) / count)
 
 
 class Wireframe:
-    """Vertices [V, 3] and index pairs [E, 2], and the shells between them and the arcs."""
+    """Vertices [V, 3], index pairs [E, 2], arcs and shells."""
 
-    shells = ()
-    arcs = ()
-
-    def __init__(self, vertices, edges):
+    def __init__(self, vertices, edges, arcs=(), shells=()):
         self.vertices = np.asarray(vertices, dtype=float).reshape(-1, 3)
         self.edges = np.asarray(edges, dtype=int).reshape(-1, 2)
+        self.arcs, self.shells = arcs, shells
+
+    def drawn(self):
+        """With arcs as chains of straight pieces, for formats without curves."""
+        vertices, edges = self.vertices, self.edges
+        for arc in self.arcs:
+            points = arc.chain()
+            start = np.arange(len(points) if arc.is_closed else len(points) - 1)
+            pieces = np.stack([start, (start + 1) % len(points)], axis=-1)
+            edges = np.concatenate([edges, len(vertices) + pieces])
+            vertices = np.concatenate([vertices, points])
+        return Wireframe(vertices, edges, shells=self.shells)
 
     def extent(self):
         if len(self.vertices) == 0:
@@ -53,31 +81,22 @@ class Wireframe:
         """Indices of the vertices without edges."""
         return sorted(set(range(len(self.vertices))) - set(self.edges.ravel().tolist()))
 
-    def drawn(self):
-        """The same with arcs as chains of edges."""
-        vertices, edges = self.vertices.tolist(), self.edges.tolist()
-        for arc in self.arcs:
-            start, end = arc["angles"]
-            pieces = max(math.ceil((end - start) / TURN_OF_DRAWN_ARCS), 1)
-            count = pieces if end - start > math.tau - 1e-9 else pieces + 1
-            edges += [[len(vertices) + k, len(vertices) + (k + 1) % count] for k in range(pieces)]
-            vertices += [point_of_arc(arc, start + (end - start) * k / pieces).tolist()
-                         for k in range(count)]
-        drawn = Wireframe(vertices, edges)
-        return drawn
-
     def without(self, vertices=(), edges=()):
         """The same without some vertices and edges."""
         kept = [v for v in range(len(self.vertices)) if v not in set(vertices)]
         new_index = {old: new for new, old in enumerate(kept)}
         pairs = [[new_index[a], new_index[b]]
                  for i, (a, b) in enumerate(self.edges.tolist()) if i not in set(edges)]
-        return Wireframe(self.vertices[kept], pairs)
+        return Wireframe(self.vertices[kept], pairs, self.arcs)
 
-
-def point_of_arc(arc, angle):
-    x, y = np.array(arc["axes"])
-    return np.array(arc["center"]) + arc["radius"] * (math.cos(angle) * x + math.sin(angle) * y)
+    def without_faces(self):
+        """What bounds no face."""
+        steps = [step for shell in self.shells for face in shell["faces"]
+                 for loop in face["loops"] for step in loop]
+        edges, arcs = ({step[kind] for step in steps if kind in step} for kind in ("edge", "arc"))
+        loose = Wireframe(self.vertices, self.edges,
+                          [arc for i, arc in enumerate(self.arcs) if i not in arcs])
+        return loose.without(edges=edges)
 
 
 def volume(shell, wireframe):
@@ -88,16 +107,14 @@ def volume(shell, wireframe):
                        np.zeros(3))
             return face["plane"]["offset"] * float(np.dot(face["plane"]["normal"], area))
         cylinder = face["cylinder"]
-        rims = [wireframe.arcs[step["arc"]] for loop in face["loops"] for step in loop
-                if "arc" in step]
-        axis, sign = np.array(cylinder["axis"]), 1.0 if cylinder["convex"] else -1.0
-        height = abs(float(np.dot(axis, np.subtract(rims[1]["center"], rims[0]["center"]))))
-        start, end = rims[0]["angles"]
-        x, y = np.array(rims[0]["axes"])
-        outward = (math.sin(end) - math.sin(start)) * x - (math.cos(end) - math.cos(start)) * y
-        radius = cylinder["radius"]
-        return sign * radius * height * (radius * (end - start)
-                                         + float(np.dot(cylinder["point"], outward)))
+        one, other = (wireframe.arcs[step["arc"]] for loop in face["loops"] for step in loop
+                      if "arc" in step)
+        height = abs(float(np.dot(cylinder["axis"], other.center - one.center)))
+        # The integral of the direction from the axis over the angle.
+        sine, cosine = np.diff(np.sin(one.angles)), np.diff(np.cos(one.angles))
+        outward = float(np.dot(cylinder["point"], sine * one.axes[0] - cosine * one.axes[1]))
+        sign, radius = 1.0 if cylinder["convex"] else -1.0, cylinder["radius"]
+        return sign * radius * height * (radius * one.sweep + outward)
 
     return sum(flux(face) for face in shell["faces"]) / 3.0
 
@@ -106,12 +123,11 @@ def area_of_step(step, wireframe):
     """Half the integral of x × dx along an edge or an arc."""
     sign = -0.5 if step.get("reversed") else 0.5
     if "edge" in step:
-        start, end = wireframe.vertices[wireframe.edges[step["edge"]]]
-        return sign * np.cross(start, end)
+        return sign * np.cross(*wireframe.vertices[wireframe.edges[step["edge"]]])
     arc = wireframe.arcs[step["arc"]]
-    start, end = (point_of_arc(arc, angle) for angle in arc["angles"])
-    swept = arc["radius"]**2 * (arc["angles"][1] - arc["angles"][0])
-    return sign * (np.cross(arc["center"], end - start) + swept * np.cross(*arc["axes"]))
+    start, end = arc.points([0.0, 1.0])
+    swept = arc.radius**2 * arc.sweep * np.cross(*arc.axes)
+    return sign * (np.cross(arc.center, end - start) + swept)
 
 
 def check_volume(found, expected, what):
@@ -121,7 +137,7 @@ def check_volume(found, expected, what):
 
 
 def check_mesh(vertices, triangles, expected):
-    """Triangles of closed shells are watertight; of sheets nothing is known."""
+    """Faces are triangles: with closed shells alone, watertight ones around their volume."""
     check((len(triangles) > 0) == (len(expected.shells) > 0), "shells and triangles")
     if expected.shells and all(shell["closed"] for shell in expected.shells):
         import trimesh
@@ -161,6 +177,25 @@ def same_lines(ends, expected, extent):
                 expected.vertices[expected.edges], extent, "ends of lines")
 
 
+def same_arcs(found, expected):
+    """Points [3, 3] at the begin, the middle and the end of arcs, in their order; circles, which
+    begin where they like, as centre, normal of either sign and radius."""
+    check(len(found) == len(expected.arcs), f"{len(found)} arcs, not {len(expected.arcs)}")
+    for arc, (points, circle) in zip(expected.arcs, found):
+        if arc.is_closed:
+            center, normal, radius = circle
+            expected_normal = np.cross(*arc.axes)
+            normal = np.asarray(normal) * np.sign(np.dot(normal, expected_normal))
+            check_close(np.asarray(center), arc.center, expected.extent(), "centre of a circle")
+            check_close(normal, expected_normal, 1.0, "normal of a circle")
+            check_close(np.asarray([radius]), np.asarray([arc.radius]), expected.extent(), "radius")
+        else:
+            points = np.asarray(points)
+            if np.abs(points[0] - arc.points([0.0])).max() > np.abs(points[2] - arc.points([0.0])).max():
+                points = points[::-1]
+            check_close(points, arc.points([0.0, 0.5, 1.0]), expected.extent(), "points of an arc")
+
+
 def read_json(path, expected):
     import jsonschema
 
@@ -170,7 +205,8 @@ def read_json(path, expected):
     jsonschema.Draft202012Validator(schema).validate(document)
     for broken in ({}, {"junctions": [[0, 0]], "edges": []},
                    {"junctions": [], "edges": [[0, -1]]},
-                   dict(document, views=[1]), dict(document, junction_covariances=[[0] * 5])):
+                   dict(document, views=[1]), dict(document, junction_covariances=[[0] * 5]),
+                   dict(document, arcs=[{"center": [0, 0, 0], "radius": 1}])):
         check(not jsonschema.Draft202012Validator(schema).is_valid(broken),
               f"the schema accepts {str(broken)[:80]}")
     same_graph(Wireframe(document["junctions"], document["edges"]), expected)
@@ -193,26 +229,28 @@ def read_obj(path, expected):
     import vtk
     from vtk.util.numpy_support import vtk_to_numpy
 
+    bare, expected = expected, expected.drawn()
     reader = vtk.vtkOBJReader()
     reader.SetFileName(str(path))
     reader.Update()
-    drawn = expected.drawn()
-    same_graph(vtk_wireframe(reader.GetOutput()), drawn)
+    same_graph(vtk_wireframe(reader.GetOutput()), expected)
     polygons = reader.GetOutput().GetPolys()
     corners = vtk_to_numpy(polygons.GetConnectivityArray()) if polygons.GetNumberOfCells() else []
-    check_mesh(drawn.vertices, np.reshape(corners, (-1, 3)), expected)
+    check_mesh(expected.vertices, np.reshape(corners, (-1, 3)), bare)
     return "VTK"
 
 
 def read_ply(path, expected):
     from plyfile import PlyData
 
+    bare, expected = expected, expected.drawn()
     ply = PlyData.read(str(path))
     vertex, edge = ply["vertex"], ply["edge"]
     same_graph(Wireframe(np.stack([vertex[axis] for axis in "xyz"], axis=-1),
-                         np.stack([edge["vertex1"], edge["vertex2"]], axis=-1)), expected.drawn())
-    faces = [e["vertex_indices"].tolist() for e in ply if e.name == "face"]
-    check_mesh(expected.drawn().vertices, np.reshape(sum(faces, []), (-1, 3)).astype(int), expected)
+                         np.stack([edge["vertex1"], edge["vertex2"]], axis=-1)), expected)
+    faces = [list(face) for element in ply if element.name == "face"
+             for face in element["vertex_indices"]]
+    check_mesh(expected.vertices, faces, bare)
     return "plyfile"
 
 
@@ -220,6 +258,7 @@ def read_gltf(path, expected):
     import pygltflib
     import vtk
 
+    bare, expected = expected, expected.drawn()
     gltf = pygltflib.GLTF2().load(str(path))
     if len(expected.vertices) == 0:
         check(not gltf.nodes and not gltf.meshes, "an empty scene has nodes")
@@ -246,13 +285,12 @@ def read_gltf(path, expected):
     primitives = gltf.meshes[node.mesh].primitives
     (positions,) = {primitive.attributes.POSITION for primitive in primitives}
     vertices = data(positions).astype(float) + np.asarray(node.translation)
-    bare, expected = expected, expected.drawn()
-    triangles = [data(p.indices).reshape(-1, 3) for p in primitives if p.mode == 4]
-    check_mesh(vertices, np.concatenate(triangles) if triangles else [], bare)
     lines = [data(p.indices).reshape(-1, 2) for p in primitives if p.mode == 1]
     points = [data(p.indices).ravel().tolist() for p in primitives if p.mode == 0]
     same_graph(Wireframe(vertices, np.concatenate(lines) if lines else []), expected)
-    check(sum(points, []) == bare.isolated(), "isolated junctions")
+    check(sum(points, []) == expected.isolated(), "isolated junctions")
+    triangles = [data(p.indices).reshape(-1, 3) for p in primitives if p.mode == 4]
+    check_mesh(vertices, np.concatenate(triangles) if triangles else [], bare)
 
     # A second reader, that applies the translation itself, in 32 bits. (trimesh takes
     # the vertices of GL_LINES in their order and ignores the indices.)
@@ -281,42 +319,50 @@ def read_dxf(path, expected):
           f"ezdxf finds {auditor.errors} and fixes {auditor.fixes}")
     space = dxf.modelspace()
     layers = {layer.dxf.name for layer in dxf.layers}
-    check({"JUNCTIONS", "CONFIDENCE_HIGH", "CONFIDENCE_MEDIUM", "CONFIDENCE_LOW",
+    check({"JUNCTIONS", "ARCS", "CONFIDENCE_HIGH", "CONFIDENCE_MEDIUM", "CONFIDENCE_LOW",
            "CONFIDENCE_UNKNOWN"} <= layers, f"layers {layers}")
     check({entity.dxf.layer for entity in space} <= layers, "an entity on no layer")
     same_lines([[line.dxf.start, line.dxf.end] for line in space.query("LINE")],
                expected, expected.extent())
+    arcs = []
+    for arc in space.query("ARC CIRCLE"):
+        points = None
+        if arc.dxftype() == "ARC":
+            start, end = arc.dxf.start_angle, arc.dxf.end_angle
+            middle = start + 0.5 * ((end - start) % 360.0)
+            points = [list(point) for point in arc.vertices([start, middle, end])]
+        center = list(arc.ocs().to_wcs(arc.dxf.center))
+        arcs.append((points, (center, list(arc.dxf.extrusion), arc.dxf.radius)))
+    same_arcs(arcs, expected)
     points = [point.dxf.location for point in space.query("POINT")]
     same_graph(Wireframe([list(point) for point in points], expected.edges), expected)
     return "ezdxf, audit clean"
 
 
 def check_shells(shape, parts, expected):
-    """Closed shells are valid solids of their volume, the others valid sheets."""
+    """Closed shells are valid solids, the others valid sheets, and all volumes together agree."""
     from OCP.BRep import BRep_Tool
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
     from OCP.TopAbs import TopAbs_ShapeEnum
 
-    closed = [shell for shell in expected.shells if shell["closed"]]
     solids = list(parts(shape, TopAbs_ShapeEnum.TopAbs_SOLID))
-    check(len(solids) == len(closed), f"{len(solids)} solids, not {len(closed)}")
     shells = list(parts(shape, TopAbs_ShapeEnum.TopAbs_SHELL))
+    closed = sum(shell["closed"] for shell in expected.shells)
+    check(len(solids) == closed, f"{len(solids)} solids, not {closed}")
     check(len(shells) == len(expected.shells), f"{len(shells)} shells")
-    check(sum(BRep_Tool.IsClosed_s(shell) for shell in shells) == len(closed), "open shells")
-    faces = sum(len(shell["faces"]) for shell in expected.shells)
-    found = len(list(parts(shape, TopAbs_ShapeEnum.TopAbs_FACE)))
-    check(found == faces, f"{found} faces, not {faces}")
+    check(sum(map(BRep_Tool.IsClosed_s, shells)) == closed, "an open solid, or a closed sheet")
+    faces = len(list(parts(shape, TopAbs_ShapeEnum.TopAbs_FACE)))
+    check(faces == sum(len(shell["faces"]) for shell in expected.shells), f"{faces} faces")
     for part in shells + solids:
         check(BRepCheck_Analyzer(part).IsValid(), "Open CASCADE finds a shell not valid")
-    if closed:
-        total = 0.0
-        for solid in solids:
-            properties = GProp_GProps()
-            BRepGProp.VolumeProperties_s(solid, properties)
-            total += properties.Mass()
-        check_volume(total, expected, "solids")
+    total = 0.0
+    for solid in solids:
+        properties = GProp_GProps()
+        BRepGProp.VolumeProperties_s(solid, properties)
+        total += properties.Mass()
+    check_volume(total, expected, "solids")
 
 
 def read_step(path, expected):
@@ -340,18 +386,18 @@ def read_step(path, expected):
             yield explorer.Current()
             explorer.Next()
 
-    check_shells(shape, parts, expected)
-    steps = [step for shell in expected.shells for face in shell["faces"]
-             for loop in face["loops"] for step in loop]
+    if expected.shells:
+        check_shells(shape, parts, expected)
+    expected = expected.without_faces()
     lengths = [np.linalg.norm(np.subtract(*expected.vertices[edge])) for edge in expected.edges]
-    left_out = [i for i, length in enumerate(lengths) if length == 0.0]
-    expected = expected.without(edges=left_out + [s["edge"] for s in steps if "edge" in s])
+    flat = [i for i, length in enumerate(lengths) if length == 0.0]
+    expected = expected.without(edges=flat)
     expected = expected.without(vertices=expected.isolated())
-    if len(expected.edges) == 0:
+    if len(expected.edges) + len(expected.arcs) == 0:
         return "Open CASCADE"
+
     vertex_kind, edge_kind = TopAbs_ShapeEnum.TopAbs_VERTEX, TopAbs_ShapeEnum.TopAbs_EDGE
     as_vertex = getattr(TopoDS, "Vertex_s", None) or TopoDS.Vertex
-    as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
     vertices = []
     buckets = {}
 
@@ -366,9 +412,21 @@ def read_step(path, expected):
         candidates.append((vertex, len(vertices) - 1))
         return len(vertices) - 1
 
-    edges = [[index(vertex) for vertex in parts(edge, vertex_kind)]
-             for edge in parts(shape, edge_kind, TopAbs_ShapeEnum.TopAbs_FACE)
-             if BRepAdaptor_Curve(as_edge(edge)).GetType() == GeomAbs_CurveType.GeomAbs_Line]
+    as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
+    edges, arcs = [], []
+    for edge in parts(shape, edge_kind, TopAbs_ShapeEnum.TopAbs_FACE):
+        curve = BRepAdaptor_Curve(as_edge(edge))
+        if curve.GetType() != GeomAbs_CurveType.GeomAbs_Circle:
+            edges.append([index(vertex) for vertex in parts(edge, vertex_kind)])
+            continue
+        first, last = curve.FirstParameter(), curve.LastParameter()
+        points = [curve.Value(first + share * (last - first)) for share in (0.0, 0.5, 1.0)]
+        axis = curve.Circle().Axis()
+        center, normal = axis.Location(), axis.Direction()
+        arcs.append(([[p.X(), p.Y(), p.Z()] for p in points],
+                     ([center.X(), center.Y(), center.Z()], [normal.X(), normal.Y(), normal.Z()],
+                      curve.Circle().Radius())))
+    same_arcs(arcs, expected)
     found = Wireframe(vertices, edges)
     check(len(vertices) == len(expected.vertices),
           f"{len(vertices)} vertices, not {len(expected.vertices)}")
@@ -382,6 +440,8 @@ def read_step(path, expected):
 
 
 def read_svg(path, expected):
+    from svgelements import Path as SvgPath
+
     root = ElementTree.parse(path).getroot()
     space = "{http://www.w3.org/2000/svg}"
     check(root.tag == space + "svg", "the root is no svg")
@@ -403,7 +463,22 @@ def read_svg(path, expected):
              in_units(float(l.attrib["x2"]), float(l.attrib["y2"]))] for l in lines]
     check_close(np.reshape(ends, (-1, 2, 2)), projected[expected.edges],
                 expected.extent(), "lines")
-    return "ElementTree"
+
+    # Ends and the middle of each elliptical piece lie on the arc as one looks at it; pieces that
+    # are thinner than a hundredth of a pixel are straight.
+    paths = list(root.iter(space + "path"))
+    check(len(paths) == len(expected.arcs), "number of arcs")
+    for arc, element in zip(expected.arcs, paths):
+        segments = [s for s in SvgPath(element.attrib["d"]) if type(s).__name__ in ("Arc", "Line")]
+        points = [in_units(*segment.point(t)) for segment in segments for t in (0.0, 0.5, 1.0)]
+        truth = arc.points([0.0, 1.0]) @ axes.T
+        check_close(np.stack([points[0], points[-1]]), truth, expected.extent(), "ends of an arc")
+        dense = arc.points(np.linspace(0.0, 1.0, 20001)) @ axes.T
+        for point in points:
+            off = np.linalg.norm(dense - point, axis=-1).min()
+            check(off < 0.02 / numbers["scale"][0] + 1e-4 * arc.radius,
+                  f"arc {element.attrib['data-arc']} passes {off} beside itself")
+    return "ElementTree and svgelements"
 
 
 def read_png(path, expected):
@@ -428,12 +503,18 @@ def read_geojson(path, expected):
     collection = json.loads(path.read_text())
     check(collection["type"] == "FeatureCollection", "type")
     features = collection["features"]
-    arcs = [f for f in features if "arc" in f["properties"]]
-    check(len(arcs) == len(expected.arcs), "arcs")
-    features = [f for f in features if "arc" not in f["properties"]]
-    lines = [f for f in features if f["geometry"]["type"] == "LineString"]
+    drawn = [f for f in features if f["geometry"]["type"] == "LineString"]
+    lines = [f for f in drawn if "arc" not in f["properties"]]
+    arcs = [f for f in drawn if "arc" in f["properties"]]
+    for arc, feature in zip(expected.arcs, arcs, strict=True):
+        found = np.asarray(feature["geometry"]["coordinates"])
+        chain = arc.chain()
+        if arc.is_closed:
+            chain = np.concatenate([chain, chain[:1]])
+        check_close(found, chain, expected.extent(), "points of an arc")
+        check(feature["properties"]["radius"] == arc.radius, "radius")
     points = [f for f in features if f["geometry"]["type"] == "Point"]
-    check(len(lines) + len(points) == len(features), "other features")
+    check(len(drawn) + len(points) == len(features), "other features")
     same_lines([line["geometry"]["coordinates"] for line in lines],
                expected, expected.extent())
     check([line["properties"]["junctions"] for line in lines] == expected.edges.tolist(),
@@ -453,6 +534,10 @@ def read_npz(path, expected):
     same_graph(Wireframe(arrays["junctions"], arrays["edges"]), expected)
     check(np.array_equal(arrays["junctions"][arrays["edges"]], arrays["lines3d"]),
           "edges do not lead to lines3d")
+    arcs = [Arc(*numbers) for numbers in zip(arrays["arc_centers"], arrays["arc_axes"],
+                                             arrays["arc_radii"], arrays["arc_angles"])]
+    same_arcs([(arc.points([0.0, 0.5, 1.0]), (arc.center, np.cross(*arc.axes), arc.radius))
+               for arc in arcs], expected)
     return "numpy"
 
 
@@ -485,8 +570,8 @@ def main(arguments):
         sys.exit(__doc__)
     truth = json.loads(Path(arguments[0]).read_text())
     directory = Path(arguments[1])
-    expected = Wireframe(truth["junctions"], truth.get("edges", truth.get("lines", [])))
-    expected.shells, expected.arcs = truth.get("shells", []), truth.get("arcs", [])
+    expected = Wireframe(truth["junctions"], truth.get("edges", truth.get("lines", [])),
+                         [Arc(**arc) for arc in truth.get("arcs", [])], truth.get("shells", []))
     readers = [("wireframe.json", read_json), ("wireframe.obj", read_obj),
                ("wireframe.ply", read_ply), ("wireframe.gltf", read_gltf),
                ("wireframe.glb", read_gltf), ("wireframe.dxf", read_dxf),
@@ -502,7 +587,8 @@ def main(arguments):
         except Exception as error:  # One bad file must not hide the next.
             failed += 1
             print(f"{name}: FAILED: {type(error).__name__}: {error}")
-    print(f"{len(expected.vertices)} vertices, {len(expected.edges)} edges: "
+    print(f"{len(expected.vertices)} vertices, {len(expected.edges)} edges, "
+          f"{len(expected.arcs)} arcs: "
           f"{len(readers) - failed} of {len(readers)} files agree")
     return 1 if failed else 0
 

@@ -135,6 +135,14 @@ typedef struct {
     const double *kinds;
     // 1 for an edge that is a piece of a curve, else 0.
     const uint8_t *curved;
+    // How many arcs of circles there are beside the edges.
+    size_t arc_count;
+    // Twelve numbers per arc: its centre; unit vectors toward angle 0 and a right angle; its
+    // radius; the angles in radians at which it begins and ends, 2π apart for a whole circle.
+    const double *arcs;
+    // The upper triangle of the covariance of each arc's centre x, y, z and radius, row by row:
+    // ten numbers in squared units; NaN where the views do not tell.
+    const double *arc_covariances;
 } NeatView;
 
 #ifdef __cplusplus

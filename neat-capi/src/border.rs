@@ -308,6 +308,9 @@ fn view_of(numbers: &Numbers, size: u32) -> NeatView {
         probabilities: list(&numbers.probabilities),
         kinds: list(&numbers.kinds),
         curved: list(&numbers.curved),
+        arc_count: numbers.arcs.len() / 12,
+        arcs: list(&numbers.arcs),
+        arc_covariances: list(&numbers.arc_covariances),
     }
 }
 

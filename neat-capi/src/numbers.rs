@@ -1,5 +1,6 @@
 //! A wireframe as plain arrays, the way C reads it.
 
+use neat_core::CircularArc;
 use neat_wireframe::export::{ExportError, WireframeDocument, read_json};
 use std::path::Path;
 
@@ -18,6 +19,10 @@ pub struct Numbers {
     pub kinds: Vec<f64>,
     /// 1 for an edge that is a piece of a curve, else 0.
     pub curved: Vec<u8>,
+    /// Twelve numbers per arc: centre, two axes, radius, two angles.
+    pub arcs: Vec<f64>,
+    /// Ten numbers per arc; NaN where it is not determined.
+    pub arc_covariances: Vec<f64>,
 }
 
 impl Numbers {
@@ -61,8 +66,24 @@ impl Numbers {
             curved: (fields.curved.iter().flatten())
                 .map(|curved| u8::from(*curved))
                 .collect(),
+            arcs: document.arcs.iter().flat_map(of_arc).collect(),
+            arc_covariances: (document.arc_covariances.iter())
+                .flat_map(|known| known.unwrap_or([f64::NAN; 10]))
+                .collect(),
         }
     }
+}
+
+fn of_arc(arc: &CircularArc) -> [f64; 12] {
+    let [x, y] = arc.axes;
+    let points = [arc.center, x, y];
+    let mut numbers = points
+        .iter()
+        .flatten()
+        .copied()
+        .chain([arc.radius])
+        .chain(arc.angles);
+    std::array::from_fn(|_| numbers.next().unwrap_or_default())
 }
 
 #[cfg(test)]
@@ -78,7 +99,12 @@ mod tests {
             "edge_fields": {
                 "probability": [0.5, 1], "curved": [0, 1], "crease": [0.25, 1],
                 "boundary": [0.25, 0], "texture": [0.5, 0], "shadow": [0, 0]
-            }
+            },
+            "arcs": [
+                {"center": [1, 2, 3], "axes": [[1, 0, 0], [0, 1, 0]], "radius": 4, "angles": [0, 2]},
+                {"center": [0, 0, 0], "axes": [[0, 1, 0], [0, 0, 1]], "radius": 1, "angles": [1, 3]}
+            ],
+            "arc_covariances": [[1, 2, 3, 4, 5, 6, 7, 8, 9, 10], null]
         }"#;
         let numbers = Numbers::of(&parse_json(text, Path::new("a.json")).unwrap());
         assert_eq!(
@@ -91,6 +117,10 @@ mod tests {
         assert_eq!(numbers.covariances.len(), 18);
         assert_eq!(numbers.probabilities, [0.5, 1.0]);
         assert_eq!(numbers.curved, [0, 1]);
+        let first = [1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 4.0, 0.0, 2.0];
+        assert_eq!((numbers.arcs.len(), &numbers.arcs[..12]), (24, &first[..]));
+        assert_eq!(numbers.arc_covariances[9], 10.0);
+        assert!(numbers.arc_covariances[10..].iter().all(|x| x.is_nan()));
         assert_eq!(numbers.kinds, [0.25, 0.25, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0]);
     }
 

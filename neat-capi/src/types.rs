@@ -123,6 +123,14 @@ pub struct NeatView {
     pub kinds: *const f64,
     /// 1 for an edge that is a piece of a curve, else 0.
     pub curved: *const u8,
+    /// How many arcs of circles there are beside the edges.
+    pub arc_count: usize,
+    /// Twelve numbers per arc: its centre; unit vectors toward angle 0 and a right angle; its
+    /// radius; the angles in radians at which it begins and ends, 2π apart for a whole circle.
+    pub arcs: *const f64,
+    /// The upper triangle of the covariance of each arc's centre x, y, z and radius, row by row:
+    /// ten numbers in squared units; NaN where the views do not tell.
+    pub arc_covariances: *const f64,
 }
 
 /// A wireframe: see `neat_wireframe_view` and `neat_wireframe_free`.

@@ -29,8 +29,7 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
             .iter()
             .try_for_each(|(name, text)| file::write_atomically(&dir.join(name), text.as_bytes()))
     })?;
-    let arcs = document.arcs.len();
-    to.leave_out(arcs, "lines3D.txt has pairs of junctions and no arcs");
+    to.leave_out_arcs("lines3D.txt has pairs of junctions and no arcs");
     to.written.files = files.iter().map(|(name, _)| dir.join(name)).collect();
     Ok(())
 }

@@ -119,6 +119,7 @@ fn with_edges(document: &WireframeDocument, passes: &[bool]) -> WireframeDocumen
         shells: (document.shells.iter())
             .filter_map(|shell| shell.with_edges(new_edge))
             .collect(),
+        arc_covariances: document.arc_covariances.clone(),
         metadata: document.metadata.clone(),
         junctions: chosen(&document.junctions, &joined),
         edges: passing

@@ -15,7 +15,7 @@ pub struct Written {
     pub junctions: usize,
     /// Number of edges that passed the filter.
     pub edges: usize,
-    /// Number of arcs, which no filter leaves out.
+    /// Number of arcs in the files; no filter leaves them out.
     pub arcs: usize,
     /// What the format has no words for and the files therefore lack, and what no filter could
     /// judge, one sentence each.
@@ -67,6 +67,12 @@ impl Target<'_> {
         if count > 0 {
             (self.written.remarks).push(format!("{sentence}: {count} left out"));
         }
+    }
+
+    /// Says that the format knows no arcs.
+    pub fn leave_out_arcs(&mut self, sentence: &str) {
+        self.leave_out(self.document.arcs.len(), sentence);
+        self.written.arcs = 0;
     }
 
     /// That the format has no numbers for the extent of the wireframe.

@@ -6,11 +6,12 @@ mod thin_regions;
 use crate::config::{BackEnd, Config, Partners};
 use crate::event::{Decision, POSES};
 use crate::plan::Plan;
+use nalgebra::Matrix4;
 use neat_core::{CircularArc, EdgelMap, Scene, SceneError, Wireframe3d};
 use neat_detect::{DetectorConfig, edgel_maps};
 use neat_train::TrainedField;
 use neat_wireframe::assemble::{AssembleReport, Assembled, assemble_with_progress};
-use neat_wireframe::confidence::{Confidence, assess};
+use neat_wireframe::confidence::{Confidence, assess, fill_arcs};
 use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::faces::{MeasuredGraph, Shell, find_shells};
 use neat_wireframe::kinds::{EdgeKinds, curved_chains, edge_kinds, fill_kinds, junction_types};
@@ -69,6 +70,8 @@ pub struct Distilled {
     pub arcs: Vec<CircularArc>,
     /// Faces between edges and arcs, likewise.
     pub shells: Vec<Shell>,
+    /// How sure their centres and radii are, see [`Assembled::arc_covariances`].
+    pub arc_covariances: Vec<Option<Matrix4<f64>>>,
     /// How sure every junction and edge is, and by which 2D segments.
     pub confidence: Confidence,
     /// What each edge is: of the shape of things, or on it.
@@ -159,12 +162,15 @@ impl Distilled {
         let original = (self.wireframe).map(|point| original_from_world.apply(point));
         let mut document = WireframeDocument::from(&original);
         let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
-        document.arcs = (self.arcs.iter())
-            .map(|arc| arc.map(|point| original_from_world.apply(point)))
-            .collect();
         document.shells = (self.shells.iter())
             .map(|shell| shell.map(|point| original_from_world.apply(point)))
             .collect();
+        fill_arcs(
+            &mut document,
+            &self.arcs,
+            &self.arc_covariances,
+            original_from_world,
+        );
         self.confidence
             .fill(&mut document, &names, original_from_world);
         fill_kinds(&mut document, &self.kinds, &junction_types(&self.wireframe));
@@ -197,11 +203,12 @@ pub fn distill(
     let scene_radius = config.data.scene_radius.unwrap_or(scene.sphere_radius);
     let back_end = plan.back_end();
     let mut refined_scene = None;
-    let (wireframe, arcs, report, surface) = match back_end {
+    let (mut arcs, mut arc_covariances) = (Vec::new(), Vec::new());
+    let (wireframe, report, surface) = match back_end {
         BackEnd::Paper => {
             let field = field.ok_or(DistillError::NoField(back_end))?;
             let (wireframe, report) = paper(scene, field, config, &views, progress)?;
-            (wireframe, Vec::new(), report, Some(field.surface_grid()))
+            (wireframe, report, Some(field.surface_grid()))
         }
         // A learned surface is too coarse to hide edges behind.
         BackEnd::Assembler => {
@@ -211,15 +218,10 @@ pub fn distill(
             };
             let built = assembled(scene, asked, config, &views, scene_radius, progress)?;
             let steps = built.report;
-            let arcs = built.arcs;
+            (arcs, arc_covariances) = (built.arcs, built.arc_covariances);
             refined_scene =
                 (built.refined_cameras).map(|cameras| scene.clone().with_cameras(&cameras));
-            (
-                built.wireframe,
-                arcs,
-                BackEndReport::Assembler { steps },
-                None,
-            )
+            (built.wireframe, BackEndReport::Assembler { steps }, None)
         }
     };
     // The rest asks the images from where they show the wireframe.
@@ -243,6 +245,7 @@ pub fn distill(
         wireframe,
         arcs,
         shells,
+        arc_covariances,
         confidence,
         kinds,
         report,

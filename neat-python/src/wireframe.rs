@@ -3,7 +3,8 @@
 use crate::arrays::{points, read_only, rows};
 use crate::background;
 use crate::errors::{Failure, NeatWarning};
-use neat_core::Wireframe3d;
+use nalgebra::Vector3;
+use neat_core::{CircularArc, Wireframe3d};
 use neat_export::{
     EdgeFilter, ExportOptions, Format, LengthUnit, ViewDirection, export as write_as,
 };
@@ -129,6 +130,39 @@ impl Wireframe {
             (edges, 4),
             (0..edges).flat_map(row).collect(),
         ))
+    }
+
+    /// Arcs of circles beside the edges, as arrays by name: `centers` (A, 3); `axes` (A, 2, 3),
+    /// unit vectors toward angle 0 and a right angle; `radii` (A,); `angles` (A, 2) in radians,
+    /// where they begin and end, 2π apart for a whole circle; `covariances` (A, 4, 4) of centre and
+    /// radius in squared units, NaN where the views do not tell.
+    #[getter]
+    fn arcs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (arcs, count) = (&self.document.arcs, self.document.arcs.len());
+        let numbers = |of: &dyn Fn(&CircularArc) -> Vec<f64>| arcs.iter().flat_map(of).collect();
+        let coordinates = |points: &[Vector3<f64>]| points.iter().flatten().copied().collect();
+        let known = self.document.arc_covariances.iter().copied();
+        let all = known.chain(std::iter::repeat(None)).take(count);
+        let matrix = |upper: Option<[f64; 10]>| {
+            let [xx, xy, xz, xr, yy, yz, yr, zz, zr, rr] = upper.unwrap_or([f64::NAN; 10]);
+            [
+                xx, xy, xz, xr, xy, yy, yz, yr, xz, yz, zz, zr, xr, yr, zr, rr,
+            ]
+        };
+        let centers = numbers(&|arc| coordinates(&[arc.center]));
+        let axes = numbers(&|arc| coordinates(&arc.axes));
+        let (radii, angles) = (
+            numbers(&|arc| vec![arc.radius]),
+            numbers(&|arc| arc.angles.into()),
+        );
+        let covariances = all.flat_map(matrix).collect();
+        let dict = PyDict::new(py);
+        dict.set_item("centers", read_only(py, (count, 3), centers))?;
+        dict.set_item("axes", read_only(py, (count, 2, 3), axes))?;
+        dict.set_item("radii", read_only(py, count, radii))?;
+        dict.set_item("angles", read_only(py, (count, 2), angles))?;
+        dict.set_item("covariances", read_only(py, (count, 4, 4), covariances))?;
+        Ok(dict)
     }
 
     /// All facts about the edges, by name: each (E,).

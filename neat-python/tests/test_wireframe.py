@@ -38,6 +38,25 @@ def test_arrays_are_those_of_the_file(run):
         wireframe.junctions[0, 0] = 1
 
 
+def test_arcs_are_those_of_the_file(tmp_path):
+    upper = [1e-4, 0, 1e-5, 0, 2e-4, 0, 0, 3e-4, 0, 4e-4]
+    arc = {"center": [0, 0, 1], "axes": [[1, 0, 0], [0, 1, 0]], "radius": 0.5, "angles": [0, 3.1]}
+    document = {"junctions": [], "edges": [], "arcs": [arc, dict(arc, radius=2)],
+                "arc_covariances": [upper, None]}
+    path = tmp_path / "wireframe.json"
+    path.write_text(json.dumps(document))
+    arcs = neat3d.Wireframe.read(path).arcs
+    assert arcs["radii"].tolist() == [0.5, 2] and arcs["angles"][0].tolist() == [0, 3.1]
+    assert arcs["centers"].tolist() == [[0, 0, 1]] * 2 and arcs["axes"][1].tolist() == arc["axes"]
+    known, unknown = arcs["covariances"]
+    assert np.array_equal(known, known.T) and np.array_equal(known[np.triu_indices(4)], upper)
+    assert np.isnan(unknown).all()
+    none = neat3d.Wireframe([[0, 0, 0], [1, 0, 0]], [[0, 1]]).arcs
+    assert {name: array.shape for name, array in none.items()} == {
+        "centers": (0, 3), "axes": (0, 2, 3), "radii": (0,), "angles": (0, 2),
+        "covariances": (0, 4, 4)}
+
+
 @pytest.mark.parametrize("format", neat3d.FORMATS)
 def test_exports_are_those_of_the_command(run, tmp_path, format):
     ours, theirs = tmp_path / "ours" / format, tmp_path / "theirs" / format

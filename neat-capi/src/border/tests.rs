@@ -141,6 +141,7 @@ fn a_wireframe_is_read_and_viewed() {
         assert_eq!((view.edges.read(), view.edges.add(1).read()), (0, 1));
         assert_eq!(view.probabilities.read(), 0.5);
         assert!(view.covariances.is_null() && view.kinds.is_null() && view.curved.is_null());
+        assert!(view.arc_count == 0 && view.arcs.is_null() && view.arc_covariances.is_null());
 
         // An earlier header's view ends before `junctions`: nothing is written behind it.
         let mut earlier: NeatView = zeroed();

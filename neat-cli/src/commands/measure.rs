@@ -15,18 +15,18 @@ const DIGITS: i32 = 6;
 /// No number needs more digits after its point.
 const MOST_DECIMALS: i32 = 12;
 
-/// Read lengths, distances and angles off a wireframe, with 95 % intervals
+/// Read lengths, distances, angles and radii off a wireframe, with 95 % intervals
 ///
-/// Without a selection the lengths of all edges. Junctions and edges have the numbers of
-/// wireframe.json and of the report, from 0. Lengths are in the unit of your files, or in that of
-/// --scale. Intervals are from the covariances of the junctions: an error that all views share is
+/// Without a selection the lengths of all edges and the radii of all arcs. Junctions, edges and
+/// arcs have the numbers of wireframe.json and of the report, from 0. Lengths are in the unit of your files, or in that of
+/// --scale. Intervals are from the covariances of junctions and arcs: an error that all views share is
 /// not in them, nor what your unit itself may be off.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   neat measure RUN
   neat measure RUN --edge 12 --between 3-17 --scale 0-4=3.20m±0.01
-  neat measure RUN --angle 4,9
+  neat measure RUN --angle 4,9 --radius 0 --spacing 0,1
   neat measure RUN --parallel --csv > gaps.csv
   neat measure RUN/wireframe.json --json")]
 pub struct MeasureArgs {
@@ -45,6 +45,12 @@ pub struct MeasureArgs {
     /// The distance of two edges: from the middle of the shorter one to the line of the other
     #[arg(long, value_name = "A,B", value_parser = |text: &str| pair(text, ','))]
     gap: Vec<[usize; 2]>,
+    /// The radius of an arc
+    #[arg(long, value_name = "N")]
+    radius: Vec<usize>,
+    /// The distance of the centres of two arcs, such as holes
+    #[arg(long, value_name = "A,B", value_parser = |text: &str| pair(text, ','))]
+    spacing: Vec<[usize; 2]>,
     /// The gaps between parallel edges that lie beside each other, the longest edges first
     #[arg(long)]
     parallel: bool,
@@ -81,7 +87,9 @@ impl MeasureArgs {
         let usage = |error: DimensionError| CliError::Usage(error.to_string());
         let dimensions = Dimensions::new(&document, self.scale).map_err(usage)?;
         let measured = self.selected(&dimensions).map_err(usage)?;
-        if !measured.is_empty() && document.junction_covariances.is_empty() {
+        let is_known =
+            !(document.junction_covariances.is_empty() && document.arc_covariances.is_empty());
+        if !measured.is_empty() && !is_known {
             output::warning(&format!(
                 "{} has no covariances, so there are no intervals: neat reconstruct writes them",
                 json.display()
@@ -107,13 +115,17 @@ impl MeasureArgs {
             .iter()
             .map(|edges| Quantity::Angle { edges: *edges });
         let gaps = self.gap.iter().map(|edges| Quantity::Gap { edges: *edges });
-        let mut measured: Vec<Dimension> = (edges.chain(distances).chain(angles).chain(gaps))
+        let radii = self.radius.iter().map(|arc| Quantity::Radius { arc: *arc });
+        let spacings = (self.spacing.iter()).map(|arcs| Quantity::Spacing { arcs: *arcs });
+        let chosen = edges.chain(distances).chain(angles).chain(gaps);
+        let mut measured: Vec<Dimension> = (chosen.chain(radii).chain(spacings))
             .map(|quantity| dimensions.measure(quantity))
             .collect::<Result<_, _>>()?;
         if self.parallel {
             measured.extend(dimensions.parallels(self.most));
         } else if measured.is_empty() {
             measured = dimensions.lengths();
+            measured.extend(dimensions.radii());
         }
         Ok(measured)
     }
@@ -126,6 +138,8 @@ fn named(quantity: &Quantity) -> (&'static str, Vec<usize>) {
         Quantity::Distance { junctions } => ("distance", junctions.to_vec()),
         Quantity::Gap { edges } => ("gap", edges.to_vec()),
         Quantity::Angle { edges } => ("angle", edges.to_vec()),
+        Quantity::Radius { arc } => ("radius", vec![*arc]),
+        Quantity::Spacing { arcs } => ("spacing", arcs.to_vec()),
     }
 }
 

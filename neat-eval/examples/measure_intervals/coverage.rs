@@ -105,7 +105,8 @@ fn pairs(document: &WireframeDocument, truth: &Wireframe3d, tolerance: f64) -> V
     near.into_iter().map(|(_, pair)| pair).collect()
 }
 
-fn median(numbers: impl Iterator<Item = f64>) -> f64 {
+/// The upper one.
+pub fn median(numbers: impl Iterator<Item = f64>) -> f64 {
     let mut numbers: Vec<f64> = numbers.collect();
     numbers.sort_by(f64::total_cmp);
     numbers.get(numbers.len() / 2).copied().unwrap_or(f64::NAN)

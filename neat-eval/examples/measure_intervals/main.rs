@@ -1,4 +1,4 @@
-//! How often the 95 % intervals of `neat measure` hold the true lengths of edges.
+//! How often the 95 % intervals of `neat measure` hold the true lengths of edges and radii of arcs.
 //!
 //! ```text
 //! cargo run --release -p neat-eval --example measure_intervals -- [--out DIR] [--solids SEEDS] SCENE…
@@ -13,22 +13,29 @@
 //! pairs first, one to one. The tolerance caps errors, so the table has half of it, the whole and
 //! twice as much: where coverage falls with it, edges are paired that are not the same. Edges
 //! with a free end, whose length ends where images stop telling, are counted apart.
+//!
+//! A true arc or circle is found by the nearest arc that runs along most of it within the
+//! tolerance, whatever its radius.
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
 
 mod coverage;
 #[path = "../measure_assembler/prepared.rs"]
 mod prepared;
+mod radii;
 
 use coverage::Coverage;
+use nalgebra::Vector3;
 use neat_core::synthetic::{Solid, SyntheticScene, generate};
-use neat_core::{Scene, Wireframe3d};
+use neat_core::{CircularArc, Scene, Wireframe3d};
 use neat_detect::{DetectorConfig, detect_views};
 use neat_eval::{NeatAbc, SceneTruth, SurfaceAndCreases, foreign};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::confidence::{ConfidenceConfig, assess};
+use neat_wireframe::confidence::{ConfidenceConfig, assess, fill_arcs};
 use neat_wireframe::export::WireframeDocument;
 use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
+use radii::Radii;
+use serde::Deserialize;
 use std::env;
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -38,6 +45,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 /// What edges are held against.
 struct Truth {
     wireframe: Wireframe3d,
+    arcs: Vec<CircularArc>,
     /// In the unit of the files.
     tolerance: f64,
 }
@@ -52,7 +60,7 @@ fn main() -> Result<()> {
             _ => scenes.push(PathBuf::from(argument)),
         }
     }
-    let mut coverage = Coverage::default();
+    let (mut coverage, mut radii) = (Coverage::default(), Radii::default());
     for dir in &scenes {
         let name = dir.file_name().unwrap_or_default().to_string_lossy();
         let scene = prepared(dir, out.as_ref().map(|out| out.join(&*name)).as_deref())?;
@@ -62,12 +70,9 @@ fn main() -> Result<()> {
             true => name,
             false => folder.to_string_lossy(),
         };
-        coverage.add(
-            &kind,
-            &documented(scene)?,
-            &truth.wireframe,
-            truth.tolerance,
-        )?;
+        let document = documented(scene)?;
+        coverage.add(&kind, &document, &truth.wireframe, truth.tolerance)?;
+        radii.add(&kind, &document, &truth.arcs, truth.tolerance)?;
     }
     for (seed, solid) in (0..seeds).flat_map(|seed| Solid::ALL.map(|solid| (seed, solid))) {
         let config = SyntheticScene {
@@ -81,7 +86,7 @@ fn main() -> Result<()> {
         let tolerance = NeatAbc::default().thresholds[0];
         coverage.add("solids", &documented(data.scene)?, &data.truth, tolerance)?;
     }
-    print!("{}", coverage.table());
+    print!("{}{}", coverage.table(), radii.table());
     Ok(())
 }
 
@@ -89,8 +94,10 @@ fn main() -> Result<()> {
 /// that the scene is measured by.
 fn true_edges(dir: &Path) -> Result<Truth> {
     if !dir.join("truth").exists() {
+        let path = dir.join("gt_wireframe.json");
         return Ok(Truth {
-            wireframe: foreign::read_truth(&dir.join("gt_wireframe.json"))?.wireframe,
+            wireframe: foreign::read_truth(&path)?.wireframe,
+            arcs: true_arcs(&path)?,
             tolerance: NeatAbc::default().thresholds[0],
         });
     }
@@ -105,8 +112,43 @@ fn true_edges(dir: &Path) -> Result<Truth> {
     wireframe.edges.retain(|edge| !edge.iter().any(is_cut));
     Ok(Truth {
         wireframe,
+        arcs: Vec::new(),
         tolerance: scale * SurfaceAndCreases::default().thresholds[1],
     })
+}
+
+/// The arcs and circles among the true curves, where these say what they are.
+fn true_arcs(path: &Path) -> Result<Vec<CircularArc>> {
+    #[derive(Deserialize)]
+    struct Truth {
+        #[serde(default)]
+        curves: Vec<serde_json::Value>,
+    }
+    #[derive(Deserialize)]
+    struct Circle {
+        r#type: String,
+        center: Vector3<f64>,
+        axis: Vector3<f64>,
+        x_axis: Vector3<f64>,
+        radius: f64,
+        start_angle: f64,
+        end_angle: f64,
+    }
+    let truth: Truth = serde_json::from_slice(&std::fs::read(path)?)?;
+    let circles = truth
+        .curves
+        .into_iter()
+        .map(serde_json::from_value::<Circle>);
+    Ok(circles
+        .filter_map(std::result::Result::ok)
+        .filter(|circle| ["arc", "circle"].contains(&&*circle.r#type))
+        .map(|circle| CircularArc {
+            center: circle.center,
+            axes: [circle.x_axis, circle.axis.cross(&circle.x_axis)],
+            radius: circle.radius,
+            angles: [circle.start_angle, circle.end_angle],
+        })
+        .collect())
 }
 
 /// As a run would write it.
@@ -122,5 +164,11 @@ fn documented(mut scene: Scene) -> Result<WireframeDocument> {
     let mut document = WireframeDocument::from(&built.wireframe.map(original));
     let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
     confidence.fill(&mut document, &names, &scene.original_from_world);
+    fill_arcs(
+        &mut document,
+        &built.arcs,
+        &built.arc_covariances,
+        &scene.original_from_world,
+    );
     Ok(document)
 }

@@ -125,7 +125,7 @@ impl Images<'_> {
             angles: angles_of(&sectors),
             ..found.arc
         };
-        arc.angles = self.ends_of_arc(&arc, &sectors, found.pixel);
+        arc.angles = self.ends_of_arc(&arc, &sectors, found.pixel)?;
         Some(FoundArc {
             arc,
             gain: sectors.iter().map(|sector| sector.evidence.gain).sum(),
@@ -208,11 +208,11 @@ impl Images<'_> {
     }
 
     /// From where to where the views that show the sectors of an arc speak for it, within a sector
-    /// of its ends.
-    fn ends_of_arc(&self, arc: &CircularArc, sectors: &[Sector], pixel: f64) -> [f64; 2] {
+    /// of its ends; `None` if they do so at no place.
+    fn ends_of_arc(&self, arc: &CircularArc, sectors: &[Sector], pixel: f64) -> Option<[f64; 2]> {
         let width = sectors[0].angles[1] - sectors[0].angles[0];
         if arc.sweep() + 2.0 * width >= TAU {
-            return arc.angles;
+            return Some(arc.angles);
         }
         let per_sector = (width * arc.radius / (END_STEP * pixel)).ceil().max(2.0);
         let step = width / per_sector;
@@ -227,7 +227,7 @@ impl Images<'_> {
             })
             .collect();
         let [start, end] = best_stretch(&gains);
-        [start, end].map(|k| first + step * k as f64)
+        (start < end).then(|| [start, end].map(|k| first + step * k as f64))
     }
 
     /// What the views that show an arc say about one place of it.
@@ -297,7 +297,7 @@ impl Images<'_> {
     }
 
     /// What the edgels beside samples of an arc in a view say.
-    fn rows_of_samples(
+    pub(super) fn rows_of_samples(
         &self,
         arc: &CircularArc,
         view: usize,

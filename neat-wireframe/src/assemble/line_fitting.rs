@@ -154,8 +154,16 @@ where
     if rows.len() < least {
         return None;
     }
-    let loss = Cauchy { scale: 0.5 * reach };
-    reweighted(rows, loss, ridge * rows.len() as f64 / (pixel * pixel))
+    reweighted(
+        rows,
+        loss_of_reach(reach),
+        ridge * rows.len() as f64 / (pixel * pixel),
+    )
+}
+
+/// Edgels farther off than half the reach count less and less.
+pub(super) fn loss_of_reach(reach: f64) -> Cauchy {
+    Cauchy { scale: 0.5 * reach }
 }
 
 /// Two directions perpendicular to a line and to each other.

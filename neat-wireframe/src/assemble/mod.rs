@@ -16,6 +16,7 @@
 //!
 //! All steps work in a world whose scene ball is the unit ball around the origin.
 
+mod arc_covariance;
 mod arcs;
 mod candidate_queue;
 mod circle_fitting;
@@ -185,6 +186,8 @@ pub fn assemble_with_progress(
         &mut part(progress, [SELECTED, FOLLOWED]),
     )?;
     report.arcs = arcs.len();
+    let covariance = |arc: &FoundArc| selection.images.covariance_of_arc(arc);
+    let arc_covariances: Vec<_> = arcs.iter().map(covariance).collect();
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
     let wireframe = graph_of(selection, config, &mut report, progress)?;
     let wireframe = wireframe.map(|junction| junction * scene_radius);
@@ -195,6 +198,9 @@ pub fn assemble_with_progress(
     ControlFlow::Continue(Assembled {
         wireframe,
         arcs: scaled_arcs(&arcs, scene_radius),
+        arc_covariances: (arc_covariances.into_iter())
+            .map(|covariance| Some(covariance? * scene_radius.powi(2)))
+            .collect(),
         report,
         refined_cameras,
     })

@@ -1,6 +1,7 @@
 //! What the assembler returns.
 
 use crate::Wireframe3d;
+use nalgebra::Matrix4;
 use neat_core::{Camera, CircularArc};
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +12,9 @@ pub struct Assembled {
     pub wireframe: Wireframe3d,
     /// Arcs of circles that the images show.
     pub arcs: Vec<CircularArc>,
+    /// The covariance of each arc's centre and radius, in squared units of the world; `None` where
+    /// the views do not tell.
+    pub arc_covariances: Vec<Option<Matrix4<f64>>>,
     /// What each step found.
     pub report: AssembleReport,
     /// The cameras of all views, from where the images show the wireframe; `None` where they

@@ -5,13 +5,35 @@ use super::{Confidence, EdgeConfidence, EdgeSupport};
 use crate::ViewObservation;
 use crate::Wireframe3d;
 use crate::export::{LineTrack, SupportingSegment, TrackSegment, WireframeDocument};
-use nalgebra::Matrix3;
-use neat_core::Similarity;
+use nalgebra::{Matrix3, Matrix4};
+use neat_core::{CircularArc, Similarity};
 
 /// The covariance of a point after a similarity: scaled by the square of its
 /// scale. Its axes stay, because a [`Similarity`] does not turn.
 pub fn transformed_covariance(covariance: &Matrix3<f64>, transform: &Similarity) -> Matrix3<f64> {
     covariance * transform.scale.powi(2)
+}
+
+/// Writes arcs of the world of the cameras, and the covariances of their centres and radii, into a
+/// document, in the frame of the user's files.
+pub fn fill_arcs(
+    document: &mut WireframeDocument,
+    arcs: &[CircularArc],
+    covariances: &[Option<Matrix4<f64>>],
+    original_from_world: &Similarity,
+) {
+    let scale = original_from_world.scale.powi(2);
+    document.arcs = (arcs.iter())
+        .map(|arc| arc.map(|point| original_from_world.apply(point)))
+        .collect();
+    document.arc_covariances = (covariances.iter())
+        .map(|covariance| {
+            let in_original = (*covariance)? * scale;
+            let of_row = |row| (row..4).map(move |column| (row, column));
+            let mut upper = (0..4).flat_map(of_row).map(|index| in_original[index]);
+            Some(std::array::from_fn(|_| upper.next().unwrap_or_default()))
+        })
+        .collect();
 }
 
 impl Confidence {

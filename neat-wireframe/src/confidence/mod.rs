@@ -41,7 +41,7 @@ mod provenance;
 mod view_correlation;
 
 pub use config::ConfidenceConfig;
-pub use document::transformed_covariance;
+pub use document::{fill_arcs, transformed_covariance};
 pub use noise::DetectionNoise;
 pub use provenance::EdgeSupport;
 

@@ -3,11 +3,15 @@
 use super::Quantity;
 use nalgebra::Vector3;
 
-/// The value of a quantity whose junctions lie at these points: for edges the ends of one after
+/// The value of a quantity whose places lie at these points: for edges the ends of one after
 /// the other.
 pub(super) fn value(quantity: &Quantity, points: &[Vector3<f64>]) -> f64 {
     match (quantity, points) {
-        (Quantity::Length { .. } | Quantity::Distance { .. }, [a, b]) => (b - a).norm(),
+        (
+            Quantity::Length { .. } | Quantity::Distance { .. } | Quantity::Spacing { .. },
+            [a, b],
+        ) => (b - a).norm(),
+        (Quantity::Radius { .. }, [radius]) => radius.x,
         (Quantity::Gap { .. }, [a, b, c, d]) => gap([a, b], [c, d]),
         (Quantity::Angle { .. }, [a, b, c, d]) => angle(&(b - a), &(d - c)),
         _ => unreachable!(

@@ -1,9 +1,9 @@
 //! Dimensions of a wireframe, each with its standard deviation: lengths of edges, distances
-//! of junctions and of parallel edges, angles.
+//! of junctions and of parallel edges, angles, radii of arcs and the spacing of their centres.
 //!
-//! A dimension is a function of the positions of a few junctions, and of those that set the
-//! scale. Its variance is linear propagation of their covariances as `wireframe.json` has
-//! them. Junctions count as independent of each other, but one that a dimension uses twice,
+//! A dimension is a function of a few places, such as positions of junctions, and of those that
+//! set the scale. Its variance is linear propagation of their covariances as `wireframe.json` has
+//! them. Places count as independent of each other, but one that a dimension uses twice,
 //! such as an end of the edge that sets the scale, counts as one.
 //!
 //! ```
@@ -69,6 +69,25 @@ pub enum Quantity {
         /// The edges.
         edges: [usize; 2],
     },
+    /// Of the circle of an arc.
+    Radius {
+        /// The arc.
+        arc: usize,
+    },
+    /// Between the centres of two arcs.
+    Spacing {
+        /// The arcs.
+        arcs: [usize; 2],
+    },
+}
+
+/// What a quantity depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Place {
+    Junction(usize),
+    Center(usize),
+    /// The first coordinate is the radius.
+    Radius(usize),
 }
 
 /// A quantity with its value.
@@ -93,7 +112,7 @@ pub enum DimensionError {
     /// A number beyond the last.
     #[error("there is no {what} {index}: the wireframe has {count}, counted from 0")]
     Missing {
-        /// "junction" or "edge".
+        /// "junction", "edge" or "arc".
         what: &'static str,
         /// The number asked for.
         index: usize,
@@ -103,7 +122,7 @@ pub enum DimensionError {
     /// One thing, twice.
     #[error("{what} {index} is named twice: name two of them")]
     Twice {
-        /// "junction" or "edge".
+        /// "junction", "edge" or "arc".
         what: &'static str,
         /// Its number.
         index: usize,
@@ -122,7 +141,7 @@ pub enum DimensionError {
 pub struct Dimensions<'a> {
     document: &'a WireframeDocument,
     scale: Option<Scale>,
-    /// Greatest side of the box around all junctions.
+    /// Greatest side of the box around all junctions and centres, or the greatest radius.
     extent: f64,
     /// Whether each junction is a free end.
     free: Vec<bool>,
@@ -138,12 +157,15 @@ impl<'a> Dimensions<'a> {
         document: &'a WireframeDocument,
         scale: Option<Scale>,
     ) -> Result<Self, DimensionError> {
-        let axes = document.junctions.iter().flat_map(|p| [p.x, p.y, p.z]);
+        let centers = document.arcs.iter().map(|arc| &arc.center);
+        let axes = (document.junctions.iter().chain(centers)).flat_map(|p| [p.x, p.y, p.z]);
         let largest = axes.clone().fold(f64::NEG_INFINITY, f64::max);
+        let extent = largest - axes.fold(f64::INFINITY, f64::min);
+        let radii = document.arcs.iter().map(|arc| arc.radius);
         let dimensions = Self {
             document,
             scale,
-            extent: (largest - axes.fold(f64::INFINITY, f64::min)).max(f64::MIN_POSITIVE),
+            extent: radii.fold(extent.max(f64::MIN_POSITIVE), f64::max),
             free: free_ends(document),
         };
         if let Some(scale) = &scale {
@@ -166,6 +188,13 @@ impl<'a> Dimensions<'a> {
             .collect()
     }
 
+    /// The radii of all arcs, in their order.
+    pub fn radii(&self) -> Vec<Dimension> {
+        (0..self.document.arcs.len())
+            .filter_map(|arc| self.measure(Quantity::Radius { arc }).ok())
+            .collect()
+    }
+
     /// The gaps between edges that may be parallel, lie beside each other for most of the
     /// shorter one and apart for sure; those of the longest edges first, `most` at most.
     pub fn parallels(&self, most: usize) -> Vec<Dimension> {
@@ -178,13 +207,14 @@ impl<'a> Dimensions<'a> {
     /// If it names what is not there, one thing twice, or an edge without a direction.
     pub fn measure(&self, quantity: Quantity) -> Result<Dimension, DimensionError> {
         self.check(&quantity)?;
-        let own = self.junctions_of(&quantity);
+        let own = self.places_of(&quantity);
         let by_scale = match quantity {
             Quantity::Angle { .. } => None,
             _ => self.scale,
         };
-        let mut junctions = own.clone();
-        junctions.extend(by_scale.iter().flat_map(|scale| scale.junctions));
+        let mut places = own.clone();
+        let reference = by_scale.iter().flat_map(|scale| scale.junctions);
+        places.extend(reference.map(Place::Junction));
         let value = |points: &[Vector3<f64>]| {
             let (own, reference) = points.split_at(own.len());
             let value = geometry::value(&quantity, own);
@@ -193,11 +223,10 @@ impl<'a> Dimensions<'a> {
                 _ => value,
             }
         };
-        let points: Vec<Vector3<f64>> =
-            (junctions.iter().map(|j| self.document.junctions[*j])).collect();
+        let points: Vec<Vector3<f64>> = (places.iter().map(|place| self.point(*place))).collect();
         let measured = value(&points);
         let propagated =
-            |of: &dyn Fn(&[Vector3<f64>]) -> Vector3<f64>| self.propagated(&junctions, &points, of);
+            |of: &dyn Fn(&[Vector3<f64>]) -> Vector3<f64>| self.propagated(&places, &points, of);
         let linear = || propagated(&|points| Vector3::new(value(points), 0.0, 0.0));
         let variance = match quantity {
             // An angle near 0 has no derivative: it is how far apart two directions are.
@@ -215,67 +244,87 @@ impl<'a> Dimensions<'a> {
             sigma,
             interval: sigma.map(|sigma| interval(&quantity, measured, sigma)),
             free_end: match quantity {
-                Quantity::Length { .. } | Quantity::Distance { .. } => {
-                    junctions.iter().any(|junction| self.free[*junction])
-                }
+                Quantity::Length { .. } | Quantity::Distance { .. } => (places.iter())
+                    .any(|place| matches!(place, Place::Junction(j) if self.free[*j])),
                 _ => false,
             },
         })
     }
 
     /// The largest variance of a vector in any direction, by linear propagation, with central
-    /// differences for derivatives; `None` if a junction is not determined.
+    /// differences for derivatives; `None` if a place is not determined.
     fn propagated(
         &self,
-        junctions: &[usize],
+        places: &[Place],
         points: &[Vector3<f64>],
         of: &dyn Fn(&[Vector3<f64>]) -> Vector3<f64>,
     ) -> Option<f64> {
         let step = STEP * self.extent;
         let mut sum = Matrix3::zeros();
-        for junction in junctions.iter().copied().collect::<BTreeSet<usize>>() {
+        for place in places.iter().copied().collect::<BTreeSet<Place>>() {
             // It moves wherever it stands.
             let moved = |by: Vector3<f64>| {
-                let all = junctions.iter().zip(points);
-                let all = all.map(|(j, p)| if *j == junction { p + by } else { *p });
+                let all = places.iter().zip(points);
+                let all = all.map(|(other, p)| if *other == place { p + by } else { *p });
                 of(&all.collect::<Vec<_>>())
             };
             let slopes = [Vector3::x(), Vector3::y(), Vector3::z()]
                 .map(|axis| (moved(axis * step) - moved(-axis * step)) / (2.0 * step));
             let slopes = Matrix3::from_columns(&slopes);
-            sum += slopes * self.covariance(junction)? * slopes.transpose();
+            sum += slopes * self.covariance(place)? * slopes.transpose();
         }
         let finite = sum.iter().all(|x| x.is_finite());
         finite.then(|| sum.symmetric_eigenvalues().max().max(0.0))
     }
 
-    fn covariance(&self, junction: usize) -> Option<Matrix3<f64>> {
-        let [xx, xy, xz, yy, yz, zz] = (*self.document.junction_covariances.get(junction)?)?;
+    fn point(&self, place: Place) -> Vector3<f64> {
+        match place {
+            Place::Junction(junction) => self.document.junctions[junction],
+            Place::Center(arc) => self.document.arcs[arc].center,
+            Place::Radius(arc) => Vector3::x() * self.document.arcs[arc].radius,
+        }
+    }
+
+    fn covariance(&self, place: Place) -> Option<Matrix3<f64>> {
+        let of_arc = |arc: usize| *self.document.arc_covariances.get(arc)?;
+        let [xx, xy, xz, yy, yz, zz] = match place {
+            Place::Junction(junction) => (*self.document.junction_covariances.get(junction)?)?,
+            Place::Center(arc) => {
+                let [xx, xy, xz, _, yy, yz, _, zz, ..] = of_arc(arc)?;
+                [xx, xy, xz, yy, yz, zz]
+            }
+            Place::Radius(arc) => [of_arc(arc)?[9], 0.0, 0.0, 0.0, 0.0, 0.0],
+        };
         Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
     }
 
     /// In the order that [`geometry::value`] expects.
-    fn junctions_of(&self, quantity: &Quantity) -> Vec<usize> {
-        let edges = &self.document.edges;
+    fn places_of(&self, quantity: &Quantity) -> Vec<Place> {
+        let ends = |edges: &[usize]| {
+            let ends = edges.iter().flat_map(|edge| self.document.edges[*edge]);
+            ends.map(Place::Junction).collect()
+        };
         match quantity {
-            Quantity::Length { edge } => edges[*edge].to_vec(),
-            Quantity::Distance { junctions } => junctions.to_vec(),
-            Quantity::Gap { edges: pair } | Quantity::Angle { edges: pair } => {
-                pair.iter().flat_map(|edge| edges[*edge]).collect()
-            }
+            Quantity::Length { edge } => ends(&[*edge]),
+            Quantity::Distance { junctions } => junctions.map(Place::Junction).to_vec(),
+            Quantity::Gap { edges } | Quantity::Angle { edges } => ends(edges),
+            Quantity::Radius { arc } => vec![Place::Radius(*arc)],
+            Quantity::Spacing { arcs } => arcs.map(Place::Center).to_vec(),
         }
     }
 
     fn check(&self, quantity: &Quantity) -> Result<(), DimensionError> {
+        let document = self.document;
         let (what, named, count) = match quantity {
-            Quantity::Length { edge } => ("edge", vec![*edge], self.document.edges.len()),
+            Quantity::Length { edge } => ("edge", vec![*edge], document.edges.len()),
             Quantity::Distance { junctions } => {
-                let count = self.document.junctions.len();
-                ("junction", junctions.to_vec(), count)
+                ("junction", junctions.to_vec(), document.junctions.len())
             }
             Quantity::Gap { edges } | Quantity::Angle { edges } => {
-                ("edge", edges.to_vec(), self.document.edges.len())
+                ("edge", edges.to_vec(), document.edges.len())
             }
+            Quantity::Radius { arc } => ("arc", vec![*arc], document.arcs.len()),
+            Quantity::Spacing { arcs } => ("arc", arcs.to_vec(), document.arcs.len()),
         };
         if let Some(&index) = named.iter().find(|index| **index >= count) {
             return Err(DimensionError::Missing { what, index, count });
@@ -285,8 +334,10 @@ impl<'a> Dimensions<'a> {
         {
             return Err(DimensionError::Twice { what, index });
         }
-        for pair in self.junctions_of(quantity).chunks_exact(2) {
-            let [a, b] = [pair[0], pair[1]];
+        for pair in self.places_of(quantity).chunks_exact(2) {
+            let [Place::Junction(a), Place::Junction(b)] = [pair[0], pair[1]] else {
+                continue;
+            };
             let apart = (self.document.junctions[b] - self.document.junctions[a]).norm();
             if apart <= 2.0 * STEP * self.extent {
                 return Err(DimensionError::OnePlace { a, b });

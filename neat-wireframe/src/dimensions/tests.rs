@@ -1,5 +1,6 @@
 use super::*;
 use crate::test_scenes::{Noise, cube};
+use neat_core::CircularArc;
 
 /// Nearly normal with standard deviation 1: the sum of twelve uniform numbers.
 fn normal(noise: &mut Noise) -> f64 {
@@ -236,4 +237,50 @@ fn scales_are_read() {
     ] {
         assert!(bad.parse::<Scale>().is_err(), "{bad}");
     }
+}
+
+#[test]
+fn holes_have_radii_and_spacings() {
+    let (mut document, _) = unsure_cube(0.0);
+    document.arcs = [0.0, 3.0]
+        .map(|x| CircularArc {
+            center: Vector3::new(x, 4.0 * x / 3.0, 0.0),
+            axes: [Vector3::x(), Vector3::y()],
+            radius: 0.5,
+            angles: [0.0, 2.0],
+        })
+        .to_vec();
+    // Centres by .03 and .04 in x, radii by .01, and both together, which no spacing asks.
+    let of_arc = |x: f64| Some([x, 0.0, 0.0, 2e-4, 0.0, 0.0, 0.0, 0.0, 0.0, 1e-4]);
+    document.arc_covariances = vec![of_arc(9e-4), of_arc(16e-4)];
+    let dimensions = Dimensions::new(&document, None).unwrap();
+    let radii = dimensions.radii();
+    assert_eq!(radii.len(), 2);
+    for radius in radii {
+        let [low, high] = radius.interval.unwrap();
+        assert!((radius.value - 0.5).abs() < 1e-12 && (radius.sigma.unwrap() - 0.01).abs() < 1e-9);
+        assert!((high - low - 2.0 * INTERVAL * 0.01).abs() < 1e-9);
+    }
+    let spacing = dimensions
+        .measure(Quantity::Spacing { arcs: [0, 1] })
+        .unwrap();
+    assert!((spacing.value - 5.0).abs() < 1e-12);
+    // By .05 in x, along which the centres are 3 of 5 apart.
+    assert!((spacing.sigma.unwrap() - 0.03).abs() < 1e-8);
+
+    // The side of the cube is truly 10 m.
+    let [a, b] = document.edges[0];
+    let side = (document.junctions[b] - document.junctions[a]).norm();
+    let scale = format!("{a}-{b}=10m").parse().unwrap();
+    let scaled = Dimensions::new(&document, Some(scale)).unwrap();
+    let radius = scaled.measure(Quantity::Radius { arc: 1 }).unwrap();
+    assert!((radius.value - 5.0 / side).abs() < 1e-9);
+    assert!((radius.sigma.unwrap() - 0.1 / side).abs() < 1e-9);
+
+    let said = |quantity| dimensions.measure(quantity).unwrap_err().to_string();
+    assert!(said(Quantity::Radius { arc: 2 }).contains("no arc 2"));
+    assert!(said(Quantity::Spacing { arcs: [1, 1] }).contains("arc 1 is named twice"));
+    document.arc_covariances.clear();
+    let unknown = Dimensions::new(&document, None).unwrap();
+    assert_eq!(unknown.radii()[0].interval, None);
 }

@@ -42,6 +42,11 @@ pub struct WireframeDocument {
     /// Faces between edges and arcs, closed shells first, in the frame of the user's files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shells: Vec<Shell>,
+    /// The upper triangle of the covariance of every arc's centre x, y, z and radius, row by row,
+    /// in squared units of the user's frame; `None` where the views do not tell. Empty, or one
+    /// per arc.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub arc_covariances: Vec<Option<[f64; 10]>>,
     /// Facts about every junction.
     #[serde(default, skip_serializing_if = "JunctionFields::is_empty")]
     pub junction_fields: JunctionFields,
@@ -169,15 +174,16 @@ impl WireframeDocument {
                 });
             }
         }
-        let covariances = self.junction_covariances.iter().flatten();
-        let covariances_fit = self.junction_covariances.is_empty()
-            || self.junction_covariances.len() == self.junctions.len();
-        if !covariances_fit || covariances.flatten().any(|x| !x.is_finite()) {
+        let covariances = [
+            covariances_fit(&self.junction_covariances, self.junctions.len(), "junction"),
+            covariances_fit(&self.arc_covariances, self.arcs.len(), "arc"),
+        ];
+        if let Some((expected, of)) = covariances.into_iter().find_map(Result::err) {
             return Err(ExportError::BadField {
                 path: path.into(),
-                field: "junction_covariances".into(),
-                expected: self.junctions.len(),
-                of: "junction",
+                field: format!("{of}_covariances"),
+                expected,
+                of,
             });
         }
         let finite = |support: &SupportingSegment| {
@@ -196,6 +202,22 @@ impl WireframeDocument {
             });
         }
         Ok(())
+    }
+}
+
+/// Whether there are none or one for each of so many things, and all numbers are finite; else what
+/// there should be.
+fn covariances_fit<const N: usize>(
+    covariances: &[Option<[f64; N]>],
+    expected: usize,
+    of: &'static str,
+) -> Result<(), (usize, &'static str)> {
+    let mut numbers = covariances.iter().flatten().flatten();
+    let fit = covariances.is_empty() || covariances.len() == expected;
+    if fit && numbers.all(|x| x.is_finite()) {
+        Ok(())
+    } else {
+        Err((expected, of))
     }
 }
 
