@@ -36,27 +36,26 @@ pub(super) fn shells(
         .map(|group| group.into_iter().collect())
         .collect();
     groups.iter_mut().for_each(|group| group.sort_unstable());
-    groups.sort_by(|a, b| b.len().cmp(&a.len()).then_with(|| a.cmp(b)));
-    let shell = |group: Vec<usize>| {
+    groups.sort();
+    let mut shells = Vec::new();
+    for group in groups {
         let mut faces: Vec<Face> = group.iter().map(|place| faces[*place].clone()).collect();
         let orientable = orient(&mut faces);
-        let two_each = faces
-            .iter()
-            .flat_map(Face::steps)
-            .all(|step| of_curve[&step.curve].len() == 2);
+        let mut steps = faces.iter().flat_map(Face::steps);
+        let two_each = steps.all(|step| of_curve[&step.curve].len() == 2);
         let mut shell = Shell {
             closed: orientable && two_each,
             faces,
         };
         face_outward(&mut shell, graph, views);
-        if shell.closed {
-            open_where_curves_are(&mut shell, curves);
+        if shell.closed && leave_out_where_curves_are(&mut shell, curves) {
+            // What is left may fall apart.
+            shells.extend(self::shells(graph, curves, shell.faces, views));
+        } else {
+            shells.push(shell);
         }
-        shell
-    };
-    let mut shells: Vec<Shell> = groups.into_iter().map(shell).collect();
-    shells.retain(|shell| !shell.faces.is_empty());
-    shells.sort_by_key(|shell| !shell.closed);
+    }
+    shells.sort_by_key(|shell| (!shell.closed, usize::MAX - shell.faces.len()));
     shells
 }
 
@@ -141,8 +140,8 @@ fn middle(face: &Face, geometry: &ShellGeometry) -> Option<(Vector3<f64>, Vector
 
 /// Makes a sheet of a closed shell if other curves of the wireframe lie within it or on it: nothing
 /// is seen within a solid, and what lies on a face is the rim of something that the shell lacks.
-/// The faces on which they lie are left out.
-fn open_where_curves_are(shell: &mut Shell, curves: &Curves) {
+/// The faces on which they lie are left out; returns whether there are such.
+fn leave_out_where_curves_are(shell: &mut Shell, curves: &Curves) -> bool {
     let own: BTreeSet<CurveIndex> = (shell.faces.iter().flat_map(Face::steps))
         .map(|step| step.curve)
         .collect();
@@ -189,8 +188,9 @@ fn open_where_curves_are(shell: &mut Shell, curves: &Curves) {
         !samples.iter().any(|of_curve| most(of_curve, &on_face))
     };
     let free: Vec<bool> = regions.iter().map(is_free).collect();
-    shell.closed =
-        free.iter().all(|free| *free) && !samples.iter().any(|of_curve| most(of_curve, &within));
+    let all_free = free.iter().all(|free| *free);
+    shell.closed = all_free && !samples.iter().any(|of_curve| most(of_curve, &within));
     let mut free = free.into_iter();
     shell.faces.retain(|_| free.next().unwrap_or(true));
+    !all_free
 }

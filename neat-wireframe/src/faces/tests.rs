@@ -229,6 +229,22 @@ fn nothing_is_seen_within_a_solid() {
 }
 
 #[test]
+fn a_shell_that_falls_apart_is_several() {
+    // Something ends on the side of a pin: its two ends are left.
+    let pin = Model::default().circle([0.0, 0.0, 0.0], 0.2, WHOLE);
+    let mut pin = pin.circle([0.0, 0.0, 1.0], 0.2, WHOLE);
+    let on_side = [[0.2, 0.0, 0.3], [0.2, 0.0, 0.7]].map(Vector3::from);
+    pin.wireframe.junctions.extend(on_side);
+    pin.wireframe.edges.push([0, 1]);
+    let shells = pin.shells();
+    let faces: Vec<(bool, usize)> = shells
+        .iter()
+        .map(|shell| (shell.closed, shell.faces.len()))
+        .collect();
+    assert_eq!(faces, [(false, 1), (false, 1)]);
+}
+
+#[test]
 fn geometry_lies_on_the_surfaces() {
     let mut noise = crate::test_scenes::Noise(5);
     let block = Model::default().prism(&SQUARE, [0.0, 0.8]);
