@@ -41,8 +41,8 @@ pub(super) fn shells(
     for group in groups {
         let mut faces: Vec<Face> = group.iter().map(|place| faces[*place].clone()).collect();
         let orientable = orient(&mut faces);
-        let mut steps = faces.iter().flat_map(Face::steps);
-        let two_each = steps.all(|step| of_curve[&step.curve].len() == 2);
+        let has_two = |face: &Face| face.steps().all(|step| of_curve[&step.curve].len() == 2);
+        let two_each = faces.iter().all(has_two);
         let mut shell = Shell {
             closed: orientable && two_each,
             faces,
