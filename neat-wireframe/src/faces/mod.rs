@@ -2,11 +2,11 @@
 //! shells where they close.
 //!
 //! Curves that lie in one plane within their covariances divide it into cells, and two coaxial
-//! circles are the rims of a cylinder: each is a face that may be there ([`candidates`]). Images
-//! speak against a face through which they show what lies behind it ([`visibility`]); among the
-//! others those are chosen that give the most edges two faces ([`selection`]). What hangs
+//! circles are the rims of a cylinder: each is a face that may be there (`candidates.rs`). Images
+//! speak against a face through which they show what lies behind it (`visibility.rs`); among the
+//! others those are chosen that give the most edges two faces (`selection.rs`). What hangs
 //! together is a shell; it bounds a solid if each of its curves has a face on both sides
-//! ([`shells`]).
+//! (`shells.rs`).
 //!
 //! ```
 //! use neat_core::Wireframe3d;
