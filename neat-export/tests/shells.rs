@@ -1,7 +1,10 @@
 //! Faces in the exports: a block with a round hole, a sheet, an edge and an arc on their own.
 
+use nalgebra::Vector3;
 use neat_export::{EdgeFilter, ExportOptions, Format, export};
 use neat_wireframe::export::{WireframeDocument, read_json, write_json};
+use neat_wireframe::faces::Surface;
+use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -140,5 +143,33 @@ fn shells_read_back_and_broken_ones_are_refused() {
         assert!(text.contains(sound));
         fs::write(&path, text.replacen(sound, broken, 1)).unwrap();
         assert!(read_json(&path).is_err(), "{broken}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    /// Surfaces of another program may have nothing to do with their curves.
+    #[test]
+    fn wrong_surfaces_are_written_as_numbers(
+        normal in prop::sample::select(vec![Vector3::x(), -Vector3::y(), Vector3::z()]),
+        offset in -2.0..2.0,
+        convex: bool,
+    ) {
+        let mut document = document();
+        for face in document.shells.iter_mut().flat_map(|shell| &mut shell.faces) {
+            face.surface = match face.surface {
+                Surface::Plane { .. } => Surface::Plane { normal, offset },
+                Surface::Cylinder { radius, .. } => Surface::Cylinder {
+                    point: document.arcs[0].center,
+                    axis: normal,
+                    radius,
+                    convex,
+                },
+            };
+        }
+        for format in [Format::Step, Format::Obj, Format::Gltf] {
+            let text = exported(&document, format, EdgeFilter::default());
+            prop_assert!(!text.contains("NaN") && !text.contains("inf"), "{format:?}");
+        }
     }
 }

@@ -131,13 +131,12 @@ impl<'a> ShellWriter<'a> {
 
     /// The surface, and whether the face's normal is its own.
     fn surface(&mut self, face: &Face) -> (String, bool) {
-        // Any point will do as origin, and any direction as x axis.
+        // Any point will do as origin, and any direction as x axis: seams begin there.
         let points = self.geometry.points(&face.loops[0][0], 0.5);
         match &face.surface {
             Surface::Plane { normal, offset } => {
                 let origin = points[0] - normal * (normal.dot(&points[0]) - offset);
-                let along = points[1] - points[0];
-                let x = (along - normal * normal.dot(&along)).normalize();
+                let x = x_axis(normal, &(points[1] - points[0]));
                 let placement = self.step.placement(&origin, normal, &x);
                 (self.step.add(&format!("PLANE('',{placement})")), true)
             }
@@ -147,8 +146,7 @@ impl<'a> ShellWriter<'a> {
                 radius,
                 convex,
             } => {
-                let outward = points[0] - point;
-                let x = (outward - axis * axis.dot(&outward)).normalize();
+                let x = x_axis(axis, &(points[0] - point));
                 let placement = self.step.placement(point, axis, &x);
                 let radius = real(*radius);
                 let surface = self
@@ -190,5 +188,17 @@ impl<'a> ShellWriter<'a> {
         edges.extend(self.oriented(second));
         edges.extend(along(self.step, ".F."));
         edges
+    }
+}
+
+/// Perpendicular to a z axis of length 1, in the direction of a point if there is one.
+fn x_axis(z: &Vector3<f64>, toward: &Vector3<f64>) -> Vector3<f64> {
+    let flat = toward - z * z.dot(toward);
+    let apart = flat.norm() > 1e-6 * toward.norm();
+    let any = Vector3::ith(z.iamin(), 1.0).cross(z);
+    if apart {
+        flat.normalize()
+    } else {
+        any.normalize()
     }
 }

@@ -225,7 +225,8 @@ fn height_over(surface: &Surface, at: &Vector3<f64>) -> (Vector3<f64>, f64) {
         } => {
             let offset = at - point;
             let across = offset - axis * axis.dot(&offset);
-            (across.normalize(), across.norm() - radius)
+            let outward = across.try_normalize(0.0).unwrap_or_default();
+            (outward, across.norm() - radius)
         }
     }
 }
@@ -251,7 +252,9 @@ fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> C
         }
     }
     let (normal, offset) = plane.unwrap_or((arc.normal(), arc.normal().dot(&center)));
-    let along = axis.unwrap_or(normal);
+    // A plane along the axis cuts no circle out of a cylinder.
+    let along = axis.filter(|axis| normal.dot(axis).abs() > MIN_SINGULAR);
+    let along = along.unwrap_or(normal);
     center += along * (offset - normal.dot(&center)) / normal.dot(&along);
     let up = normal * normal.dot(&arc.normal()).signum();
     let toward = if whole {
@@ -259,7 +262,8 @@ fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> C
     } else {
         arc.axes[0]
     };
-    let x = (toward - up * up.dot(&toward)).normalize();
+    let flat = toward - up * up.dot(&toward);
+    let x = flat.try_normalize(MIN_SINGULAR).unwrap_or(across(&up)[0]);
     CircularArc {
         center,
         axes: [x, up.cross(&x)],
