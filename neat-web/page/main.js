@@ -15,10 +15,17 @@ let worker = null;
 let reportUrl = null;
 /** The content of the report. */
 let report = null;
+/** When the work on a scene began, in milliseconds. */
+let began = 0;
+
+// A worker of a file of its own would have the policy of that file, which a plain server does not
+// give: one of a blob has the page's.
+const WORKER = URL.createObjectURL(new Blob(
+  [`import ${JSON.stringify(new URL("worker.js", import.meta.url))};`], { type: "text/javascript" }));
 
 function startWorker() {
   worker?.terminate();
-  worker = new Worker("worker.js", { type: "module" });
+  worker = new Worker(WORKER, { type: "module" });
   worker.onmessage = ({ data }) => HEARD[data.event]?.(data);
   worker.onerror = (event) => {
     event.preventDefault();
@@ -52,12 +59,14 @@ const HEARD = {
 /** What follows a command. */
 const FINISHED = {
   formats: ({ failure }) => { if (failure) fail(failure); },
-  reconstruct: ({ failure, report: bytes }) => {
+  reconstruct: ({ failure, bytes, report: page }) => {
     busy(false);
-    $("stage").textContent = failure ? "Stopped" : "Done";
+    const seconds = ((performance.now() - began) / 1000).toFixed(1);
+    const mebibytes = Math.ceil(bytes / 2 ** 20);
+    $("stage").textContent = failure ? "Stopped" : `Done in ${seconds} s with ${mebibytes} MiB of memory`;
     $("bar").value = failure ? 0 : 1;
     if (failure) return fail(failure);
-    report = new Blob([bytes], { type: "text/html" });
+    report = new Blob([page], { type: "text/html" });
     reportUrl = URL.createObjectURL(report);
     $("report").src = reportUrl;
     $("result").hidden = false;
@@ -105,6 +114,7 @@ function begin({ name, files }) {
   busy(true);
   $("progress").hidden = false;
   $("stage").textContent = "Starting";
+  began = performance.now();
   worker.postMessage({ command: "reconstruct", name, files });
 }
 

@@ -20,7 +20,7 @@ class LocalFile extends Inode {
   }
 }
 
-const program = fetch("neat.wasm").then((answer) => {
+const program = fetch(new URL("neat.wasm", import.meta.url)).then((answer) => {
   if (!answer.ok) throw new Error(`neat.wasm: ${answer.status} ${answer.statusText}`);
   return answer.arrayBuffer();
 }).then((bytes) => WebAssembly.compile(bytes));
@@ -52,7 +52,7 @@ function written(path) {
   return found.data;
 }
 
-/** Runs the program to its end; why it failed, or undefined. */
+/** Runs the program to its end: its `failure`, if it failed, and how many bytes of memory it had. */
 async function run(...parameters) {
   const errors = [];
   const stdin = new OpenFile(new File(new ArrayBuffer(0)));
@@ -65,38 +65,37 @@ async function run(...parameters) {
   const descriptors = [stdin, stdout, stderr, new PreopenDirectory("/", root)];
   const system = new WASI(["neat-web", ...parameters], [], descriptors, { debug: false });
   const instance = await WebAssembly.instantiate(await program, { wasi_snapshot_preview1: system.wasiImport });
+  const { memory } = instance.exports;
   try {
-    if (system.start(instance) === 0) return undefined;
+    if (system.start(instance) === 0) return { bytes: memory.buffer.byteLength };
   } catch (error) {
     // A program that ends itself has said why.
     if (errors.length === 0) errors.push(String(error));
   }
   const text = errors.join("\n");
-  return text.startsWith("memory allocation") ? OUT_OF_MEMORY : text;
+  return { failure: text.startsWith("memory allocation") ? OUT_OF_MEMORY : text };
 }
 
 const COMMANDS = {
   async reconstruct({ name, files }) {
     root.clear();
     const scene = `${SCENE}/${name}`;
-    if (!files) {
-      const failure = await run("synthesise", scene);
-      if (failure) return { failure };
-    } else {
+    if (files) {
       for (const { path, file } of files) place(`${scene}/${path}`, file);
+    } else {
+      const { failure } = await run("synthesise", scene);
+      if (failure) return { failure };
     }
-    const failure = await run("reconstruct", scene, RESULTS);
-    return failure ? { failure } : { report: written("report.html") };
+    const end = await run("reconstruct", scene, RESULTS);
+    return end.failure ? end : { ...end, report: written("report.html") };
   },
 
   async export({ format, ending }) {
-    const failure = await run("export", `${RESULTS}/wireframe.json`, format, `${RESULTS}/exported`);
-    return failure ? { failure } : { name: `wireframe.${ending}`, content: written("exported") };
+    const end = await run("export", `${RESULTS}/wireframe.json`, format, `${RESULTS}/exported`);
+    return end.failure ? end : { name: `wireframe.${ending}`, content: written("exported") };
   },
 
-  async formats() {
-    return { failure: await run("formats") };
-  },
+  formats: () => run("formats"),
 };
 
 onmessage = async ({ data }) => {

@@ -15,7 +15,7 @@ pub fn tell_policy() -> Result<(), Box<dyn Error>> {
         "policy": format!(
             "default-src 'none'; script-src 'self' 'wasm-unsafe-eval' '{script}'; \
              style-src 'self' '{style}'; img-src data: blob:; connect-src 'self'; \
-             worker-src 'self'; frame-src blob:; base-uri 'none'; form-action 'none'"
+             worker-src 'self' blob:; frame-src blob:; base-uri 'none'; form-action 'none'"
         ),
     }));
     Ok(())
