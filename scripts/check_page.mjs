@@ -5,10 +5,11 @@
 //   scripts/make_page.sh PAGE
 //   node scripts/check_page.mjs PAGE NEAT [--scene FOLDER] [--picture FILE]
 //
-// NEAT is the command. Of FOLDER, another scene, the times of both are told. The page is served until it has loaded, and then no more: what follows
-// must work without the network. Any error or warning on the console, any request to somewhere
-// else, and a number that differs by more than 1e-9 is a failure. Needs Node 18 and Chromium (or
-// CHROMIUM=path), nothing else.
+// NEAT is the command. Of FOLDER, another scene, the times of both are told. The page is served
+// until its synthetic scene is done, and then no more: what follows must work without the
+// network. Any error or warning on the console, any request to somewhere else, and a number that
+// differs by more than 1e-9 is a failure. Needs Node 18 and Chromium (or CHROMIUM=path), nothing
+// else.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -140,6 +141,14 @@ async function pickSegment(browser) {
   assert.match(heading ?? "nothing", /^Segment \d+$/, `a click on segment ${index} picks ${heading}`);
 }
 
+async function checkStopped(browser) {
+  await browser.clickOn("#synthetic");
+  await browser.until(isShown("views"), "no image is shown", 5 * MINUTES);
+  await browser.clickOn("#stop");
+  assert.ok(await browser.evaluate(`!(${isShown("progress")}) && !document.getElementById("choose").disabled`));
+  console.log("ok: a scene is given up");
+}
+
 async function checkSynthetic(browser, truth) {
   await browser.clickOn("#synthetic");
   await browser.until(isShown("views"), "no image is shown", 5 * MINUTES);
@@ -199,12 +208,12 @@ async function main(browser) {
   await browser.setDevice({ width: 1280, height: 900 });
   await browser.open(`http://127.0.0.1:${port}/`);
   await browser.until(`document.querySelectorAll("#format option").length > 5`, "the program does not start");
+  await checkStopped(browser);
+  await checkSynthetic(browser, truth);
   await new Promise((done) => {
     server.close(done);
     server.closeAllConnections();
   });
-
-  await checkSynthetic(browser, truth);
   await checkDropped(browser, scene, truth);
   if (another) await measure(browser, resolve(another));
   await checkRefused(browser);
@@ -212,7 +221,7 @@ async function main(browser) {
   const own = ["data:", "blob:", `http://127.0.0.1:${port}/`];
   const outside = browser.requests.filter((url) => !own.some((begin) => url.startsWith(begin)));
   assert.deepEqual(outside, [], "nothing may be fetched from elsewhere");
-  console.log("ok: all without the network, and nothing on the console");
+  console.log("ok: nothing from elsewhere, and nothing on the console");
 }
 
 const found = findBrowser();
