@@ -20,6 +20,7 @@ import { extname, join, resolve } from "node:path";
 import { Browser, findBrowser } from "./browser.mjs";
 
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm" };
+const DESKTOP = { width: 1280, height: 900 };
 const MINUTES = 60_000;
 /** As `neat-web synthesise` makes it. */
 const BUNDLED = ["--views", "48", "--image-size", "400"];
@@ -159,6 +160,7 @@ async function checkSynthetic(browser, truth) {
   assert.equal(images, Number(BUNDLED[1]), "an image for every view");
   assert.ok(lines > 5 * images, `${lines} segments in ${images} images`);
   await pickSegment(browser);
+  await checkPhone(browser);
   if (picture) writeFileSync(picture, Buffer.from(await browser.screenshot(), "base64"));
   const document = JSON.parse(await download(browser, "json", "wireframe.json"));
   document.metadata.scene = truth.document.metadata.scene;
@@ -185,6 +187,13 @@ async function measure(browser, scene) {
     + `${truth.document.edges.length} edges`);
 }
 
+async function checkPhone(browser) {
+  await browser.setDevice({ width: 390, height: 844, touch: true, dark: true });
+  const [scrolls, page] = await browser.evaluate("[document.scrollingElement.scrollWidth, window.innerWidth]");
+  assert.ok(scrolls <= page, `the page is ${scrolls} pixels wide in a window of ${page}`);
+  await browser.setDevice(DESKTOP);
+}
+
 async function checkRefused(browser) {
   const empty = join(work, "no-scene");
   mkdirSync(empty);
@@ -205,7 +214,7 @@ async function main(browser) {
   const server = await serve();
   const { port } = server.address();
   await browser.send("Browser.setDownloadBehavior", { behavior: "allow", downloadPath: downloads }, null);
-  await browser.setDevice({ width: 1280, height: 900 });
+  await browser.setDevice(DESKTOP);
   await browser.open(`http://127.0.0.1:${port}/`);
   await browser.until(`document.querySelectorAll("#format option").length > 5`, "the program does not start");
   await checkStopped(browser);
