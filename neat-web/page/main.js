@@ -103,6 +103,7 @@ function clear() {
   for (const id of ["problem", "result", "views", "progress"]) $(id).hidden = true;
   for (const id of ["notes", "thumbnails"]) $(id).replaceChildren();
   $("remarks").textContent = "";
+  $("download").disabled = false;
   $("report").removeAttribute("src");
   if (reportUrl) URL.revokeObjectURL(reportUrl);
   reportUrl = null;
