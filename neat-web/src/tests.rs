@@ -21,7 +21,11 @@ fn the_bundled_scene_becomes_a_wireframe_a_report_and_exports() {
     assert_eq!((document.junctions.len(), document.edges.len()), (12, 18));
     let report = fs::read_to_string(path("out/report.html")).unwrap();
     assert!(report.contains("\"Seconds\""));
-    for (format, begins) in [("step", &b"ISO-10303-21"[..]), ("limap", b"PK"), ("glb", b"glTF")] {
+    for (format, begins) in [
+        ("step", &b"ISO-10303-21"[..]),
+        ("limap", b"PK"),
+        ("glb", b"glTF"),
+    ] {
         let file = path(format);
         run(&["export", &json, format, &file]).unwrap().unwrap();
         let bytes = fs::read(&file).unwrap();
