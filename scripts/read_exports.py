@@ -9,8 +9,9 @@ OUT is the folder that
 
 has filled. Every format must hold as many vertices and edges as WIREFRAME.json, the
 same edges, and the same coordinates to 1e-6 of the wireframe's extent; and its arcs, as
-arcs or as chains of straight pieces, where the format has them. Prints a line per file;
-the exit code is 1 if one differs. Needs scripts/requirements-readers.txt.
+arcs or as chains of straight pieces, where the format has them. Closed shells must be valid
+solids in STEP and watertight triangles elsewhere, of the volume that their loops enclose.
+Prints a line per file; the exit code is 1 if one differs. Needs scripts/requirements-readers.txt.
 """
 
 import json
@@ -25,6 +26,10 @@ TOLERANCE = 1e-6
 # Pieces of arcs that are drawn as chains turn by no more, in radians.
 TURN = 0.089
 SCHEMA = Path(__file__).resolve().parent.parent / "docs" / "wireframe.schema.json"
+
+
+# Junctions move onto the planes of their faces by what is noise, and chords cut off segments.
+VOLUME_TOLERANCE = 0.01
 
 
 class Arc:
@@ -49,12 +54,12 @@ class Arc:
 
 
 class Wireframe:
-    """Vertices [V, 3], index pairs [E, 2] and arcs."""
+    """Vertices [V, 3], index pairs [E, 2], arcs and shells."""
 
-    def __init__(self, vertices, edges, arcs=()):
+    def __init__(self, vertices, edges, arcs=(), shells=()):
         self.vertices = np.asarray(vertices, dtype=float).reshape(-1, 3)
         self.edges = np.asarray(edges, dtype=int).reshape(-1, 2)
-        self.arcs = arcs
+        self.arcs, self.shells = arcs, shells
 
     def drawn(self):
         """With arcs as chains of straight pieces, for formats without curves."""
@@ -65,7 +70,7 @@ class Wireframe:
             pieces = np.stack([start, (start + 1) % len(points)], axis=-1)
             edges = np.concatenate([edges, len(vertices) + pieces])
             vertices = np.concatenate([vertices, points])
-        return Wireframe(vertices, edges)
+        return Wireframe(vertices, edges, shells=self.shells)
 
     def extent(self):
         if len(self.vertices) == 0:
@@ -83,6 +88,63 @@ class Wireframe:
         pairs = [[new_index[a], new_index[b]]
                  for i, (a, b) in enumerate(self.edges.tolist()) if i not in set(edges)]
         return Wireframe(self.vertices[kept], pairs, self.arcs)
+
+    def without_faces(self):
+        """What bounds no face."""
+        steps = [step for shell in self.shells for face in shell["faces"]
+                 for loop in face["loops"] for step in loop]
+        edges, arcs = ({step[kind] for step in steps if kind in step} for kind in ("edge", "arc"))
+        loose = Wireframe(self.vertices, self.edges,
+                          [arc for i, arc in enumerate(self.arcs) if i not in arcs])
+        return loose.without(edges=edges)
+
+
+def volume(shell, wireframe):
+    """What a closed shell encloses: a third of the flux of x through its faces."""
+    def flux(face):
+        if "plane" in face:
+            area = sum((area_of_step(step, wireframe) for loop in face["loops"] for step in loop),
+                       np.zeros(3))
+            return face["plane"]["offset"] * float(np.dot(face["plane"]["normal"], area))
+        cylinder = face["cylinder"]
+        one, other = (wireframe.arcs[step["arc"]] for loop in face["loops"] for step in loop
+                      if "arc" in step)
+        height = abs(float(np.dot(cylinder["axis"], other.center - one.center)))
+        # The integral of the direction from the axis over the angle.
+        sine, cosine = np.diff(np.sin(one.angles)), np.diff(np.cos(one.angles))
+        outward = float(np.dot(cylinder["point"], sine * one.axes[0] - cosine * one.axes[1]))
+        sign, radius = 1.0 if cylinder["convex"] else -1.0, cylinder["radius"]
+        return sign * radius * height * (radius * one.sweep + outward)
+
+    return sum(flux(face) for face in shell["faces"]) / 3.0
+
+
+def area_of_step(step, wireframe):
+    """Half the integral of x × dx along an edge or an arc."""
+    sign = -0.5 if step.get("reversed") else 0.5
+    if "edge" in step:
+        return sign * np.cross(*wireframe.vertices[wireframe.edges[step["edge"]]])
+    arc = wireframe.arcs[step["arc"]]
+    start, end = arc.points([0.0, 1.0])
+    swept = arc.radius**2 * arc.sweep * np.cross(*arc.axes)
+    return sign * (np.cross(arc.center, end - start) + swept)
+
+
+def check_volume(found, expected, what):
+    total = sum(volume(shell, expected) for shell in expected.shells if shell["closed"])
+    check(abs(found - total) <= VOLUME_TOLERANCE * abs(total),
+          f"{what} of volume {found}, not {total}")
+
+
+def check_mesh(vertices, triangles, expected):
+    """Faces are triangles: with closed shells alone, watertight ones around their volume."""
+    check((len(triangles) > 0) == (len(expected.shells) > 0), "shells and triangles")
+    if expected.shells and all(shell["closed"] for shell in expected.shells):
+        import trimesh
+
+        mesh = trimesh.Trimesh(vertices, triangles, process=False)
+        check(mesh.is_watertight and mesh.is_winding_consistent, "the mesh has holes")
+        check_volume(mesh.volume, expected, "a mesh")
 
 
 def check(condition, sentence):
@@ -165,23 +227,30 @@ def vtk_wireframe(data):
 
 def read_obj(path, expected):
     import vtk
+    from vtk.util.numpy_support import vtk_to_numpy
 
-    expected = expected.drawn()
+    bare, expected = expected, expected.drawn()
     reader = vtk.vtkOBJReader()
     reader.SetFileName(str(path))
     reader.Update()
     same_graph(vtk_wireframe(reader.GetOutput()), expected)
+    polygons = reader.GetOutput().GetPolys()
+    corners = vtk_to_numpy(polygons.GetConnectivityArray()) if polygons.GetNumberOfCells() else []
+    check_mesh(expected.vertices, np.reshape(corners, (-1, 3)), bare)
     return "VTK"
 
 
 def read_ply(path, expected):
     from plyfile import PlyData
 
-    expected = expected.drawn()
+    bare, expected = expected, expected.drawn()
     ply = PlyData.read(str(path))
     vertex, edge = ply["vertex"], ply["edge"]
     same_graph(Wireframe(np.stack([vertex[axis] for axis in "xyz"], axis=-1),
                          np.stack([edge["vertex1"], edge["vertex2"]], axis=-1)), expected)
+    faces = [list(face) for element in ply if element.name == "face"
+             for face in element["vertex_indices"]]
+    check_mesh(expected.vertices, faces, bare)
     return "plyfile"
 
 
@@ -189,7 +258,7 @@ def read_gltf(path, expected):
     import pygltflib
     import vtk
 
-    expected = expected.drawn()
+    bare, expected = expected, expected.drawn()
     gltf = pygltflib.GLTF2().load(str(path))
     if len(expected.vertices) == 0:
         check(not gltf.nodes and not gltf.meshes, "an empty scene has nodes")
@@ -220,6 +289,8 @@ def read_gltf(path, expected):
     points = [data(p.indices).ravel().tolist() for p in primitives if p.mode == 0]
     same_graph(Wireframe(vertices, np.concatenate(lines) if lines else []), expected)
     check(sum(points, []) == expected.isolated(), "isolated junctions")
+    triangles = [data(p.indices).reshape(-1, 3) for p in primitives if p.mode == 4]
+    check_mesh(vertices, np.concatenate(triangles) if triangles else [], bare)
 
     # A second reader, that applies the translation itself, in 32 bits. (trimesh takes
     # the vertices of GL_LINES in their order and ignores the indices.)
@@ -268,6 +339,32 @@ def read_dxf(path, expected):
     return "ezdxf, audit clean"
 
 
+def check_shells(shape, parts, expected):
+    """Closed shells are valid solids, the others valid sheets, and all volumes together agree."""
+    from OCP.BRep import BRep_Tool
+    from OCP.BRepCheck import BRepCheck_Analyzer
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+    from OCP.TopAbs import TopAbs_ShapeEnum
+
+    solids = list(parts(shape, TopAbs_ShapeEnum.TopAbs_SOLID))
+    shells = list(parts(shape, TopAbs_ShapeEnum.TopAbs_SHELL))
+    closed = sum(shell["closed"] for shell in expected.shells)
+    check(len(solids) == closed, f"{len(solids)} solids, not {closed}")
+    check(len(shells) == len(expected.shells), f"{len(shells)} shells")
+    check(sum(map(BRep_Tool.IsClosed_s, shells)) == closed, "an open solid, or a closed sheet")
+    faces = len(list(parts(shape, TopAbs_ShapeEnum.TopAbs_FACE)))
+    check(faces == sum(len(shell["faces"]) for shell in expected.shells), f"{faces} faces")
+    for part in shells + solids:
+        check(BRepCheck_Analyzer(part).IsValid(), "Open CASCADE finds a shell not valid")
+    total = 0.0
+    for solid in solids:
+        properties = GProp_GProps()
+        BRepGProp.VolumeProperties_s(solid, properties)
+        total += properties.Mass()
+    check_volume(total, expected, "solids")
+
+
 def read_step(path, expected):
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Curve
@@ -278,23 +375,26 @@ def read_step(path, expected):
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopoDS import TopoDS
 
-    lengths = [np.linalg.norm(np.subtract(*expected.vertices[edge])) for edge in expected.edges]
-    flat = [i for i, length in enumerate(lengths) if length == 0.0]
-    expected = expected.without(edges=flat)
-    expected = expected.without(vertices=expected.isolated())
-
     reader = STEPControl_Reader()
     check(reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone, "not read")
     reader.TransferRoots()
     shape = reader.OneShape()
-    if len(expected.edges) + len(expected.arcs) == 0:
-        return "Open CASCADE"
 
-    def parts(shape, kind):
-        explorer = TopExp_Explorer(shape, kind)
+    def parts(shape, kind, outside=TopAbs_ShapeEnum.TopAbs_SHAPE):
+        explorer = TopExp_Explorer(shape, kind, outside)
         while explorer.More():
             yield explorer.Current()
             explorer.Next()
+
+    if expected.shells:
+        check_shells(shape, parts, expected)
+    expected = expected.without_faces()
+    lengths = [np.linalg.norm(np.subtract(*expected.vertices[edge])) for edge in expected.edges]
+    flat = [i for i, length in enumerate(lengths) if length == 0.0]
+    expected = expected.without(edges=flat)
+    expected = expected.without(vertices=expected.isolated())
+    if len(expected.edges) + len(expected.arcs) == 0:
+        return "Open CASCADE"
 
     vertex_kind, edge_kind = TopAbs_ShapeEnum.TopAbs_VERTEX, TopAbs_ShapeEnum.TopAbs_EDGE
     as_vertex = getattr(TopoDS, "Vertex_s", None) or TopoDS.Vertex
@@ -314,7 +414,7 @@ def read_step(path, expected):
 
     as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
     edges, arcs = [], []
-    for edge in parts(shape, edge_kind):
+    for edge in parts(shape, edge_kind, TopAbs_ShapeEnum.TopAbs_FACE):
         curve = BRepAdaptor_Curve(as_edge(edge))
         if curve.GetType() != GeomAbs_CurveType.GeomAbs_Circle:
             edges.append([index(vertex) for vertex in parts(edge, vertex_kind)])
@@ -471,7 +571,7 @@ def main(arguments):
     truth = json.loads(Path(arguments[0]).read_text())
     directory = Path(arguments[1])
     expected = Wireframe(truth["junctions"], truth.get("edges", truth.get("lines", [])),
-                         [Arc(**arc) for arc in truth.get("arcs", [])])
+                         [Arc(**arc) for arc in truth.get("arcs", [])], truth.get("shells", []))
     readers = [("wireframe.json", read_json), ("wireframe.obj", read_obj),
                ("wireframe.ply", read_ply), ("wireframe.gltf", read_gltf),
                ("wireframe.glb", read_gltf), ("wireframe.dxf", read_dxf),

@@ -40,7 +40,8 @@ impl EdgeFilter {
 
     /// The document with the edges that pass, in their order, and the junctions
     /// that they join. Fields, covariances and support follow; the metadata say
-    /// what was asked for. Arcs all stay: nothing is known of them that a filter asks. Without any
+    /// what was asked for. Arcs all stay: nothing is known of them that a filter asks. Faces go
+    /// with their edges, and a shell that loses one is a sheet. Without any
     /// minimum, the document as it is, junctions without edges too.
     ///
     /// The document must be valid, see [`WireframeDocument::check`].
@@ -111,8 +112,13 @@ fn with_edges(document: &WireframeDocument, passes: &[bool]) -> WireframeDocumen
         new_index.push(count);
         count += usize::from(joined);
     }
+    let kept: Vec<usize> = (0..passes.len()).filter(|edge| passes[*edge]).collect();
+    let new_edge = |edge: usize| kept.binary_search(&edge).ok();
     WireframeDocument {
         arcs: document.arcs.clone(),
+        shells: (document.shells.iter())
+            .filter_map(|shell| shell.with_edges(new_edge))
+            .collect(),
         arc_covariances: document.arc_covariances.clone(),
         metadata: document.metadata.clone(),
         junctions: chosen(&document.junctions, &joined),

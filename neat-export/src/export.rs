@@ -41,5 +41,10 @@ pub fn export(
         target.written.remarks.push(sentence.to_owned());
     }
     format.write(&mut target)?;
+    if !format.holds_faces() {
+        let shells = document.shells.iter();
+        let faces = shells.map(|shell| shell.faces.len()).sum();
+        target.leave_out(faces, &format!("{} has no faces", format.name()));
+    }
     Ok(target.written)
 }

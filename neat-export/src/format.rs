@@ -58,12 +58,12 @@ const FOLDER: &[&str] = &[];
 #[rustfmt::skip] // One row a line.
 static FORMATS: [Row; 13] = [
     row(Format::Json, "json", &["json"], |to| Ok(write_json(to.path, to.document)?), "everything that is known, by docs/wireframe.schema.json"),
-    row(Format::Obj, "obj", &["obj"], |to| Ok(write_obj(to.path, &to.document.drawn())?), "Wavefront OBJ: v and l elements (Blender, MeshLab, trimesh)"),
-    row(Format::Ply, "ply", &["ply"], |to| Ok(write_ply(to.path, &to.document.drawn())?), "PLY, ASCII, with vertex and edge elements (CloudCompare, trimesh)"),
-    row(Format::Gltf, "gltf", &["gltf"], gltf::write_text, "glTF 2.0 lines, text with embedded data, coloured by confidence"),
-    row(Format::Glb, "glb", &["glb"], gltf::write_binary, "glTF 2.0 lines in one binary file (web viewers, Blender)"),
+    row(Format::Obj, "obj", &["obj"], |to| Ok(write_obj(to.path, &to.document.drawn(), &to.document.drawn_triangles())?), "Wavefront OBJ: v, l and f elements (Blender, MeshLab, trimesh)"),
+    row(Format::Ply, "ply", &["ply"], |to| Ok(write_ply(to.path, &to.document.drawn(), &to.document.drawn_triangles())?), "PLY, ASCII, with vertex, face and edge elements (CloudCompare, trimesh)"),
+    row(Format::Gltf, "gltf", &["gltf"], gltf::write_text, "glTF 2.0 lines and triangles, text with embedded data, coloured by confidence"),
+    row(Format::Glb, "glb", &["glb"], gltf::write_binary, "glTF 2.0 lines and triangles in one binary file (web viewers, Blender)"),
     row(Format::Dxf, "dxf", &["dxf"], dxf::write, "AutoCAD R12 lines on layers by confidence, arcs (CAD programs)"),
-    row(Format::Step, "step", &["step", "stp"], step::write, "ISO 10303 AP214 wireframe of lines and circles with shared vertices (CAD programs)"),
+    row(Format::Step, "step", &["step", "stp"], step::write, "ISO 10303 AP214: solids and sheets of faces, else a wireframe of lines and circles (CAD programs)"),
     row(Format::Svg, "svg", &["svg"], svg::write, "orthographic view, vector graphics"),
     row(Format::Png, "png", &["png"], picture::write, "orthographic view, image"),
     row(Format::GeoJson, "geojson", &["geojson"], geojson::write, "LineString features with z, coordinates as they are (QGIS)"),
@@ -118,6 +118,14 @@ impl Format {
     /// Whether it fills a folder instead of a file.
     pub fn is_folder(self) -> bool {
         self.endings().is_empty()
+    }
+
+    /// Whether it has faces beside edges.
+    pub fn holds_faces(self) -> bool {
+        matches!(
+            self,
+            Self::Json | Self::Obj | Self::Ply | Self::Gltf | Self::Glb | Self::Step
+        )
     }
 
     /// What it is for, in one line.

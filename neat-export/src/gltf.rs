@@ -1,9 +1,9 @@
-//! glTF 2.0 (Khronos Group, ISO/IEC 12113): lines with shared vertices.
+//! glTF 2.0 (Khronos Group, ISO/IEC 12113): lines and triangles with shared vertices.
 //!
 //! Positions are 32-bit numbers from the centre of the wireframe, which is the
 //! translation of the node: coordinates far from the origin keep their accuracy.
 //! Every class of confidence and the arcs, as chains of straight pieces, are a primitive with a
-//! colour of its own; all use the same positions. Axes and unit are those of the document, although glTF means
+//! colour of its own, and so are the faces; all use the same positions. Axes and unit are those of the document, although glTF means
 //! metres with +Y up.
 
 use crate::drawn::Drawn;
@@ -23,6 +23,9 @@ const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 const POINTS: u32 = 0;
 const LINES: u32 = 1;
+const TRIANGLES: u32 = 4;
+/// Faces are grey, so that edges stand out.
+const FACE_COLOR: [u8; 3] = [0xc8, 0xc8, 0xc8];
 /// The extents that 32-bit numbers hold: smaller ones would lose digits.
 const EXTENTS: Range<f64> = 1e-30..1e38;
 
@@ -108,18 +111,21 @@ impl Asset {
             "translation": [center.x, center.y, center.z],
         }]);
         let position = asset.add_positions(&positions);
-        let primitives = asset.add_primitives(&drawn, &isolated_junctions(document), position)?;
+        let isolated = isolated_junctions(document);
+        let triangles = document.drawn_triangles();
+        let primitives = asset.add_primitives(&drawn, &isolated, &triangles, position)?;
         asset.json["meshes"] = json!([{"name": "wireframe", "primitives": primitives}]);
         asset.json["extensionsUsed"] = json!(["KHR_materials_unlit"]);
         asset.json["buffers"] = json!([{"byteLength": asset.data.len()}]);
         Some(asset)
     }
 
-    /// One primitive per group, and one for junctions without edges.
+    /// One primitive per group, and one each for junctions without edges and for faces.
     fn add_primitives(
         &mut self,
         drawn: &Drawn,
         isolated: &[usize],
+        triangles: &[[usize; 3]],
         position: usize,
     ) -> Option<Vec<Value>> {
         let mut primitives = Vec::new();
@@ -136,11 +142,16 @@ impl Asset {
                 "mode": mode,
             }));
             let [red, green, blue] = color.map(linear_from_srgb);
-            materials.push(json!({
+            let mut material = json!({
                 "name": name,
                 "pbrMetallicRoughness": {"baseColorFactor": [red, green, blue, 1.0]},
-                "extensions": {"KHR_materials_unlit": {}},
-            }));
+            });
+            // Lines have no side that light could fall on; of a sheet both are seen.
+            match mode {
+                TRIANGLES => material["doubleSided"] = true.into(),
+                _ => material["extensions"] = json!({"KHR_materials_unlit": {}}),
+            }
+            materials.push(material);
             Some(())
         };
         for (name, color, edges) in &drawn.groups {
@@ -148,6 +159,7 @@ impl Asset {
             add(name, *color, LINES, &ends.collect::<Vec<_>>())?;
         }
         add("isolated", Confidence::Unknown.color(), POINTS, isolated)?;
+        add("faces", FACE_COLOR, TRIANGLES, triangles.as_flattened())?;
         self.json["materials"] = materials.into();
         Some(primitives)
     }

@@ -6,6 +6,7 @@ use neat_core::{Camera, CircularArc, EdgelMap, Scene, SceneError, Wireframe3d};
 use neat_detect::{DetectorConfig, edgel_maps};
 use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble_with_progress};
 use neat_wireframe::confidence::{ConfidenceConfig, assess};
+use neat_wireframe::faces::{MeasuredGraph, find_shells};
 use neat_wireframe::kinds::edge_kinds;
 use neat_wireframe::paper::NeatLine;
 use neat_wireframe::validity::WireframeFlaw;
@@ -111,9 +112,18 @@ impl Draft {
         let edges = confidence.edges.iter();
         let shown: Vec<Vec<usize>> = edges.map(|edge| edge.showing_views.clone()).collect();
         let kinds = edge_kinds(&self.wireframe, scene, &shown)?;
+        let junctions = confidence.junctions.iter();
+        let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
+        let graph = MeasuredGraph {
+            wireframe: &self.wireframe,
+            arcs: &self.arcs,
+            covariances: &covariances,
+        };
+        let shells = find_shells(&graph, &views);
         Ok(Distilled {
             wireframe: self.wireframe,
             arcs: self.arcs,
+            shells,
             arc_covariances: self.arc_covariances,
             confidence,
             kinds,

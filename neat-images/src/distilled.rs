@@ -7,6 +7,7 @@ use neat_wireframe::ViewObservation;
 use neat_wireframe::assemble::AssembleReport;
 use neat_wireframe::confidence::{Confidence, fill_arcs};
 use neat_wireframe::export::WireframeDocument;
+use neat_wireframe::faces::Shell;
 use neat_wireframe::kinds::{EdgeKinds, curved_chains, fill_kinds, junction_types};
 use neat_wireframe::metrics::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 use neat_wireframe::paper::PaperBackEndCounts;
@@ -28,7 +29,9 @@ pub struct Distilled {
     pub wireframe: Wireframe3d,
     /// Arcs of circles beside its edges, likewise.
     pub arcs: Vec<CircularArc>,
-    /// How sure their centres and radii are, see
+    /// Faces between edges and arcs, likewise.
+    pub shells: Vec<Shell>,
+    /// How sure the centres and radii of arcs are, see
     /// [`Assembled::arc_covariances`](neat_wireframe::assemble::Assembled::arc_covariances).
     pub arc_covariances: Vec<Option<Matrix4<f64>>>,
     /// How sure every junction and edge is, and by which 2D segments.
@@ -122,6 +125,9 @@ impl Distilled {
         let original = (self.wireframe).map(|point| original_from_world.apply(point));
         let mut document = WireframeDocument::from(&original);
         let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
+        document.shells = (self.shells.iter())
+            .map(|shell| shell.map(|point| original_from_world.apply(point)))
+            .collect();
         let (arcs, covariances) = (&self.arcs, &self.arc_covariances);
         fill_arcs(&mut document, arcs, covariances, original_from_world);
         self.confidence

@@ -60,8 +60,8 @@ pub fn reconstruct_line3d(
     file::create_dir(out)?;
     let path = |extension: &str| out.join("wireframe").with_extension(extension);
     write_json(&path("json"), &document)?;
-    write_obj(&path("obj"), &wireframe)?;
-    write_ply(&path("ply"), &wireframe)?;
+    write_obj(&path("obj"), &wireframe, &[])?;
+    write_ply(&path("ply"), &wireframe, &[])?;
     Ok(Line3dResult {
         segments: segments.len(),
         seconds,

@@ -9,6 +9,7 @@
 //! | learn how sure each junction and edge is, and which 2D segments say so | [`confidence`] |
 //! | tell creases from paint and shadows, pieces of curves, and corners from ends | [`kinds`] |
 //! | read lengths, distances and angles off one, with intervals | [`dimensions`] |
+//! | find planes, cylinders and the solids that they bound | [`faces`] |
 //! | measure a wireframe, with and without ground truth | [`metrics`] |
 //! | write and read one | [`export`], [`validity`] |
 //!
@@ -34,6 +35,7 @@ pub mod bundle_adjustment;
 pub mod confidence;
 pub mod dimensions;
 pub mod export;
+pub mod faces;
 pub mod kinds;
 pub mod metrics;
 pub mod paper;

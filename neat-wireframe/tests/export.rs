@@ -94,13 +94,21 @@ fn write_json_graph(path: &Path, wireframe: &Wireframe3d) -> Result<(), ExportEr
     write_json(path, &WireframeDocument::from(wireframe))
 }
 
+fn write_bare_obj(path: &Path, wireframe: &Wireframe3d) -> Result<(), ExportError> {
+    write_obj(path, wireframe, &[])
+}
+
+fn write_bare_ply(path: &Path, wireframe: &Wireframe3d) -> Result<(), ExportError> {
+    write_ply(path, wireframe, &[])
+}
+
 type Write = fn(&Path, &Wireframe3d) -> Result<(), ExportError>;
 type Parse = fn(&str) -> Wireframe3d;
 
 const FORMATS: [(&str, Write, Parse); 3] = [
     ("w.json", write_json_graph, parse_json),
-    ("w.obj", write_obj, parse_obj),
-    ("w.ply", write_ply, parse_ply),
+    ("w.obj", write_bare_obj, parse_obj),
+    ("w.ply", write_bare_ply, parse_ply),
 ];
 
 #[test]

@@ -172,8 +172,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let file = |name: &str| dir.path().join(name);
         write_wireframe(&file("a.json"), &l_shape()).unwrap();
-        write_obj(&file("a.obj"), &l_shape()).unwrap();
-        write_ply(&file("a.ply"), &l_shape()).unwrap();
+        write_obj(&file("a.obj"), &l_shape(), &[]).unwrap();
+        write_ply(&file("a.ply"), &l_shape(), &[]).unwrap();
         let ends = l_shape().segments();
         let values = ends.iter().flat_map(|s| s.ends());
         let lines = NpyArray {

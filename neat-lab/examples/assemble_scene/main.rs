@@ -149,8 +149,8 @@ fn main() -> Result<(), AnyError> {
         let mut document = WireframeDocument::from(&in_files);
         document.edge_fields.supporting_views = Some(views_per_edge.clone());
         write_json(&dir.join("wireframe.json"), &document)?;
-        write_obj(&dir.join("wireframe.obj"), &in_files)?;
-        write_ply(&dir.join("wireframe.ply"), &in_files)?;
+        write_obj(&dir.join("wireframe.obj"), &in_files, &[])?;
+        write_ply(&dir.join("wireframe.ply"), &in_files, &[])?;
     }
     if let Some(dir) = &arguments.overlays {
         drawing::draw_overlays(dir, &scene, &wireframe, &views_per_edge)?;

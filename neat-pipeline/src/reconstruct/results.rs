@@ -127,8 +127,9 @@ impl Session<'_> {
         let [json, obj, ply, png] =
             ["json", "obj", "ply", "png"].map(|extension| self.dir.wireframe(extension));
         write_json(&json, &document)?;
-        write_obj(&obj, &document.drawn())?;
-        write_ply(&ply, &document.drawn())?;
+        let (drawn, triangles) = (document.drawn(), document.drawn_triangles());
+        write_obj(&obj, &drawn, &triangles)?;
+        write_ply(&ply, &drawn, &triangles)?;
         write_png(&png, &draw_wireframe(in_world, arcs, &self.scene))?;
         let mut written = vec![json, obj, ply, png];
 

@@ -2,6 +2,7 @@
 
 use super::{EdgeFields, ExportError, JunctionFields, check};
 use crate::Wireframe3d;
+use crate::faces::{Face, Shell, triangles};
 use nalgebra::Vector3;
 use neat_core::{CircularArc, file};
 use serde::{Deserialize, Serialize};
@@ -38,6 +39,9 @@ pub struct WireframeDocument {
     /// Arcs of circles beside the edges, in the frame of the user's files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub arcs: Vec<CircularArc>,
+    /// Faces between edges and arcs, closed shells first, in the frame of the user's files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shells: Vec<Shell>,
     /// The upper triangle of the covariance of every arc's centre x, y, z and radius, row by row,
     /// in squared units of the user's frame; `None` where the views do not tell. Empty, or one
     /// per arc.
@@ -93,18 +97,40 @@ impl WireframeDocument {
     /// no points; the ends of a whole circle are one.
     pub fn drawn(&self) -> Wireframe3d {
         let mut drawn = self.wireframe();
-        for arc in &self.arcs {
+        for (arc, chain) in self.arcs.iter().zip(self.chains()) {
             let mut points = arc.points(Self::TURN_OF_DRAWN_ARCS);
             if arc.is_closed() {
                 points.pop();
             }
-            let (first, count) = (drawn.junctions.len(), points.len());
-            let pieces = count - usize::from(!arc.is_closed());
-            let piece = |k: usize| [first + k, first + (k + 1) % count];
-            drawn.edges.extend((0..pieces).map(piece));
             drawn.junctions.extend(points);
+            drawn
+                .edges
+                .extend(chain.windows(2).map(|ends| [ends[0], ends[1]]));
         }
         drawn
+    }
+
+    /// The faces as triangles of the junctions of [`Self::drawn`], counterclockwise as seen from
+    /// outside. Those of a closed shell are watertight.
+    pub fn drawn_triangles(&self) -> Vec<[usize; 3]> {
+        if self.shells.is_empty() {
+            return Vec::new();
+        }
+        let points = self.drawn().junctions;
+        triangles(&self.shells, &self.edges, &self.chains(), &points)
+    }
+
+    /// For each arc the junctions of [`Self::drawn`] along it.
+    fn chains(&self) -> Vec<Vec<usize>> {
+        let mut first = self.junctions.len();
+        let chain = |arc: &CircularArc| {
+            let pieces = arc.points(Self::TURN_OF_DRAWN_ARCS).len() - 1;
+            let count = pieces + usize::from(!arc.is_closed());
+            let chain = (0..=pieces).map(|k| first + k % count).collect();
+            first += count;
+            chain
+        };
+        self.arcs.iter().map(chain).collect()
     }
 
     /// Checks everything that [`write_json`] and every other export rely on; `path`
@@ -119,6 +145,14 @@ impl WireframeDocument {
             return Err(ExportError::BadArc {
                 path: path.into(),
                 arc,
+            });
+        }
+        let wireframe = self.wireframe();
+        let is_valid = |face: &Face| face.is_valid(&wireframe, &self.arcs);
+        if let Some(shell) = (self.shells.iter()).position(|s| !s.faces.iter().all(is_valid)) {
+            return Err(ExportError::BadShell {
+                path: path.into(),
+                shell,
             });
         }
         let per_junction = (

@@ -19,6 +19,7 @@ pub use limap::{
 pub use obj::write_obj;
 pub use ply::write_ply;
 
+use crate::Wireframe3d;
 use crate::validity::{WireframeFlaw, check_wireframe};
 use nalgebra::Vector3;
 use neat_core::SceneError;
@@ -61,6 +62,17 @@ pub enum ExportError {
         /// Its index.
         arc: usize,
     },
+    /// A shell has a face that is none.
+    #[error(
+        "{path}: shell {shell} has a face that is none: it needs a plane or a cylinder, and loops \
+         of edges and arcs that exist and join end to end"
+    )]
+    BadShell {
+        /// The file.
+        path: PathBuf,
+        /// Its index.
+        shell: usize,
+    },
     /// The text is not the JSON of a wireframe.
     #[error("{path} is not a wireframe in JSON; it may be truncated: export it again")]
     Json {
@@ -80,4 +92,14 @@ fn check(path: &Path, junctions: &[Vector3<f64>], edges: &[[usize; 2]]) -> Resul
         path: path.into(),
         source,
     })
+}
+
+/// # Panics
+/// If a triangle names no junction: it is ours, and was made of them.
+fn check_triangles(triangles: &[[usize; 3]], wireframe: &Wireframe3d) {
+    let count = wireframe.junctions.len();
+    assert!(
+        triangles.iter().flatten().all(|corner| *corner < count),
+        "a triangle of other points than {count} junctions"
+    );
 }

@@ -1,81 +1,9 @@
-//! STEP (ISO 10303-21) with an edge-based wireframe of AP214.
-//!
-//! Every junction is one `VERTEX_POINT`, which its `EDGE_CURVE`s share. Arcs are `EDGE_CURVE`s of
-//! `CIRCLE`s between vertices of their own; a whole circle begins and ends at one. Open CASCADE
-//! joins the edges of a `CONNECTED_EDGE_SET` to one wire and moves vertices where
-//! more than two edges meet; so every edge is a set of its own, and its reader keeps
-//! positions and shared vertices.
+//! The numbered lines of a STEP file, and what of them any file needs.
 
-use crate::target::Target;
-use crate::{ExportError, LengthUnit};
+use crate::LengthUnit;
 use nalgebra::Vector3;
 use neat_core::CircularArc;
 use std::fmt::Write;
-
-/// Writes a STEP file.
-pub fn write(to: &mut Target) -> Result<(), ExportError> {
-    let document = to.document;
-    let mut step = Entities::default();
-    let context = step.add("APPLICATION_CONTEXT('automotive design')");
-    step.add(&format!(
-        "APPLICATION_PROTOCOL_DEFINITION('international standard','automotive_design',2000,{context})"
-    ));
-    let shape = step.product(&string(to.title()), &context);
-    let geometry = step.geometric_context(to.options.unit);
-    let origin = step.point(&Vector3::zeros());
-    let placement = step.add(&format!("AXIS2_PLACEMENT_3D('',{origin},$,$)"));
-
-    let vertices: Vec<String> = document
-        .junctions
-        .iter()
-        .map(|junction| {
-            let point = step.point(junction);
-            step.add(&format!("VERTEX_POINT('',{point})"))
-        })
-        .collect();
-    let mut sets = Vec::new();
-    let mut lonely = vec![true; vertices.len()];
-    for &[a, b] in &document.edges {
-        let [start, end] = [a, b].map(|junction| document.junctions[junction]);
-        let Some(direction) = direction(&start, &end) else {
-            continue;
-        };
-        let direction = step.add(&format!("DIRECTION('',{})", triple(&direction)));
-        let vector = step.add(&format!("VECTOR('',{direction},1.0)"));
-        let origin = step.point(&start);
-        let line = step.add(&format!("LINE('',{origin},{vector})"));
-        let (from, to) = (&vertices[a], &vertices[b]);
-        let edge = step.add(&format!("EDGE_CURVE('',{from},{to},{line},.T.)"));
-        sets.push(step.add(&format!("CONNECTED_EDGE_SET('',({edge}))")));
-        (lonely[a], lonely[b]) = (false, false);
-    }
-    let lines = sets.len();
-    sets.extend(document.arcs.iter().filter_map(|arc| step.arc(arc)));
-    let arcs = sets.len() - lines;
-    let representation = if sets.is_empty() {
-        format!("SHAPE_REPRESENTATION('',({placement}),{geometry})")
-    } else {
-        let model = step.add(&format!(
-            "EDGE_BASED_WIREFRAME_MODEL('',({}))",
-            sets.join(",")
-        ));
-        format!("EDGE_BASED_WIREFRAME_SHAPE_REPRESENTATION('',({placement},{model}),{geometry})")
-    };
-    let representation = step.add(&representation);
-    step.add(&format!(
-        "SHAPE_DEFINITION_REPRESENTATION({shape},{representation})"
-    ));
-    // A line needs a direction, and a vertex an edge.
-    let lonely = lonely.iter().filter(|lonely| **lonely).count();
-    for (count, what) in [
-        (document.edges.len() - lines, "edges without length"),
-        (lonely, "junctions without edges"),
-        (document.arcs.len() - arcs, "arcs without length"),
-    ] {
-        to.leave_out(count, &format!("a STEP wireframe has no {what}"));
-    }
-    to.write(step.file())
-}
 
 /// The unit vector between two points, if they differ. First scaled, so that no
 /// square overflows or vanishes.
@@ -87,50 +15,63 @@ fn direction(start: &Vector3<f64>, end: &Vector3<f64>) -> Option<Vector3<f64>> {
 
 /// The numbered lines of a data section.
 #[derive(Default)]
-struct Entities {
+pub(super) struct Entities {
     text: String,
     count: usize,
 }
 
 impl Entities {
     /// Appends an instance; returns its name.
-    fn add(&mut self, entity: &str) -> String {
+    pub fn add(&mut self, entity: &str) -> String {
         self.count += 1;
         let _ = writeln!(self.text, "#{}={entity};", self.count);
         format!("#{}", self.count)
     }
 
-    fn point(&mut self, point: &Vector3<f64>) -> String {
+    pub fn point(&mut self, point: &Vector3<f64>) -> String {
         self.add(&format!("CARTESIAN_POINT('',{})", triple(point)))
     }
 
-    /// An arc as a set of its own; `None` if its ends are the same numbers.
-    fn arc(&mut self, arc: &CircularArc) -> Option<String> {
-        let [start, end] = arc.angles.map(|angle| arc.point_at(angle));
-        if start == end && !arc.is_closed() {
-            return None;
-        }
-        let center = self.point(&arc.center);
-        let [normal, x] = [arc.normal().normalize(), arc.axes[0]]
-            .map(|axis| self.add(&format!("DIRECTION('',{})", triple(&axis))));
-        let placement = self.add(&format!("AXIS2_PLACEMENT_3D('',{center},{normal},{x})"));
+    /// A place with its z axis and its x axis.
+    pub fn placement(
+        &mut self,
+        origin: &Vector3<f64>,
+        z: &Vector3<f64>,
+        x: &Vector3<f64>,
+    ) -> String {
+        let origin = self.point(origin);
+        let [z, x] = [z, x].map(|axis| self.add(&format!("DIRECTION('',{})", triple(axis))));
+        self.add(&format!("AXIS2_PLACEMENT_3D('',{origin},{z},{x})"))
+    }
+
+    pub fn vertex(&mut self, point: &Vector3<f64>) -> String {
+        let point = self.point(point);
+        self.add(&format!("VERTEX_POINT('',{point})"))
+    }
+
+    /// The edge along a straight line between two vertices; `None` if these are one point.
+    pub fn straight_edge(
+        &mut self,
+        [from, to]: [&String; 2],
+        [start, end]: [&Vector3<f64>; 2],
+    ) -> Option<String> {
+        let direction = direction(start, end)?;
+        let direction = self.add(&format!("DIRECTION('',{})", triple(&direction)));
+        let vector = self.add(&format!("VECTOR('',{direction},1.0)"));
+        let origin = self.point(start);
+        let line = self.add(&format!("LINE('',{origin},{vector})"));
+        Some(self.add(&format!("EDGE_CURVE('',{from},{to},{line},.T.)")))
+    }
+
+    /// The edge along an arc between two vertices.
+    pub fn arc_edge(&mut self, [from, to]: [&String; 2], arc: &CircularArc) -> String {
+        let placement = self.placement(&arc.center, &arc.normal().normalize(), &arc.axes[0]);
         let circle = self.add(&format!("CIRCLE('',{placement},{})", real(arc.radius)));
-        let mut vertex = |point| {
-            let point = self.point(point);
-            self.add(&format!("VERTEX_POINT('',{point})"))
-        };
-        let from = vertex(&start);
-        let to = if arc.is_closed() {
-            from.clone()
-        } else {
-            vertex(&end)
-        };
-        let edge = self.add(&format!("EDGE_CURVE('',{from},{to},{circle},.T.)"));
-        Some(self.add(&format!("CONNECTED_EDGE_SET('',({edge}))")))
+        self.add(&format!("EDGE_CURVE('',{from},{to},{circle},.T.)"))
     }
 
     /// The product whose shape the wireframe is.
-    fn product(&mut self, name: &str, context: &str) -> String {
+    pub fn product(&mut self, name: &str, context: &str) -> String {
         let of_product = self.add(&format!("PRODUCT_CONTEXT('',{context},'mechanical')"));
         let product = self.add(&format!("PRODUCT({name},{name},'',({of_product}))"));
         self.add(&format!(
@@ -146,7 +87,7 @@ impl Entities {
         self.add(&format!("PRODUCT_DEFINITION_SHAPE('','',{definition})"))
     }
 
-    fn geometric_context(&mut self, unit: LengthUnit) -> String {
+    pub fn geometric_context(&mut self, unit: LengthUnit) -> String {
         let prefix = match unit {
             LengthUnit::Millimetre => ".MILLI.",
             LengthUnit::Centimetre => ".CENTI.",
@@ -167,7 +108,7 @@ impl Entities {
 
     /// The whole file. It states no time, so that the same wireframe is the same
     /// file.
-    fn file(self) -> String {
+    pub fn file(self) -> String {
         format!(
             "ISO-10303-21;\n\
              HEADER;\n\
@@ -190,7 +131,7 @@ fn triple(point: &Vector3<f64>) -> String {
 
 /// A number that reads back as the same one. STEP demands a decimal point and a
 /// capital E.
-fn real(value: f64) -> String {
+pub(super) fn real(value: f64) -> String {
     let text = format!("{value:?}");
     match text.split_once('e') {
         None => text,
@@ -201,7 +142,7 @@ fn real(value: f64) -> String {
 
 /// A quoted string. Quotes and backslashes are doubled, control characters become
 /// spaces, and what is not ASCII is encoded (ISO 10303-21, 6.4.3).
-fn string(text: &str) -> String {
+pub(super) fn string(text: &str) -> String {
     let mut quoted = String::from("'");
     for character in text.chars() {
         match character {

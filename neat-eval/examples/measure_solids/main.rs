@@ -1,0 +1,212 @@
+//! Which faces and solids are found in scenes of which a true wireframe is known: in that, and in
+//! the one that the assembler makes.
+//!
+//! ```text
+//! cargo run --release -p neat-eval --example measure_solids -- [--out DIR] [--kept DIR] SCENE…
+//! ```
+//!
+//! `--out` keeps documents with their shells, `NAME/true.json` and `NAME/assembled.json`. With `--kept` wireframes and segments are those that `measure_assembler --out`
+//! has left there; a scene that it lacks is measured in the true wireframe only. A true wireframe
+//! gets no views: only its edges speak. Its curves that are no arcs of circles are left out.
+
+#![expect(clippy::print_stdout, reason = "it measures for people to read")]
+
+#[path = "../measure_assembler/prepared.rs"]
+mod prepared;
+mod truth;
+
+use nalgebra::{Matrix3, Vector3};
+use neat_core::{Camera, CircularArc, Scene, Wireframe3d};
+use neat_wireframe::ViewObservation;
+use neat_wireframe::confidence::{ConfidenceConfig, assess, transformed_covariance};
+use neat_wireframe::export::{WireframeDocument, read_json, write_json};
+use neat_wireframe::faces::{MeasuredGraph, Shell, ShellGeometry, find_shells};
+use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
+use std::env;
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use truth::Truth;
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+/// Areas of the same face agree so well.
+const AREA: f64 = 0.05;
+
+/// A wireframe in the frame of the files, with what there is to find faces by.
+struct Input {
+    wireframe: Wireframe3d,
+    arcs: Vec<CircularArc>,
+    covariances: Vec<Option<Matrix3<f64>>>,
+    views: Vec<ViewObservation>,
+}
+
+fn main() -> Result<()> {
+    let (mut scenes, mut out, mut kept) = (Vec::new(), None, None);
+    let mut arguments = env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--out" => out = arguments.next().map(PathBuf::from),
+            "--kept" => kept = arguments.next().map(PathBuf::from),
+            _ => scenes.push(PathBuf::from(argument)),
+        }
+    }
+    for dir in &scenes {
+        let name = dir.file_name().unwrap_or_default().to_string_lossy();
+        let truth = Truth::read(dir)?;
+        let of_truth = Input {
+            wireframe: truth.wireframe.clone(),
+            arcs: truth.arcs.clone(),
+            covariances: Vec::new(),
+            views: Vec::new(),
+        };
+        println!(
+            "{name}: {} edges, {} arcs, {} other curves, {} faces",
+            truth.wireframe.edges.len(),
+            truth.arcs.len(),
+            truth.other_curves,
+            truth.faces.len()
+        );
+        let folder = out.as_ref().map(|out| out.join(&*name));
+        let measure = |kind: &str, input: &Input| -> Result<()> {
+            let start = Instant::now();
+            let shells = input.shells();
+            let seconds = start.elapsed().as_secs_f64();
+            println!(
+                "  {kind:9} {}, {seconds:.3} s",
+                scores(&shells, input, &truth)
+            );
+            if let Some(folder) = &folder {
+                fs::create_dir_all(folder)?;
+                let document = input.document(shells);
+                write_json(&folder.join(format!("{kind}.json")), &document)?;
+            }
+            Ok(())
+        };
+        measure("true", &of_truth)?;
+        if let Some(input) = reconstructed(dir, &name, kept.as_deref())? {
+            measure("assembled", &input)?;
+        }
+    }
+    Ok(())
+}
+
+/// What the assembler makes of a scene, or has made of it; `None` if it is not among those kept.
+fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<Input>> {
+    let folder = kept.map(|kept| kept.join(name));
+    if folder
+        .as_ref()
+        .is_some_and(|folder| !folder.join("wireframe.json").exists())
+    {
+        return Ok(None);
+    }
+    let mut scene = prepared(dir, folder.as_deref())?;
+    let original = |scene: &Scene, p: &Vector3<f64>| scene.original_from_world.apply(p);
+    let (wireframe, arcs) = match folder {
+        Some(folder) => {
+            let document = read_json(&folder.join("wireframe.json"))?;
+            let world = scene.original_from_world.inverse();
+            (document.wireframe().map(|p| world.apply(p)), document.arcs)
+        }
+        None => {
+            let built = assembled(&scene)?;
+            if let Some(cameras) = &built.refined_cameras {
+                scene = scene.with_cameras(cameras);
+            }
+            let arcs = built
+                .arcs
+                .iter()
+                .map(|arc| arc.map(|p| original(&scene, p)));
+            (built.wireframe, arcs.collect())
+        }
+    };
+    let views = ViewObservation::from_scene(&scene, MIN_SEGMENT_SCORE);
+    let confidence = assess(&wireframe, &views, None, 1.0, &ConfidenceConfig::default())?;
+    let covariance =
+        |covariance: &Matrix3<f64>| transformed_covariance(covariance, &scene.original_from_world);
+    let in_original = |view: ViewObservation| ViewObservation {
+        camera: Camera {
+            center_in_world: original(&scene, &view.camera.center_in_world),
+            ..view.camera
+        },
+        ..view
+    };
+    Ok(Some(Input {
+        wireframe: wireframe.map(|p| original(&scene, p)),
+        arcs,
+        covariances: (confidence.junctions.iter())
+            .map(|junction| junction.covariance.as_ref().map(covariance))
+            .collect(),
+        views: views.into_iter().map(in_original).collect(),
+    }))
+}
+
+impl Input {
+    fn shells(&self) -> Vec<Shell> {
+        let graph = MeasuredGraph {
+            wireframe: &self.wireframe,
+            arcs: &self.arcs,
+            covariances: &self.covariances,
+        };
+        find_shells(&graph, &self.views)
+    }
+
+    fn document(&self, shells: Vec<Shell>) -> WireframeDocument {
+        WireframeDocument {
+            arcs: self.arcs.clone(),
+            shells,
+            ..WireframeDocument::from(&self.wireframe)
+        }
+    }
+}
+
+/// Faces, shells and agreement with the true faces, as text.
+fn scores(shells: &[Shell], input: &Input, truth: &Truth) -> String {
+    let mut text = format!(
+        "{} faces",
+        shells.iter().map(|shell| shell.faces.len()).sum::<usize>()
+    );
+    for shell in shells {
+        let geometry = ShellGeometry::new(shell, &input.wireframe, &input.arcs);
+        let faces = shell.faces.len();
+        text += &match (shell.closed, truth.volume) {
+            (false, _) => format!(", sheet of {faces}"),
+            (true, None) => format!(", closed of {faces}, volume {:.5}", geometry.volume(shell)),
+            (true, Some(volume)) => {
+                format!(
+                    ", closed of {faces}, volume ratio {:.4}",
+                    geometry.volume(shell) / volume
+                )
+            }
+        };
+    }
+    if let Some([recall, precision]) = agreement(shells, input, truth) {
+        text += &format!(", {recall:.3} of true area found, {precision:.3} of found area true");
+    }
+    text
+}
+
+/// Share of the area of true faces that are found with the same surface and area, and of found
+/// ones that are true; `None` without true faces.
+fn agreement(shells: &[Shell], input: &Input, truth: &Truth) -> Option<[f64; 2]> {
+    let (mut same, mut all) = (0.0, 0.0);
+    let mut left: Vec<bool> = vec![true; truth.faces.len()];
+    for shell in shells {
+        let geometry = ShellGeometry::new(shell, &input.wireframe, &input.arcs);
+        for face in &shell.faces {
+            let area = geometry.area(face);
+            all += area;
+            let agrees = |k: &usize| {
+                let truth = &truth.faces[*k];
+                left[*k] && truth.is_on(&face.surface) && (area / truth.area - 1.0).abs() < AREA
+            };
+            if let Some(found) = (0..truth.faces.len()).find(agrees) {
+                left[found] = false;
+                same += truth.faces[found].area;
+            }
+        }
+    }
+    let truth: f64 = truth.faces.iter().map(|face| face.area).sum();
+    (truth > 0.0).then(|| [same / truth, if all > 0.0 { same / all } else { 0.0 }])
+}

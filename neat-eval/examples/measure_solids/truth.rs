@@ -1,0 +1,177 @@
+//! What a scene's folder says of the solid: its wireframe with arcs, its faces and its volume.
+
+use crate::Result;
+use nalgebra::Vector3;
+use neat_core::{CircularArc, Wireframe3d};
+use neat_eval::foreign;
+use neat_wireframe::faces::Surface;
+use serde::Deserialize;
+use std::fs;
+use std::path::Path;
+
+/// Points of a curve lie within so much of its arc; what does not is another curve.
+const TOLERANCE: f64 = 1e-4;
+
+/// The truth of one scene, in the frame of its files.
+pub struct Truth {
+    pub wireframe: Wireframe3d,
+    /// The curves that are arcs of circles.
+    pub arcs: Vec<CircularArc>,
+    /// How many curves are none.
+    pub other_curves: usize,
+    /// Empty where the truth has none.
+    pub faces: Vec<TrueFace>,
+    /// Of the mesh.
+    pub volume: Option<f64>,
+}
+
+/// A face of the CAD model.
+#[derive(Deserialize)]
+pub struct TrueFace {
+    #[serde(rename = "type")]
+    kind: String,
+    pub area: f64,
+    normal: Option<Vector3<f64>>,
+    offset: Option<f64>,
+    axis_point: Option<Vector3<f64>>,
+    axis: Option<Vector3<f64>>,
+    radius: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct Faces {
+    #[serde(default)]
+    faces: Vec<TrueFace>,
+}
+
+impl Truth {
+    pub fn read(dir: &Path) -> Result<Self> {
+        let path = dir.join("gt_wireframe.json");
+        let truth = foreign::read_truth(&path)?;
+        let faces: Faces = serde_json::from_slice(&fs::read(&path)?)?;
+        let mut curves: Vec<Vec<Vector3<f64>>> =
+            truth.curves.into_iter().map(|curve| curve.points).collect();
+        // The toy has them beside its wireframe.
+        let beside = dir.join("gt_curves.json");
+        if beside.exists() {
+            #[derive(Deserialize)]
+            struct Curve {
+                points: Vec<Vector3<f64>>,
+            }
+            let beside: Vec<Curve> = serde_json::from_slice(&fs::read(beside)?)?;
+            curves.extend(beside.into_iter().map(|curve| curve.points));
+        }
+        let curves = joined(curves);
+        let arcs: Vec<CircularArc> = curves.iter().filter_map(|points| arc_of(points)).collect();
+        // Other meshes are in frames of their own.
+        let mesh = dir.join("mesh.obj");
+        Ok(Self {
+            wireframe: truth.wireframe,
+            other_curves: curves.len() - arcs.len(),
+            arcs,
+            faces: faces.faces,
+            volume: mesh.exists().then(|| mesh_volume(&mesh)).transpose()?,
+        })
+    }
+}
+
+impl TrueFace {
+    /// Whether a surface is the same to a hundredth.
+    pub fn is_on(&self, surface: &Surface) -> bool {
+        let near = |a: f64, b: f64| (a - b).abs() < 0.01;
+        match (surface, self.kind.as_str()) {
+            (Surface::Plane { normal, offset }, "plane") => {
+                let truth = self.normal.zip(self.offset);
+                truth.is_some_and(|(n, d)| {
+                    near(n.dot(normal).abs(), 1.0) && near(n.dot(normal) * d, *offset)
+                })
+            }
+            (
+                Surface::Cylinder {
+                    point,
+                    axis,
+                    radius,
+                    ..
+                },
+                "cylinder",
+            ) => {
+                let truth = self.axis_point.zip(self.axis).zip(self.radius);
+                truth.is_some_and(|((p, a), r)| {
+                    near(a.dot(axis).abs(), 1.0)
+                        && near((point - p).cross(&a).norm(), 0.0)
+                        && near(r, *radius)
+                })
+            }
+            _ => false,
+        }
+    }
+}
+
+/// Chains that end where one other begins become one: CAD kernels cut circles at seams.
+fn joined(mut curves: Vec<Vec<Vector3<f64>>>) -> Vec<Vec<Vector3<f64>>> {
+    let near = |a: &Vector3<f64>, b: &Vector3<f64>| (a - b).norm() < TOLERANCE;
+    let mut k = 0;
+    while k < curves.len() {
+        let (first, last) = (curves[k][0], curves[k][curves[k].len() - 1]);
+        let goes_on = |other: &Vec<Vector3<f64>>| {
+            let ends = [other[0], other[other.len() - 1]];
+            ends.iter()
+                .filter(|end| near(end, &first) || near(end, &last))
+                .count()
+                == 2
+        };
+        let open = !near(&first, &last);
+        match (k + 1..curves.len()).find(|other| open && goes_on(&curves[*other])) {
+            Some(other) => {
+                let mut rest = curves.remove(other);
+                if !near(&rest[0], &last) {
+                    rest.reverse();
+                }
+                curves[k].extend(rest.into_iter().skip(1));
+            }
+            None => k += 1,
+        }
+    }
+    curves
+}
+
+/// The arc that a chain of points follows, if it is one.
+fn arc_of(points: &[Vector3<f64>]) -> Option<CircularArc> {
+    let count = points.len();
+    let [first, last] = [points.first()?, points.last()?];
+    let closed = (first - last).norm() < TOLERANCE;
+    let third = if closed { 2 * count / 3 } else { count - 1 };
+    let middle = if closed { count / 3 } else { count / 2 };
+    let mut arc = CircularArc::through([*first, points[middle], points[third]])?;
+    if closed {
+        arc.angles[1] = arc.angles[0] + std::f64::consts::TAU;
+    }
+    let on_arc = |point: &Vector3<f64>| arc.distance_to_circle(point) < TOLERANCE;
+    points.iter().all(on_arc).then_some(arc)
+}
+
+/// The volume that the triangles of a Wavefront OBJ enclose.
+fn mesh_volume(path: &Path) -> Result<f64> {
+    let text = fs::read_to_string(path)?;
+    let (mut vertices, mut six_fold) = (Vec::new(), 0.0);
+    for line in text.lines() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words[..] {
+            ["v", x, y, z] => {
+                vertices.push(Vector3::new(x.parse()?, y.parse()?, z.parse::<f64>()?))
+            }
+            ["f", a, b, c] => {
+                let vertex = |word: &str| -> Result<Vector3<f64>> {
+                    let index: usize = word.split('/').next().unwrap_or(word).parse()?;
+                    vertices
+                        .get(index.wrapping_sub(1))
+                        .copied()
+                        .ok_or_else(|| format!("{}: no vertex {index}", path.display()).into())
+                };
+                six_fold += vertex(a)?.dot(&vertex(b)?.cross(&vertex(c)?));
+            }
+            _ => {}
+        }
+    }
+    Ok(six_fold.abs() / 6.0)
+}

@@ -1,0 +1,133 @@
+//! All faces that the curves might bound: the cells of planes, and cylinders between two rims.
+
+use super::cells::cells;
+use super::curves::{Curve, Curves};
+use super::face::{CurveIndex, Face, Step, Surface};
+use super::plane_fit::{PlaneFit, PlaneFrame};
+use super::planes::coplanar_curves;
+use nalgebra::Vector3;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Rims of one cylinder agree within so many standard deviations of an arc, of both together: as
+/// one point of a thousand does not.
+const AGREEMENT: f64 = 3.29 * std::f64::consts::SQRT_2;
+
+/// Faces with different boundaries; none knows its outer side yet.
+pub(super) fn candidates(curves: &Curves) -> Vec<Face> {
+    let mut known: BTreeSet<Vec<CurveIndex>> = BTreeSet::new();
+    let mut faces = Vec::new();
+    let planar = coplanar_curves(curves).into_iter().flat_map(|plane| {
+        let frame = PlaneFrame::new(plane.normal, plane.offset);
+        let cells = cells(curves, &plane.curves, &frame).into_iter();
+        cells.filter_map(move |loops| planar_face(curves, loops, &frame))
+    });
+    for face in planar.chain(cylinders(curves)) {
+        let mut boundary: Vec<CurveIndex> = face.steps().map(|step| step.curve).collect();
+        boundary.sort_unstable();
+        if known.insert(boundary) {
+            faces.push(face);
+        }
+    }
+    faces
+}
+
+/// The face in the plane of its own curves, if there is one that holds all of them.
+fn planar_face(curves: &Curves, loops: Vec<Vec<Step>>, frame: &PlaneFrame) -> Option<Face> {
+    let of_loops = loops
+        .iter()
+        .flatten()
+        .filter_map(|step| curves.find(step.curve));
+    let measured = of_loops.flat_map(|curve| &curve.measured);
+    let fit = PlaneFit::through(measured.clone(), curves.extent)?;
+    let plane = fit.solved()?;
+    let (mut normal, mut offset) = plane.plane();
+    if normal.dot(&frame.normal) < 0.0 {
+        (normal, offset) = (-normal, -offset);
+    }
+    let holds = measured
+        .clone()
+        .all(|(point, covariance)| plane.holds(point, covariance));
+    holds.then_some(Face {
+        surface: Surface::Plane { normal, offset },
+        loops,
+    })
+}
+
+/// Cylinders between two whole circles, or two arcs whose ends edges join.
+fn cylinders(curves: &Curves) -> Vec<Face> {
+    let (arcs, edges): (Vec<&Curve>, Vec<&Curve>) =
+        (curves.all.iter()).partition(|curve| curve.arc.is_some());
+    let by_ends: BTreeMap<[usize; 2], &Curve> = (edges.into_iter())
+        .filter_map(|edge| Some((sorted(edge.ends?), edge)))
+        .collect();
+    let pairs = (0..arcs.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
+    let face = |(i, j): (usize, usize)| {
+        let rims = [arcs[i], arcs[j]];
+        let surface = common_cylinder(curves, rims)?;
+        let loops = loops_between(&surface, rims, &by_ends)?;
+        Some(Face { surface, loops })
+    };
+    pairs.filter_map(face).collect()
+}
+
+/// The cylinder on which both arcs are rims, with its normal away from the axis, which points
+/// from the first rim to the second.
+fn common_cylinder(curves: &Curves, rims: [&Curve; 2]) -> Option<Surface> {
+    let [a, b] = [rims[0].arc?, rims[1].arc?];
+    let tolerance = AGREEMENT * curves.arc_sigma();
+    let between = b.center - a.center;
+    let turned = b.normal() * a.normal().dot(&b.normal()).signum();
+    let axis = (a.normal() + turned).normalize();
+    let height = axis.dot(&between);
+    let tilt = a.normal().cross(&b.normal()).norm();
+    let agree = (a.radius - b.radius).abs() <= tolerance
+        && (between - axis * height).norm() <= tolerance
+        && tilt * a.radius.min(b.radius) <= tolerance
+        && height.abs() > tolerance;
+    agree.then(|| Surface::Cylinder {
+        point: a.center,
+        axis: between.normalize(),
+        radius: 0.5 * (a.radius + b.radius),
+        convex: true,
+    })
+}
+
+/// Around the axis along the first rim and the other way along the second: in two loops of
+/// circles, or in one that edges close.
+fn loops_between(
+    surface: &Surface,
+    rims: [&Curve; 2],
+    edges: &BTreeMap<[usize; 2], &Curve>,
+) -> Option<Vec<Vec<Step>>> {
+    let Surface::Cylinder { axis, .. } = surface else {
+        return None;
+    };
+    let around = |curve: &Curve, axis: Vector3<f64>| {
+        let reversed = curve.arc?.normal().dot(&axis) < 0.0;
+        let ends = curve
+            .ends
+            .map(|[a, b]| if reversed { [b, a] } else { [a, b] });
+        let curve = curve.index;
+        Some((Step { curve, reversed }, ends))
+    };
+    let (first, ends) = around(rims[0], *axis)?;
+    let (second, other_ends) = around(rims[1], -axis)?;
+    match (ends, other_ends) {
+        (None, None) => Some(vec![vec![first], vec![second]]),
+        (Some([a, b]), Some([c, d])) => {
+            let edge = |from: usize, to: usize| {
+                let edge = edges.get(&sorted([from, to]))?;
+                Some(Step {
+                    curve: edge.index,
+                    reversed: edge.ends? != [from, to],
+                })
+            };
+            Some(vec![vec![first, edge(b, c)?, second, edge(d, a)?]])
+        }
+        _ => None,
+    }
+}
+
+fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
+    [a.min(b), a.max(b)]
+}

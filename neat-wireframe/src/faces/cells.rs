@@ -1,0 +1,175 @@
+//! The cells into which the curves of a plane divide it: minimal cycles of their planar graph,
+//! each with what lies within it as holes.
+
+use super::curves::{Curve, Curves};
+use super::face::{CurveIndex, Step};
+use super::plane_fit::PlaneFrame;
+use super::polygon::{contains, crosses_itself, signed_area};
+use nalgebra::Vector2;
+use std::collections::{BTreeMap, BTreeSet};
+
+type Polygon = Vec<Vector2<f64>>;
+
+/// A cell: its outer loop, counterclockwise, and those of its holes, clockwise.
+pub(super) type Cell = Vec<Vec<Step>>;
+
+/// A cycle of the graph as it lies in the plane.
+struct Cycle {
+    steps: Vec<Step>,
+    polygon: Polygon,
+    area: f64,
+    component: usize,
+}
+
+/// The bounded cells between some curves of a plane, by their places among all curves.
+pub(super) fn cells(curves: &Curves, members: &[usize], frame: &PlaneFrame) -> Vec<Cell> {
+    let members: Vec<&Curve> = members.iter().map(|place| &curves.all[*place]).collect();
+    let (circles, mut open): (Vec<&Curve>, Vec<&Curve>) =
+        members.into_iter().partition(|curve| curve.ends.is_none());
+    let mut cycles: Vec<Cycle> = Vec::new();
+    for circle in &circles {
+        let component = cycles.len();
+        for reversed in [false, true] {
+            let step = Step {
+                curve: circle.index,
+                reversed,
+            };
+            cycles.push(Cycle::new(curves, vec![step], component, frame));
+        }
+    }
+    // A curve with the same cycle on both sides divides nothing.
+    let of_graph = loop {
+        let found = half_edge_cycles(curves, &open, frame);
+        let bridges: BTreeSet<CurveIndex> = found.iter().flat_map(|cycle| twice(cycle)).collect();
+        if bridges.is_empty() {
+            break found;
+        }
+        open.retain(|curve| !bridges.contains(&curve.index));
+    };
+    let component_of = components(&open);
+    for steps in of_graph {
+        let component = circles.len() * 2 + component_of[&steps[0].curve];
+        cycles.push(Cycle::new(curves, steps, component, frame));
+    }
+    let sound = |cycle: &Cycle| cycle.polygon.len() > 2 && !crosses_itself(&cycle.polygon);
+    cycles.retain(sound);
+    nested(&cycles)
+}
+
+impl Cycle {
+    fn new(curves: &Curves, steps: Vec<Step>, component: usize, frame: &PlaneFrame) -> Self {
+        let polygon = polygon_of(curves, &steps, frame);
+        Self {
+            area: signed_area(&polygon),
+            steps,
+            polygon,
+            component,
+        }
+    }
+}
+
+/// The points of a loop in the plane, each once.
+pub(super) fn polygon_of(curves: &Curves, steps: &[Step], frame: &PlaneFrame) -> Polygon {
+    let mut polygon = Vec::new();
+    for step in steps {
+        let points = (curves.find(step.curve)).map(|curve| curve.points_along(step));
+        let points = points.unwrap_or_default();
+        let all_but_last = points.len().saturating_sub(1);
+        polygon.extend(points[..all_but_last].iter().map(|p| frame.coordinates(p)));
+    }
+    polygon
+}
+
+/// The curves that a cycle runs along both ways.
+fn twice(steps: &[Step]) -> Vec<CurveIndex> {
+    let mut curves: Vec<CurveIndex> = steps.iter().map(|step| step.curve).collect();
+    curves.sort_unstable();
+    let repeated = curves.windows(2).filter(|pair| pair[0] == pair[1]);
+    repeated.map(|pair| pair[0]).collect()
+}
+
+/// The cycles that keep to the left: at every junction the next curve clockwise from the one
+/// that led there. Bounded cells run counterclockwise, the outside of a component clockwise.
+fn half_edge_cycles(curves: &Curves, open: &[&Curve], frame: &PlaneFrame) -> Vec<Vec<Step>> {
+    // Steps that leave each junction, counterclockwise.
+    let mut leaving: BTreeMap<usize, Vec<(f64, Step)>> = BTreeMap::new();
+    for curve in open {
+        let ends = curve.ends.iter();
+        for (reversed, from) in ends.flat_map(|[start, end]| [(false, *start), (true, *end)]) {
+            let step = Step {
+                curve: curve.index,
+                reversed,
+            };
+            let points = curve.points_along(&step);
+            let along = frame.coordinates(&points[1]) - frame.coordinates(&points[0]);
+            let angle = along.y.atan2(along.x);
+            leaving.entry(from).or_default().push((angle, step));
+        }
+    }
+    for steps in leaving.values_mut() {
+        steps.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    }
+    let next = |step: &Step| {
+        let ends = curves.find(step.curve)?.ends?;
+        let around = leaving.get(&ends[usize::from(!step.reversed)])?;
+        let back = around.iter().position(|(_, s)| *s == step.turned())?;
+        Some(around[(back + around.len() - 1) % around.len()].1)
+    };
+    let mut cycles = Vec::new();
+    let mut visited: BTreeSet<Step> = BTreeSet::new();
+    for start in leaving.values().flatten().map(|(_, step)| *step) {
+        let mut cycle = Vec::new();
+        let mut step = start;
+        while visited.insert(step) {
+            cycle.push(step);
+            let Some(following) = next(&step) else { break };
+            step = following;
+        }
+        if !cycle.is_empty() {
+            cycles.push(cycle);
+        }
+    }
+    cycles
+}
+
+/// A number for every curve, the same for those that junctions join.
+fn components(open: &[&Curve]) -> BTreeMap<CurveIndex, usize> {
+    let ends: Vec<Vec<usize>> = open
+        .iter()
+        .filter_map(|c| c.ends.map(|e| e.to_vec()))
+        .collect();
+    let groups = pathfinding::undirected::connected_components::components(&ends);
+    let mut component_of_junction = BTreeMap::new();
+    let mut groups: Vec<Vec<usize>> = groups
+        .into_iter()
+        .map(|g| g.into_iter().collect())
+        .collect();
+    groups.iter_mut().for_each(|group| group.sort_unstable());
+    groups.sort();
+    for (number, group) in groups.iter().enumerate() {
+        component_of_junction.extend(group.iter().map(|junction| (*junction, number)));
+    }
+    let of_curve = |curve: &&Curve| Some((curve.index, component_of_junction[&curve.ends?[0]]));
+    open.iter().filter_map(of_curve).collect()
+}
+
+/// Every bounded cycle with the outsides of the components that lie in it and in no smaller one.
+fn nested(cycles: &[Cycle]) -> Vec<Cell> {
+    let mut bounded: Vec<&Cycle> = cycles.iter().filter(|cycle| cycle.area > 0.0).collect();
+    bounded.sort_by(|a, b| a.area.total_cmp(&b.area));
+    let mut cells: Vec<Cell> = bounded
+        .iter()
+        .map(|cycle| vec![cycle.steps.clone()])
+        .collect();
+    for inner in cycles.iter().filter(|cycle| cycle.area < 0.0) {
+        let holds = |outer: &&Cycle| {
+            outer.component != inner.component
+                && outer.area > -inner.area
+                && (inner.polygon.iter()).all(|point| contains(&outer.polygon, point))
+        };
+        if let Some(outer) = bounded.iter().position(holds) {
+            cells[outer].push(inner.steps.clone());
+        }
+    }
+    cells
+}

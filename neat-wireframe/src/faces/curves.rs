@@ -1,0 +1,152 @@
+//! The curves of a wireframe as boundaries of faces: straight edges, whole circles, and arcs
+//! whose ends are junctions.
+
+use super::face::{CurveIndex, Step};
+use nalgebra::{Matrix3, Vector3};
+use neat_core::{CircularArc, Wireframe3d};
+
+/// Arcs are drawn in pieces that turn by so much, in radians.
+pub(super) const TURN: f64 = 0.1;
+/// Points of an arc that say in which plane it lies.
+const POINTS_OF_ARC: usize = 8;
+/// Standard deviation of a junction where none is known, and what is added to the known one, by
+/// the extent of the wireframe: junctions of six solids that the assembler made lie 0.00001 to
+/// 0.0003 off their planes (root mean square).
+const JUNCTION_NOISE: f64 = 5e-4;
+/// The same for points of arcs, which are fitted one by one and have no covariance: the radii of
+/// the two rims of the toy's hole differ by 0.003.
+const ARC_NOISE: f64 = 3e-3;
+/// An end of an arc is a junction within so many standard deviations of an arc.
+const REACH: f64 = 4.0;
+
+/// What is known of the wireframe, in one frame.
+#[derive(Clone, Copy, Debug)]
+pub struct MeasuredGraph<'a> {
+    /// Junctions and straight edges.
+    pub wireframe: &'a Wireframe3d,
+    /// Arcs beside them.
+    pub arcs: &'a [CircularArc],
+    /// Covariances of the junctions; empty, or one for each, `None` where it is not determined.
+    pub covariances: &'a [Option<Matrix3<f64>>],
+}
+
+/// A curve that may bound faces.
+#[derive(Clone, Debug)]
+pub(super) struct Curve {
+    pub index: CurveIndex,
+    /// The junctions at its start and end; `None` for a whole circle.
+    pub ends: Option<[usize; 2]>,
+    /// Points along it, the ends among them; the first and last of a circle are the same.
+    pub points: Vec<Vector3<f64>>,
+    /// Points by which its plane is known, each with its covariance.
+    pub measured: Vec<(Vector3<f64>, Matrix3<f64>)>,
+    /// The arc, if it is one.
+    pub arc: Option<CircularArc>,
+}
+
+/// The curves of a wireframe, with its size and noise.
+pub(super) struct Curves {
+    /// Those that may bound faces.
+    pub all: Vec<Curve>,
+    /// Arcs that may not, as an end is no junction.
+    pub loose: Vec<Vec<Vector3<f64>>>,
+    /// Greatest side of the box around the wireframe.
+    pub extent: f64,
+}
+
+impl Curve {
+    /// The points in the direction of a loop.
+    pub fn points_along(&self, step: &Step) -> Vec<Vector3<f64>> {
+        let mut points = self.points.clone();
+        if step.reversed {
+            points.reverse();
+        }
+        points
+    }
+}
+
+impl Curves {
+    pub fn new(graph: &MeasuredGraph) -> Self {
+        let extent = extent(graph);
+        let floor = |share: f64| Matrix3::identity() * (share * extent).powi(2);
+        let junctions = &graph.wireframe.junctions;
+        let covariance = |junction: usize| {
+            let known = graph.covariances.get(junction).copied().flatten();
+            known.unwrap_or_default() + floor(JUNCTION_NOISE)
+        };
+        let edge = |(index, ends): (usize, &[usize; 2])| Curve {
+            index: CurveIndex::Edge(index),
+            ends: Some(*ends),
+            points: ends.map(|end| junctions[end]).to_vec(),
+            measured: ends.map(|end| (junctions[end], covariance(end))).to_vec(),
+            arc: None,
+        };
+        let has_length = |curve: &Curve| curve.points[0] != curve.points[1];
+        let edges = graph.wireframe.edges.iter().enumerate().map(edge);
+        let mut all: Vec<Curve> = edges.filter(has_length).collect();
+        let mut loose = Vec::new();
+        for (index, arc) in graph.arcs.iter().enumerate() {
+            let mut points = arc.points(TURN);
+            let ends = ends_of(arc, junctions, REACH * ARC_NOISE * extent);
+            if !arc.is_closed() {
+                let Some([start, end]) = ends else {
+                    loose.push(points);
+                    continue;
+                };
+                let last = points.len() - 1;
+                (points[0], points[last]) = (junctions[start], junctions[end]);
+            }
+            let angle = |k: usize| arc.angles[0] + arc.sweep() * k as f64 / POINTS_OF_ARC as f64;
+            let on_arc = (0..POINTS_OF_ARC).map(|k| (arc.point_at(angle(k)), floor(ARC_NOISE)));
+            all.push(Curve {
+                index: CurveIndex::Arc(index),
+                ends: ends.filter(|_| !arc.is_closed()),
+                points,
+                measured: on_arc.collect(),
+                arc: Some(*arc),
+            });
+        }
+        Self { all, loose, extent }
+    }
+
+    /// The place of a curve in [`Curves::all`].
+    pub fn find(&self, index: CurveIndex) -> Option<&Curve> {
+        let found = self.all.binary_search_by_key(&index, |curve| curve.index);
+        found.ok().map(|found| &self.all[found])
+    }
+
+    /// Standard deviation of a point of an arc.
+    pub fn arc_sigma(&self) -> f64 {
+        ARC_NOISE * self.extent
+    }
+}
+
+/// The junctions nearest to the ends of an arc; `None` without junctions.
+pub(super) fn nearest_junctions(
+    arc: &CircularArc,
+    junctions: &[Vector3<f64>],
+) -> Option<[usize; 2]> {
+    let nearest = |angle: f64| {
+        let point = arc.point_at(angle);
+        let distances = junctions.iter().map(|j| (j - point).norm()).enumerate();
+        let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some(nearest.0)
+    };
+    Some([nearest(arc.angles[0])?, nearest(arc.angles[1])?])
+}
+
+/// The junctions at the two ends of an arc, if both are near one, and not the same.
+fn ends_of(arc: &CircularArc, junctions: &[Vector3<f64>], reach: f64) -> Option<[usize; 2]> {
+    let ends = nearest_junctions(arc, junctions)?;
+    let near = |k: usize| (junctions[ends[k]] - arc.point_at(arc.angles[k])).norm() <= reach;
+    (ends[0] != ends[1] && near(0) && near(1)).then_some(ends)
+}
+
+fn extent(graph: &MeasuredGraph) -> f64 {
+    let of_arcs = graph.arcs.iter().flat_map(|arc| arc.points(TURN));
+    let points = graph.wireframe.junctions.iter().copied().chain(of_arcs);
+    let low_high = points.fold(None, |range: Option<[Vector3<f64>; 2]>, p| {
+        Some(range.map_or([p, p], |[low, high]| [low.inf(&p), high.sup(&p)]))
+    });
+    low_high.map_or(0.0, |[low, high]| (high - low).max())
+}

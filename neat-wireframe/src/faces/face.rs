@@ -1,0 +1,250 @@
+//! Faces and shells: what a boundary representation is made of.
+
+use super::curves::nearest_junctions;
+use nalgebra::Vector3;
+use neat_core::{CircularArc, Wireframe3d};
+use serde::{Deserialize, Serialize};
+
+/// Faces that hang together by the curves that they share.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Shell {
+    /// Whether it bounds a solid: every curve has two faces, one on each side, normals point out
+    /// of the solid, and nothing is seen within it. Otherwise it is a sheet.
+    pub closed: bool,
+    /// Its faces.
+    pub faces: Vec<Face>,
+}
+
+/// A part of a surface, bounded by edges and arcs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Face {
+    /// What it is a part of, with the side to which its normal points.
+    #[serde(flatten)]
+    pub surface: Surface,
+    /// Closed chains of curves, the outer one of a plane first; the others are holes. Seen from the
+    /// side to which the normal points, the face lies on the left of each.
+    pub loops: Vec<Vec<Step>>,
+}
+
+/// The surfaces of faces.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Surface {
+    /// The points x with `normal · x = offset`.
+    Plane {
+        /// Of length 1.
+        normal: Vector3<f64>,
+        /// Distance from the origin along the normal.
+        offset: f64,
+    },
+    /// The points at a distance from an axis.
+    Cylinder {
+        /// A point of the axis.
+        point: Vector3<f64>,
+        /// Its direction, of length 1.
+        axis: Vector3<f64>,
+        /// The distance.
+        radius: f64,
+        /// Whether the normal points away from the axis, as on a pin; in a hole it points to it.
+        convex: bool,
+    },
+}
+
+/// A curve of a loop, in the direction in which the loop runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Step {
+    /// The curve.
+    #[serde(flatten)]
+    pub curve: CurveIndex,
+    /// Whether the loop runs from its end to its start.
+    #[serde(default)]
+    pub reversed: bool,
+}
+
+/// An edge or an arc of the wireframe, by its index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CurveIndex {
+    /// A straight edge.
+    Edge(usize),
+    /// An arc, which may be a whole circle.
+    Arc(usize),
+}
+
+impl Shell {
+    /// The same shell where a similarity has moved the wireframe: one that does not turn it, but
+    /// may mirror it at a point.
+    pub fn map(&self, f: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
+        Self {
+            closed: self.closed,
+            faces: self.faces.iter().map(|face| face.map(&f)).collect(),
+        }
+    }
+}
+
+impl Shell {
+    /// The same shell where edges have new indices, or none; `None` if no face is left. Without one
+    /// of its faces it is a sheet.
+    pub fn with_edges(&self, new_index: impl Fn(usize) -> Option<usize>) -> Option<Self> {
+        let step = |step: &Step| {
+            let curve = match step.curve {
+                CurveIndex::Edge(edge) => CurveIndex::Edge(new_index(edge)?),
+                arc @ CurveIndex::Arc(_) => arc,
+            };
+            Some(Step { curve, ..*step })
+        };
+        let face = |face: &Face| {
+            let steps = |steps: &Vec<Step>| steps.iter().map(step).collect::<Option<_>>();
+            Some(Face {
+                surface: face.surface,
+                loops: face.loops.iter().map(steps).collect::<Option<_>>()?,
+            })
+        };
+        let faces: Vec<Face> = self.faces.iter().filter_map(face).collect();
+        (!faces.is_empty()).then_some(Self {
+            closed: self.closed && faces.len() == self.faces.len(),
+            faces,
+        })
+    }
+}
+
+impl Face {
+    /// Whether its surface is one, and its loops are closed chains of curves that exist: any
+    /// number on a plane; on a cylinder two arcs, which are loops of their own or joined by two
+    /// edges.
+    pub(crate) fn is_valid(&self, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> bool {
+        let exists = |step: &Step| match step.curve {
+            CurveIndex::Edge(edge) => edge < wireframe.edges.len(),
+            CurveIndex::Arc(arc) => arc < arcs.len(),
+        };
+        let unit = |v: &Vector3<f64>| (v.norm() - 1.0).abs() < 1e-6;
+        let is_arc = |step: &Step| matches!(step.curve, CurveIndex::Arc(_));
+        let shape: Vec<Vec<bool>> = (self.loops.iter())
+            .map(|steps| steps.iter().map(is_arc).collect())
+            .collect();
+        let surface = match &self.surface {
+            Surface::Plane { normal, offset } => {
+                unit(normal) && offset.is_finite() && !self.loops.is_empty()
+            }
+            Surface::Cylinder {
+                point,
+                axis,
+                radius,
+                ..
+            } => {
+                let finite = point.iter().all(|x| x.is_finite());
+                let joined =
+                    shape == [[true, false, true, false]] || shape == [[false, true, false, true]];
+                unit(axis)
+                    && finite
+                    && radius.is_normal()
+                    && *radius > 0.0
+                    && (joined || shape == [[true], [true]])
+            }
+        };
+        surface
+            && self.steps().all(exists)
+            && (self.loops.iter()).all(|steps| is_closed(steps, wireframe, arcs))
+    }
+
+    /// The steps of all loops.
+    pub fn steps(&self) -> impl Iterator<Item = &Step> + Clone {
+        self.loops.iter().flatten()
+    }
+
+    fn map(&self, f: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
+        let origin = f(&Vector3::zeros());
+        let scale = (f(&Vector3::x()) - origin).x;
+        let surface = match self.surface {
+            Surface::Plane { normal, offset } => {
+                let outward = normal * scale.signum();
+                Surface::Plane {
+                    normal: outward,
+                    offset: outward.dot(&f(&(normal * offset))),
+                }
+            }
+            Surface::Cylinder {
+                point,
+                axis,
+                radius,
+                convex,
+            } => Surface::Cylinder {
+                point: f(&point),
+                axis: axis * scale.signum(),
+                radius: radius * scale.abs(),
+                convex,
+            },
+        };
+        // In the mirror, left is right.
+        let loops = if scale < 0.0 {
+            self.turned().loops
+        } else {
+            self.loops.clone()
+        };
+        Self { surface, loops }
+    }
+
+    /// The same face with its normal on the other side.
+    pub(super) fn turned(&self) -> Self {
+        let surface = match self.surface {
+            Surface::Plane { normal, offset } => Surface::Plane {
+                normal: -normal,
+                offset: -offset,
+            },
+            Surface::Cylinder {
+                point,
+                axis,
+                radius,
+                convex,
+            } => Surface::Cylinder {
+                point,
+                axis,
+                radius,
+                convex: !convex,
+            },
+        };
+        let turned = |steps: &Vec<Step>| steps.iter().rev().map(Step::turned).collect();
+        Self {
+            surface,
+            loops: self.loops.iter().map(turned).collect(),
+        }
+    }
+}
+
+impl Step {
+    pub(super) fn turned(&self) -> Self {
+        Self {
+            curve: self.curve,
+            reversed: !self.reversed,
+        }
+    }
+}
+
+/// Whether each step begins where the one before it ends. A step alone is a circle.
+fn is_closed(steps: &[Step], wireframe: &Wireframe3d, arcs: &[CircularArc]) -> bool {
+    let ends = |step: &Step| {
+        let [start, end] = match step.curve {
+            CurveIndex::Edge(edge) => wireframe.edges[edge],
+            CurveIndex::Arc(arc) => nearest_junctions(&arcs[arc], &wireframe.junctions)?,
+        };
+        Some(if step.reversed {
+            [end, start]
+        } else {
+            [start, end]
+        })
+    };
+    match steps {
+        [] => false,
+        [step] => match step.curve {
+            CurveIndex::Edge(_) => false,
+            CurveIndex::Arc(arc) => arcs[arc].is_closed(),
+        },
+        [.., last] => {
+            let before = std::iter::once(last).chain(steps);
+            let mut pairs = before
+                .zip(steps)
+                .map(|(before, step)| (ends(before), ends(step)));
+            pairs.all(|(before, step)| before.zip(step).is_some_and(|(b, s)| b[1] == s[0]))
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! The exact geometry of a shell: its vertices and arcs where its surfaces meet, and what it
+//! encloses.
+//!
+//! Measured junctions lie off the planes of their faces by the noise of the measurement. A
+//! boundary representation wants them on all of them; they move by the shortest way that leads
+//! there.
+
+use super::curves::nearest_junctions;
+use super::face::{CurveIndex, Face, Shell, Step, Surface};
+use super::plane_fit::across;
+use nalgebra::{DMatrix, DVector, Vector3};
+use neat_core::{CircularArc, Wireframe3d};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// Surfaces whose normals differ by a smaller sine do not say where along them they meet.
+const MIN_SINGULAR: f64 = 0.05;
+/// Cylinders are not flat: the way to them is gone in so many steps.
+const STEPS: usize = 4;
+
+/// A curve as a shell has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShellCurve {
+    /// The junctions at its start and end; `None` for a whole circle.
+    pub ends: Option<[usize; 2]>,
+    /// The arc, if it is one. Whole circles of one axis start in the same direction.
+    pub arc: Option<CircularArc>,
+}
+
+/// Vertices and curves of one shell, by their indices in the wireframe.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ShellGeometry {
+    /// The junctions at which its curves end.
+    pub vertices: BTreeMap<usize, Vector3<f64>>,
+    /// Its edges and arcs.
+    pub curves: BTreeMap<CurveIndex, ShellCurve>,
+    /// A point of it: far from the origin of the frame, areas and volumes would lose their digits.
+    origin: Vector3<f64>,
+}
+
+impl ShellGeometry {
+    /// Of a shell of a wireframe in the same frame.
+    ///
+    /// # Panics
+    /// If the shell names curves that the wireframe does not have.
+    pub fn new(shell: &Shell, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Self {
+        let mut surfaces_of: BTreeMap<CurveIndex, Vec<Surface>> = BTreeMap::new();
+        let mut curves = BTreeMap::new();
+        for face in &shell.faces {
+            for steps in &face.loops {
+                for step in steps {
+                    surfaces_of
+                        .entry(step.curve)
+                        .or_default()
+                        .push(face.surface);
+                    let curve = match step.curve {
+                        CurveIndex::Edge(edge) => ShellCurve {
+                            ends: Some(wireframe.edges[edge]),
+                            arc: None,
+                        },
+                        CurveIndex::Arc(arc) => ShellCurve {
+                            ends: (steps.len() > 1)
+                                .then(|| nearest_junctions(&arcs[arc], &wireframe.junctions))
+                                .flatten(),
+                            arc: Some(arcs[arc]),
+                        },
+                    };
+                    curves.insert(step.curve, curve);
+                }
+            }
+        }
+        let mut surfaces_at: BTreeMap<usize, Vec<Surface>> = BTreeMap::new();
+        for (index, curve) in &curves {
+            for end in curve.ends.iter().flatten() {
+                surfaces_at
+                    .entry(*end)
+                    .or_default()
+                    .extend(&surfaces_of[index]);
+            }
+        }
+        let vertices = (surfaces_at.into_iter())
+            .map(|(j, surfaces)| (j, on_surfaces(wireframe.junctions[j], &surfaces)))
+            .collect();
+        for (index, curve) in &mut curves {
+            if let Some(arc) = &mut curve.arc {
+                *arc = match curve.ends {
+                    None => circle_on_surfaces(arc, &surfaces_of[index], true),
+                    Some(ends) => {
+                        let circle = circle_on_surfaces(arc, &surfaces_of[index], false);
+                        between(&circle, ends, &vertices)
+                    }
+                }
+            }
+        }
+        let centers = curves.values().filter_map(|curve| Some(curve.arc?.center));
+        let origin = vertices
+            .values()
+            .copied()
+            .chain(centers)
+            .next()
+            .unwrap_or_default();
+        Self {
+            vertices,
+            curves,
+            origin,
+        }
+    }
+
+    /// Points along a step, both ends among them; arcs turn by `most` radians at most from one to
+    /// the next. The first and the last of a circle are the same.
+    pub fn points(&self, step: &Step, most: f64) -> Vec<Vector3<f64>> {
+        let curve = &self.curves[&step.curve];
+        let mut points = match (&curve.arc, curve.ends) {
+            (Some(arc), _) => arc.points(most),
+            (None, ends) => ends
+                .iter()
+                .flatten()
+                .map(|end| self.vertices[end])
+                .collect(),
+        };
+        if let (Some(ends), [first, .., last]) = (curve.ends, &mut points[..]) {
+            [*first, *last] = ends.map(|end| self.vertices[&end]);
+        }
+        if step.reversed {
+            points.reverse();
+        }
+        points
+    }
+
+    /// Area of a face.
+    pub fn area(&self, face: &Face) -> f64 {
+        match face.surface {
+            Surface::Plane { normal, .. } => normal.dot(&self.area_vector(face)),
+            Surface::Cylinder { .. } => self.moments_of_cylinder(face).0,
+        }
+    }
+
+    /// The volume that faces with their normals outward enclose, by Gauss' theorem for the field
+    /// x / 3: for a shell that is not closed it means nothing.
+    pub fn volume(&self, shell: &Shell) -> f64 {
+        let flux = |face: &Face| match face.surface {
+            Surface::Plane { normal, offset } => {
+                (offset - normal.dot(&self.origin)) * normal.dot(&self.area_vector(face))
+            }
+            Surface::Cylinder { .. } => self.moments_of_cylinder(face).1,
+        };
+        shell.faces.iter().map(flux).sum::<f64>() / 3.0
+    }
+
+    /// Half the integral of x × dx around a face, with x from the origin.
+    fn area_vector(&self, face: &Face) -> Vector3<f64> {
+        let of_step = |step: &Step| {
+            let curve = &self.curves[&step.curve];
+            let sign = if step.reversed { -0.5 } else { 0.5 };
+            let ends = curve
+                .ends
+                .map(|ends| ends.map(|end| self.vertices[&end] - self.origin));
+            let twice = match (&curve.arc, ends) {
+                (Some(arc), ends) => {
+                    let [start, end] = ends.unwrap_or_default();
+                    (arc.center - self.origin).cross(&(end - start))
+                        + arc.normal() * arc.radius.powi(2) * arc.sweep()
+                }
+                (None, Some([start, end])) => start.cross(&end),
+                (None, None) => Vector3::zeros(),
+            };
+            sign * twice
+        };
+        face.steps().map(of_step).sum()
+    }
+
+    /// Area of a cylinder, and the flux of x through it.
+    fn moments_of_cylinder(&self, face: &Face) -> (f64, f64) {
+        let Surface::Cylinder {
+            point,
+            axis,
+            radius,
+            convex,
+        } = face.surface
+        else {
+            return (0.0, 0.0);
+        };
+        let rims = face.steps().filter_map(|step| self.curves[&step.curve].arc);
+        let rims: Vec<CircularArc> = rims.collect();
+        let [one, other] = rims[..] else {
+            return (0.0, 0.0);
+        };
+        let height = axis.dot(&(other.center - one.center)).abs();
+        let area = radius * one.sweep() * height;
+        // The integral of the direction from the axis, over the angle.
+        let [start, end] = one.angles;
+        let outward = one.toward(end - 0.25 * TAU) - one.toward(start - 0.25 * TAU);
+        let flux = radius * area + radius * height * (point - self.origin).dot(&outward);
+        (area, if convex { flux } else { -flux })
+    }
+}
+
+/// The nearest point on all surfaces, or the best one if there is none.
+fn on_surfaces(start: Vector3<f64>, surfaces: &[Surface]) -> Vector3<f64> {
+    let mut position = start;
+    for _ in 0..STEPS {
+        let rows = surfaces
+            .iter()
+            .map(|surface| height_over(surface, &position));
+        let rows: Vec<(Vector3<f64>, f64)> = rows.collect();
+        let normals = DMatrix::from_fn(rows.len(), 3, |i, k| rows[i].0[k]);
+        let heights = DVector::from_fn(rows.len(), |i, _| -rows[i].1);
+        let Ok(step) = normals.svd(true, true).solve(&heights, MIN_SINGULAR) else {
+            break;
+        };
+        position += Vector3::new(step[0], step[1], step[2]);
+    }
+    position
+}
+
+/// The normal of a surface near a point, and how far over it the point lies.
+fn height_over(surface: &Surface, at: &Vector3<f64>) -> (Vector3<f64>, f64) {
+    match surface {
+        Surface::Plane { normal, offset } => (*normal, normal.dot(at) - offset),
+        Surface::Cylinder {
+            point,
+            axis,
+            radius,
+            ..
+        } => {
+            let offset = at - point;
+            let across = offset - axis * axis.dot(&offset);
+            let outward = across.try_normalize(0.0).unwrap_or_default();
+            (outward, across.norm() - radius)
+        }
+    }
+}
+
+/// The circle of an arc in the plane of a face and around the axis of another. A whole one begins
+/// where all circles around this axis do.
+fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> CircularArc {
+    let (mut center, mut radius) = (arc.center, arc.radius);
+    let (mut axis, mut plane) = (None, None);
+    for surface in surfaces {
+        match surface {
+            Surface::Plane { normal, offset } => plane = plane.or(Some((*normal, *offset))),
+            Surface::Cylinder {
+                point,
+                axis: along,
+                radius: of_cylinder,
+                ..
+            } => {
+                center = point + along * along.dot(&(center - point));
+                radius = *of_cylinder;
+                axis = Some(*along);
+            }
+        }
+    }
+    let (normal, offset) = plane.unwrap_or((arc.normal(), arc.normal().dot(&center)));
+    // A plane along the axis cuts no circle out of a cylinder.
+    let along = axis.filter(|axis| normal.dot(axis).abs() > MIN_SINGULAR);
+    let along = along.unwrap_or(normal);
+    center += along * (offset - normal.dot(&center)) / normal.dot(&along);
+    let up = normal * normal.dot(&arc.normal()).signum();
+    let toward = if whole {
+        across(&along)[0]
+    } else {
+        arc.axes[0]
+    };
+    let flat = toward - up * up.dot(&toward);
+    let x = flat.try_normalize(MIN_SINGULAR).unwrap_or(across(&up)[0]);
+    CircularArc {
+        center,
+        axes: [x, up.cross(&x)],
+        radius,
+        angles: if whole { [0.0, TAU] } else { arc.angles },
+    }
+}
+
+/// The arc from one vertex to the other, in its direction.
+fn between(
+    arc: &CircularArc,
+    ends: [usize; 2],
+    vertices: &BTreeMap<usize, Vector3<f64>>,
+) -> CircularArc {
+    let [start, end] = ends.map(|end| arc.angle_of(&vertices[&end]));
+    CircularArc {
+        angles: [start, start + (end - start).rem_euclid(TAU)],
+        ..*arc
+    }
+}

@@ -1,0 +1,84 @@
+//! Faces and solids from a wireframe: planes and cylinders between its edges and arcs, closed to
+//! shells where they close.
+//!
+//! Curves that lie in one plane within their covariances divide it into cells, and two coaxial
+//! circles are the rims of a cylinder: each is a face that may be there (`candidates.rs`). Images
+//! speak against a face through which they show what lies behind it (`visibility.rs`); among the
+//! others those are chosen that give the most edges two faces (`selection.rs`). What hangs
+//! together is a shell; it bounds a solid if each of its curves has a face on both sides
+//! (`shells.rs`).
+//!
+//! ```
+//! use neat_core::Wireframe3d;
+//! use neat_wireframe::faces::{MeasuredGraph, ShellGeometry, find_shells};
+//! use nalgebra::Vector3;
+//!
+//! let corner = |i: usize| Vector3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64);
+//! let cube = Wireframe3d {
+//!     junctions: (0..8).map(corner).collect(),
+//!     edges: (0..8)
+//!         .flat_map(|i| [1, 2, 4].map(|bit| [i, i | bit]))
+//!         .filter(|[a, b]| a != b)
+//!         .collect(),
+//! };
+//! let graph = MeasuredGraph { wireframe: &cube, arcs: &[], covariances: &[] };
+//! let shells = find_shells(&graph, &[]);
+//! assert!(shells[0].closed && shells[0].faces.len() == 6);
+//! let geometry = ShellGeometry::new(&shells[0], &cube, &[]);
+//! assert!((geometry.volume(&shells[0]) - 1.0).abs() < 1e-9);
+//! ```
+
+mod candidates;
+mod cells;
+mod chain;
+mod curves;
+mod face;
+mod geometry;
+mod plane_fit;
+mod planes;
+mod polygon;
+mod region;
+mod selection;
+mod shells;
+mod triangulation;
+mod visibility;
+
+#[cfg(test)]
+mod tests;
+
+pub use curves::MeasuredGraph;
+pub use face::{CurveIndex, Face, Shell, Step, Surface};
+pub(crate) use triangulation::triangles;
+
+pub use geometry::{ShellCurve, ShellGeometry};
+
+use crate::ViewObservation;
+use curves::Curves;
+use rayon::prelude::*;
+use region::Region;
+use visibility::Sightings;
+
+/// The shells of a wireframe, closed ones first.
+///
+/// - `graph`: valid, see [`check_wireframe`](crate::validity::check_wireframe), with edges cut
+///   where others meet them.
+/// - `views`: cameras and 2D segments, in the same frame. Without any, only the wireframe speaks.
+///
+/// The result does not depend on the number of threads.
+pub fn find_shells(graph: &MeasuredGraph, views: &[ViewObservation]) -> Vec<Shell> {
+    let curves = Curves::new(graph);
+    let faces = candidates::candidates(&curves);
+    let _span = tracing::debug_span!("find_shells", faces = faces.len()).entered();
+    let sightings = Sightings::new(&curves, views);
+    let against: Vec<f64> = (faces.par_iter())
+        .map(|face| {
+            let of_steps = face.steps().filter_map(|step| curves.find(step.curve));
+            let outline: Vec<_> = of_steps.flat_map(|curve| curve.points.clone()).collect();
+            let region = Region::new(&curves, face);
+            region.map_or(f64::MAX, |region| sightings.against(&region, &outline))
+        })
+        .collect();
+    let chosen = selection::select(&curves, &faces, &against);
+    let chosen = chosen.into_iter().map(|face| faces[face].clone()).collect();
+    shells::shells(graph, &curves, chosen, views)
+}

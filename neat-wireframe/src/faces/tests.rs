@@ -1,0 +1,355 @@
+use super::*;
+use nalgebra::{Rotation3, Vector2, Vector3};
+use neat_core::{CircularArc, Wireframe3d};
+use std::f64::consts::{PI, TAU};
+
+#[derive(Default)]
+struct Model {
+    wireframe: Wireframe3d,
+    arcs: Vec<CircularArc>,
+}
+
+impl Model {
+    /// The edges of a prism over a polygon, between two heights.
+    fn prism(mut self, corners: &[[f64; 2]], heights: [f64; 2]) -> Self {
+        let count = corners.len();
+        let first = self.wireframe.junctions.len();
+        for height in heights {
+            let at_height = corners.iter().map(|[x, y]| Vector3::new(*x, *y, height));
+            self.wireframe.junctions.extend(at_height);
+        }
+        for k in 0..count {
+            let (here, next) = (first + k, first + (k + 1) % count);
+            let edges = [
+                [here, next],
+                [count + here, count + next],
+                [here, count + here],
+            ];
+            self.wireframe.edges.extend(edges);
+        }
+        self
+    }
+
+    fn circle(mut self, center: [f64; 3], radius: f64, angles: [f64; 2]) -> Self {
+        self.arcs.push(CircularArc {
+            center: center.into(),
+            axes: [Vector3::x(), Vector3::y()],
+            radius,
+            angles,
+        });
+        self
+    }
+
+    /// Turned and moved, so that no axis is special.
+    fn turned(mut self) -> Self {
+        let turn = Rotation3::new(Vector3::new(0.3, -0.7, 0.5));
+        let moved = |p: &Vector3<f64>| turn * p * 1.7 + Vector3::new(0.2, -4.0, 1.0);
+        self.wireframe = self.wireframe.map(moved);
+        self.arcs = self.arcs.iter().map(|arc| arc.map(moved)).collect();
+        self
+    }
+
+    fn shells(&self) -> Vec<Shell> {
+        let graph = MeasuredGraph {
+            wireframe: &self.wireframe,
+            arcs: &self.arcs,
+            covariances: &[],
+        };
+        find_shells(&graph, &[])
+    }
+
+    /// Number of faces and volume of the one shell, which is closed.
+    fn solid(&self) -> (usize, f64) {
+        let shells = self.shells();
+        assert_eq!(shells.len(), 1, "{shells:?}");
+        assert!(shells[0].closed, "{shells:?}");
+        let is_valid = |face: &Face| face.is_valid(&self.wireframe, &self.arcs);
+        assert!(shells[0].faces.iter().all(is_valid));
+        let geometry = ShellGeometry::new(&shells[0], &self.wireframe, &self.arcs);
+        (shells[0].faces.len(), geometry.volume(&shells[0]))
+    }
+}
+
+const SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+const WHOLE: [f64; 2] = [-1.0, -1.0 + TAU];
+/// Volume of the unit cube of a model that is turned.
+const UNIT: f64 = 1.7 * 1.7 * 1.7;
+
+fn assert_solid(model: Model, faces: usize, volume: f64) {
+    let (found, of_model) = model.turned().solid();
+    assert_eq!(found, faces);
+    assert!(
+        (of_model / UNIT - volume).abs() < 1e-9,
+        "{}",
+        of_model / UNIT
+    );
+}
+
+#[test]
+fn prisms_are_solids() {
+    let l_profile = [
+        [0.0, 0.0],
+        [1.0, 0.0],
+        [1.0, 0.3],
+        [0.3, 0.3],
+        [0.3, 1.0],
+        [0.0, 1.0],
+    ];
+    let stairs = [
+        [0.0, 0.0],
+        [1.0, 0.0],
+        [1.0, 0.3],
+        [0.6, 0.3],
+        [0.6, 0.6],
+        [0.3, 0.6],
+        [0.3, 1.0],
+        [0.0, 1.0],
+    ];
+    assert_solid(Model::default().prism(&SQUARE, [0.0, 0.8]), 6, 0.8);
+    assert_solid(Model::default().prism(&l_profile, [0.0, 0.5]), 8, 0.255);
+    assert_solid(
+        Model::default().prism(&stairs, [0.0, 1.0]),
+        10,
+        0.3 + 0.18 + 0.12,
+    );
+}
+
+#[test]
+fn square_holes_have_walls_and_no_lids() {
+    let inner = SQUARE.map(|p| p.map(|x| 0.3 + 0.4 * x));
+    let through = Model::default()
+        .prism(&SQUARE, [0.0, 0.8])
+        .prism(&inner, [0.0, 0.8]);
+    assert_solid(through, 10, 0.8 * 0.84);
+    let blind = Model::default()
+        .prism(&SQUARE, [0.0, 0.8])
+        .prism(&inner, [0.3, 0.8]);
+    assert_solid(blind, 11, 0.8 - 0.5 * 0.16);
+}
+
+#[test]
+fn round_holes_and_pins_are_cylinders() {
+    let block = || Model::default().prism(&SQUARE, [0.0, 0.8]);
+    let [low, high] = [0.0, 0.8].map(|z| [0.4, 0.5, z]);
+    let area = PI * 0.04;
+    let through = block().circle(low, 0.2, WHOLE).circle(high, 0.2, WHOLE);
+    assert_solid(through, 7, 0.8 * (1.0 - area));
+    let blind = block()
+        .circle(high, 0.2, WHOLE)
+        .circle([0.4, 0.5, 0.3], 0.2, WHOLE);
+    assert_solid(blind, 8, 0.8 - 0.5 * area);
+    let pin = block()
+        .circle(high, 0.2, WHOLE)
+        .circle([0.4, 0.5, 1.2], 0.2, WHOLE);
+    assert_solid(pin, 8, 0.8 + 0.4 * area);
+    let disc = Model::default()
+        .circle(low, 0.2, WHOLE)
+        .circle(high, 0.2, WHOLE);
+    assert_solid(disc, 3, 0.8 * area);
+}
+
+/// A block with a slot whose ends are half round.
+fn slotted_block() -> Model {
+    let corners = [[0.3, 0.4], [0.7, 0.4], [0.7, 0.6], [0.3, 0.6]];
+    let mut slot = Model::default()
+        .prism(&SQUARE, [0.0, 0.8])
+        .prism(&corners, [0.0, 0.8]);
+    let junctions = slot.wireframe.junctions.clone();
+    slot.wireframe.edges.retain(|[a, b]| {
+        let along = junctions[*b] - junctions[*a];
+        *a < 8 || along.x.abs() > 1e-9 || along.z.abs() > 1e-9
+    });
+    for z in [0.0, 0.8] {
+        slot = slot.circle([0.3, 0.5, z], 0.1, [0.5 * PI, 1.5 * PI]);
+        slot = slot.circle([0.7, 0.5, z], 0.1, [-0.5 * PI, 0.5 * PI]);
+    }
+    slot
+}
+
+/// A cube with one rounded edge.
+fn rounded_block() -> Model {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.7], [0.7, 1.0], [0.0, 1.0]];
+    let mut rounded = Model::default().prism(&corners, [0.0, 1.0]);
+    let junctions = rounded.wireframe.junctions.clone();
+    rounded.wireframe.edges.retain(|[a, b]| {
+        let along = junctions[*b] - junctions[*a];
+        along.x.abs() < 1e-9 || along.y.abs() < 1e-9
+    });
+    for z in [0.0, 1.0] {
+        rounded = rounded.circle([0.7, 0.7, z], 0.3, [0.0, 0.5 * PI]);
+    }
+    rounded
+}
+
+#[test]
+fn rounded_ends_are_parts_of_cylinders() {
+    assert_solid(slotted_block(), 10, 0.8 * (1.0 - 0.08 - PI * 0.01));
+    assert_solid(rounded_block(), 7, 1.0 - 0.09 + 0.25 * PI * 0.09);
+}
+
+#[test]
+fn what_does_not_close_is_a_sheet() {
+    // A box without the edge at one corner has three faces, or a hole whose bottom is missing.
+    let mut open = Model::default().prism(&SQUARE, [0.0, 1.0]);
+    open.wireframe.edges.retain(|edge| *edge != [0, 1]);
+    let shells = open.shells();
+    assert_eq!(
+        (shells.len(), shells[0].closed, shells[0].faces.len()),
+        (1, false, 4)
+    );
+    let half = Model::default()
+        .prism(&SQUARE, [0.0, 0.8])
+        .circle([0.4, 0.5, 0.8], 0.2, WHOLE);
+    let shells = half.shells();
+    assert_eq!(
+        (shells.len(), shells[0].closed, shells[0].faces.len()),
+        (1, false, 6)
+    );
+    assert!(Model::default().shells().is_empty());
+}
+
+#[test]
+fn nothing_is_seen_within_a_solid() {
+    let mut hollow = Model::default().prism(&SQUARE, [0.0, 1.0]);
+    hollow
+        .wireframe
+        .junctions
+        .extend([[0.4, 0.4, 0.4], [0.6, 0.5, 0.6]].map(Vector3::from));
+    hollow.wireframe.edges.push([8, 9]);
+    assert!(!hollow.shells()[0].closed);
+    // Nor is there a face without a hole where the rim of one is, …
+    let mut put = |ends: [[f64; 3]; 2]| {
+        hollow.wireframe.junctions[8..].copy_from_slice(&ends.map(Vector3::from));
+        hollow.shells()[0].closed
+    };
+    assert!(!put([[0.4, 0.4, 1.0], [0.6, 0.5, 1.0]]));
+    // … but what lies outside, or is an edge once more, is none of the solid's business.
+    assert!(put([[0.4, 0.4, 1.4], [0.6, 0.5, 1.6]]));
+    assert!(put([[0.1, 0.005, 1.0], [0.7, 0.005, 1.0]]));
+}
+
+#[test]
+fn a_shell_that_falls_apart_is_several() {
+    // Something ends on the side of a pin: its two ends are left.
+    let pin = Model::default().circle([0.0, 0.0, 0.0], 0.2, WHOLE);
+    let mut pin = pin.circle([0.0, 0.0, 1.0], 0.2, WHOLE);
+    let on_side = [[0.2, 0.0, 0.3], [0.2, 0.0, 0.7]].map(Vector3::from);
+    pin.wireframe.junctions.extend(on_side);
+    pin.wireframe.edges.push([0, 1]);
+    let shells = pin.shells();
+    let faces: Vec<(bool, usize)> = shells
+        .iter()
+        .map(|shell| (shell.closed, shell.faces.len()))
+        .collect();
+    assert_eq!(faces, [(false, 1), (false, 1)]);
+}
+
+#[test]
+fn geometry_lies_on_the_surfaces() {
+    let mut noise = crate::test_scenes::Noise(5);
+    let block = Model::default().prism(&SQUARE, [0.0, 0.8]);
+    let mut block = block
+        .circle([0.4, 0.5, 0.0], 0.2, WHOLE)
+        .circle([0.4, 0.5, 0.8], 0.2, WHOLE);
+    for junction in &mut block.wireframe.junctions {
+        *junction += 5e-4 * noise.vector();
+    }
+    block.arcs[0].radius *= 1.01;
+    let (faces, volume) = block.solid();
+    assert_eq!(faces, 7);
+    assert!((volume - 0.8 * (1.0 - PI * 0.04)).abs() < 3e-3, "{volume}");
+    let shell = &block.shells()[0];
+    let geometry = ShellGeometry::new(shell, &block.wireframe, &block.arcs);
+    for face in &shell.faces {
+        for point in face.steps().flat_map(|step| geometry.points(step, 0.1)) {
+            let off = match face.surface {
+                Surface::Plane { normal, offset } => normal.dot(&point) - offset,
+                Surface::Cylinder {
+                    point: on_axis,
+                    axis,
+                    radius,
+                    ..
+                } => (point - on_axis).cross(&axis).norm() - radius,
+            };
+            assert!(off.abs() < 1e-5, "{off} {:?}", face.surface);
+        }
+    }
+}
+
+#[test]
+fn normals_point_out_and_loops_keep_the_face_on_their_left() {
+    let model = Model::default().prism(&SQUARE, [0.0, 1.0]);
+    for face in &model.shells()[0].faces {
+        let Surface::Plane { normal, offset } = face.surface else {
+            panic!("a cube has planes only");
+        };
+        assert!(normal.dot(&Vector3::repeat(0.5)) < offset);
+        let frame = plane_fit::PlaneFrame::new(normal, offset);
+        let geometry = ShellGeometry::new(&model.shells()[0], &model.wireframe, &[]);
+        let polygon: Vec<Vector2<f64>> = (face.loops[0].iter())
+            .map(|step| frame.coordinates(&geometry.points(step, 0.1)[0]))
+            .collect();
+        assert!((polygon::signed_area(&polygon) - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_similarity_moves_faces() {
+    let model = Model::default().prism(&SQUARE, [0.0, 0.8]);
+    let model = model
+        .circle([0.4, 0.5, 0.0], 0.2, WHOLE)
+        .circle([0.4, 0.5, 0.8], 0.2, WHOLE);
+    for scale in [3.0, -3.0] {
+        let moved = |p: &Vector3<f64>| p * scale + Vector3::new(5.0, -1.0, 2.0);
+        let shell = model.shells()[0].map(moved);
+        let wireframe = model.wireframe.map(moved);
+        let arcs: Vec<CircularArc> = model.arcs.iter().map(|arc| arc.map(moved)).collect();
+        let geometry = ShellGeometry::new(&shell, &wireframe, &arcs);
+        let volume = 27.0 * 0.8 * (1.0 - PI * 0.04);
+        assert!((geometry.volume(&shell) - volume).abs() < 1e-9 * volume);
+        assert!(shell.faces.iter().all(|face| geometry.area(face) > 0.0));
+        assert!(
+            shell
+                .faces
+                .iter()
+                .all(|face| face.is_valid(&wireframe, &arcs))
+        );
+    }
+}
+
+/// Volume between triangles and origin, and whether each side of one is a side of another.
+fn of_triangles(model: &Model) -> (f64, bool) {
+    let document = crate::export::WireframeDocument {
+        arcs: model.arcs.clone(),
+        shells: model.shells(),
+        ..crate::export::WireframeDocument::from(&model.wireframe)
+    };
+    let points = document.drawn().junctions;
+    let triangles = document.drawn_triangles();
+    let volume = |[a, b, c]: &[usize; 3]| points[*a].dot(&points[*b].cross(&points[*c])) / 6.0;
+    let sides = |[a, b, c]: &[usize; 3]| [[*a, *b], [*b, *c], [*c, *a]];
+    let mut all: Vec<[usize; 2]> = triangles.iter().flat_map(sides).collect();
+    let mut back: Vec<[usize; 2]> = all.iter().map(|[a, b]| [*b, *a]).collect();
+    all.sort_unstable();
+    back.sort_unstable();
+    (triangles.iter().map(volume).sum(), all == back)
+}
+
+#[test]
+fn triangles_of_a_solid_are_watertight() {
+    let block = || Model::default().prism(&SQUARE, [0.0, 0.8]);
+    let through =
+        block()
+            .circle([0.4, 0.5, 0.0], 0.2, WHOLE)
+            .circle([0.4, 0.5, 0.8], 0.2, [2.0, 2.0 + TAU]);
+    let pin = block()
+        .circle([0.4, 0.5, 0.8], 0.2, WHOLE)
+        .circle([0.4, 0.5, 1.2], 0.2, WHOLE);
+    for model in [block(), through, pin, rounded_block(), slotted_block()] {
+        let model = model.turned();
+        let (volume, watertight) = of_triangles(&model);
+        assert!(watertight);
+        let exact = model.solid().1;
+        assert!((volume / exact - 1.0).abs() < 2e-3, "{volume} {exact}");
+    }
+}
