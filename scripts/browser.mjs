@@ -118,8 +118,8 @@ export class Browser {
   }
 
   /** Waits until an expression of the page is true. */
-  async until(expression, otherwise) {
-    const end = Date.now() + ANSWER_MILLISECONDS;
+  async until(expression, otherwise, milliseconds = ANSWER_MILLISECONDS) {
+    const end = Date.now() + milliseconds;
     while (Date.now() < end) {
       if (await this.evaluate(expression)) return;
       await new Promise((resolve) => setTimeout(resolve, 50));

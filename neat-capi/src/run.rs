@@ -77,8 +77,8 @@ pub enum Told {
 }
 
 impl Told {
-    fn of(event: Event<'_>) -> Self {
-        match event {
+    fn of(event: Event<'_>) -> Option<Self> {
+        Some(match event {
             Event::StageStarted(stage) => Self::Stage(stage.to_string()),
             Event::StageProgress { fraction, .. } | Event::Step { fraction, .. } => {
                 Self::Progress(fraction)
@@ -91,7 +91,9 @@ impl Told {
             }
             Event::Warning(warning) => Self::Warning(warning.to_string()),
             Event::FileWritten(path) => Self::File(path.display().to_string()),
-        }
+            // How far the detection has come is told beside it.
+            Event::Detected(_) => return None,
+        })
     }
 }
 
@@ -143,7 +145,7 @@ impl Request {
         let options = self.options()?;
         let cancelled = AtomicBool::new(false);
         let result = reconstruct(&options, &cancelled, &mut |event| {
-            if !listen(&Told::of(event)) {
+            if Told::of(event).is_some_and(|told| !listen(&told)) {
                 cancelled.store(true, Ordering::Relaxed);
             }
         });

@@ -75,7 +75,7 @@ impl Progress {
                 self.line(&format!("training goes on after step {step} of {steps}"));
             }
             Event::Warning(warning) => self.print(&format!("warning: {warning}")),
-            Event::FileWritten(_) => {}
+            Event::Detected(_) | Event::FileWritten(_) => {}
         }
     }
 

@@ -195,7 +195,16 @@ fn temporary_name(path: &Path) -> PathBuf {
     static WRITTEN: AtomicU64 = AtomicU64::new(0);
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let count = WRITTEN.fetch_add(1, Ordering::Relaxed);
-    path.with_file_name(format!(".{name}.{}.{count}.tmp", std::process::id()))
+    path.with_file_name(format!(".{name}.{}.{count}.tmp", process_id()))
+}
+
+/// WASI numbers no processes, and asking for a number ends the program: it is alone there.
+fn process_id() -> u32 {
+    if cfg!(target_os = "wasi") {
+        0
+    } else {
+        std::process::id()
+    }
 }
 
 /// Whether a file or folder has the name that [`write_atomically`] and

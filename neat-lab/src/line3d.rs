@@ -65,7 +65,7 @@ pub fn reconstruct_line3d(
     Ok(Line3dResult {
         segments: segments.len(),
         seconds,
-        agreement: agreement(&scene, config, &in_world),
+        agreement: agreement(&scene, config.data.min_segment_score, &in_world),
         file: path("json"),
     })
 }

@@ -5,6 +5,7 @@ use crate::event::Stage;
 use crate::plan::PlanError;
 use crate::run_dir::RunDirError;
 use neat_core::SceneError;
+use neat_images::error::ImagesError;
 use neat_report::ReportError;
 use neat_tensor::BackendError;
 use neat_tensor::checkpoint::CheckpointError;
@@ -87,6 +88,17 @@ pub enum PipelineError {
         /// What the backend said.
         reason: String,
     },
+}
+
+impl From<ImagesError> for PipelineError {
+    fn from(error: ImagesError) -> Self {
+        match error {
+            ImagesError::Scene(error) => Self::Scene(error),
+            ImagesError::Detector(error) => Self::Detector(error),
+            ImagesError::NotReady(problems) => Self::NotReady(problems),
+            ImagesError::InterruptedIn(stage) => Self::InterruptedIn(stage),
+        }
+    }
 }
 
 impl From<PlanError> for PipelineError {

@@ -36,14 +36,14 @@
 
 #![forbid(unsafe_code)]
 
+pub use neat_images::detection;
+
 mod changes;
 pub mod config;
-pub mod detection;
 pub mod distill;
 pub mod error;
 pub mod event;
 pub mod manifest;
-mod overlay;
 pub mod plan;
 pub mod reconstruct;
 pub mod render;

@@ -70,13 +70,22 @@ fn script() -> String {
 /// Only this script and this style run, photographs come from the page itself, and
 /// nothing is fetched from anywhere.
 fn policy(script: &str) -> String {
-    let hash = |text: &str| BASE64_STANDARD.encode(Sha256::digest(text.as_bytes()));
     format!(
-        "default-src 'none'; script-src 'sha256-{}'; style-src 'sha256-{}'; img-src data:; \
+        "default-src 'none'; script-src '{}'; style-src '{}'; img-src data:; \
          base-uri 'none'; form-action 'none'",
-        hash(script),
-        hash(STYLE)
+        source(script),
+        source(STYLE)
     )
+}
+
+/// The script and the style of every page, as sources of a content security policy.
+pub(crate) fn sources() -> [String; 2] {
+    [source(&script()), source(STYLE)]
+}
+
+fn source(text: &str) -> String {
+    let hash = BASE64_STANDARD.encode(Sha256::digest(text.as_bytes()));
+    format!("sha256-{hash}")
 }
 
 #[cfg(test)]

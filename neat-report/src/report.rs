@@ -124,6 +124,17 @@ impl Report {
         page::render(self)
     }
 
+    /// The script and the style that are in every page, as sources of a content security
+    /// policy: who shows a report in a frame that it fills itself has to allow them.
+    ///
+    /// ```
+    /// let [script, style] = neat_report::Report::policy_sources();
+    /// assert!(script.starts_with("sha256-") && style.starts_with("sha256-"));
+    /// ```
+    pub fn policy_sources() -> [String; 2] {
+        page::sources()
+    }
+
     /// Writes the page, completely or not at all.
     ///
     /// # Errors

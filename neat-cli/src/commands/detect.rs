@@ -7,6 +7,7 @@ use crate::progress::Progress;
 use clap::Args;
 use neat_pipeline::config::{Preset, apply_overrides};
 use neat_pipeline::detection::{DetectOptions, SegmentSource, detect_folder};
+use neat_pipeline::error::PipelineError;
 use std::path::PathBuf;
 
 /// Detect the 2D wireframe of every image in a folder
@@ -77,7 +78,8 @@ impl DetectArgs {
             memory_limit: self.memory.limit(),
         };
         let mut progress = Progress::new(quiet);
-        let detected = detect_folder(&options, &mut |event| progress.show(event))?;
+        let detected = detect_folder(&options, &mut |event| progress.show(event))
+            .map_err(PipelineError::from)?;
         drop(progress);
         let mut edges: Vec<usize> = detected.iter().map(|one| one.edges).collect();
         edges.sort_unstable();

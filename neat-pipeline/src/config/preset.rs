@@ -127,11 +127,24 @@ impl FromStr for Preset {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Choice, FieldUse, Partners, apply_overrides};
+    use crate::config::{Choice, DataConfig, FieldUse, Partners, apply_overrides};
     use crate::plan::settle_field_use;
+    use neat_detect::DetectorConfig;
     use neat_gjp::JunctionCount;
     use neat_tensor::Kernels;
     use neat_train::config::TrainingConfig;
+    use neat_wireframe::assemble::AssembleConfig;
+    use neat_wireframe::confidence::ConfidenceConfig;
+
+    /// Who makes wireframes without presets, as a page in a browser, has these.
+    #[test]
+    fn defaults_of_the_parts_are_those_of_the_default_preset() {
+        let config = Preset::default().config();
+        assert_eq!(config.data, DataConfig::default());
+        assert_eq!(config.detect, DetectorConfig::default());
+        assert_eq!(config.distill.assembler, AssembleConfig::default());
+        assert_eq!(config.distill.confidence, ConfidenceConfig::default());
+    }
 
     #[test]
     fn every_preset_survives_the_way_to_disk_and_back() {

@@ -3,6 +3,7 @@
 use super::session::Session;
 use crate::config::OverlayGround;
 use crate::error::PipelineError;
+use neat_images::distilled::result_facts;
 use neat_report::{Curve, FactGroup, JunctionSnapshot, PhotographConfig, Report};
 use neat_train::LOSS_TERMS;
 use neat_train::step_log::{JunctionsLine, read_log};
@@ -60,23 +61,7 @@ impl Session<'_> {
         agreement: Option<ImageEvidence>,
     ) -> Vec<FactGroup> {
         let manifest = &self.manifest;
-        let mut result = vec![
-            ("Junctions", document.junctions.len().to_string()),
-            ("Edges", document.edges.len().to_string()),
-        ];
-        if let Some(curved) = &document.edge_fields.curved {
-            let pieces = curved.iter().filter(|is_piece| **is_piece).count();
-            result.push(("Of them pieces of curves", pieces.to_string()));
-        }
-        if let Some(agreement) = agreement {
-            let explained = agreement.explained_length_share.map(|share| {
-                let percent = format!("{:.0} % of their length", 100.0 * share);
-                ("2D segments explained", percent)
-            });
-            let off = agreement.mean_reprojection_error_in_pixels;
-            let off = off.map(|pixels| ("Mean distance from them", format!("{pixels:.2} px")));
-            result.extend(explained.into_iter().chain(off));
-        }
+        let result = result_facts(document, agreement);
         let run = vec![
             ("Scene", self.scene.name.clone()),
             ("Preset", manifest.preset.clone()),

@@ -2,15 +2,17 @@
 
 use super::Reconstruction;
 use super::session::Session;
-use crate::config::OverlayGround;
+use crate::config::{OverlayGround, Partners};
 use crate::distill::{Cancelled, Distilled, agreement, distill};
 use crate::error::PipelineError;
-use crate::event::{Event, POSES, Stage, WarningKind};
+use crate::event::{Event, Stage, WarningKind};
 use crate::manifest::Manifest;
-use crate::overlay::{draw_overlay, draw_sketch, draw_wireframe};
 use crate::scene::spread_views;
 use neat_core::file::write_png;
-use neat_core::{Camera, Scene, View, Wireframe3d, file};
+use neat_core::{View, Wireframe3d, file};
+use neat_images::distilled::{AGREEMENT_KEY, REPORT_KEY};
+use neat_images::event::POSES;
+use neat_images::overlay::{draw_overlay, draw_sketch, draw_wireframe};
 use neat_report::ReportError;
 use neat_train::TrainedField;
 use neat_wireframe::export::{WireframeDocument, read_json, write_json, write_obj, write_ply};
@@ -25,11 +27,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const OVERLAYS: usize = 6;
 /// Photographs that are in memory for that at once.
 const OVERLAYS_AT_ONCE: usize = 2;
-
-/// Keys of the metadata of `wireframe.json`.
-const REPORT: &str = "report";
-const AGREEMENT: &str = "agreement";
-const REFINED_POSES: &str = "refined_poses";
 
 impl Session<'_> {
     /// Warnings and decisions about an earlier result, which a new one replaces.
@@ -51,8 +48,8 @@ impl Session<'_> {
         Some(Reconstruction {
             run: self.dir.clone(),
             wireframe: document.wireframe(),
-            agreement: serde_json::from_value(of(AGREEMENT)).ok()?,
-            report: serde_json::from_value(of(REPORT)).ok(),
+            agreement: serde_json::from_value(of(AGREEMENT_KEY)).ok()?,
+            report: serde_json::from_value(of(REPORT_KEY)).ok(),
         })
     }
 
@@ -82,15 +79,16 @@ impl Session<'_> {
             self.tell(Event::Decided(moved));
         }
         if distilled.wireframe.edges.is_empty() {
-            let partners = self.plan.config().distill.partners;
-            let why = distilled.report.why_empty(partners);
+            let asked_field = self.plan.config().distill.partners == Partners::Field;
+            let why = distilled.report.why_empty(asked_field);
             self.warn(
                 WarningKind::NoEdges,
                 format!("the wireframe has no edges: {why}"),
             );
         }
         let scene = distilled.refined_scene.as_ref().unwrap_or(&self.scene);
-        let agreement = agreement(scene, self.plan.config(), &distilled.wireframe);
+        let min_score = self.plan.config().data.min_segment_score;
+        let agreement = agreement(scene, min_score, &distilled.wireframe);
         let (wireframe, document) = self.stage(Stage::Export, |session| {
             session.export(&distilled, agreement)
         })?;
@@ -171,8 +169,6 @@ impl Session<'_> {
         distilled: &Distilled,
         agreement: Option<ImageEvidence>,
     ) -> BTreeMap<String, serde_json::Value> {
-        let refined = distilled.refined_scene.as_ref().map(poses_in_original);
-        let refined = refined.map(|poses| (REFINED_POSES, json!(poses)));
         let facts = [
             ("neat", json!(self.manifest.neat)),
             ("scene", json!(self.scene.name)),
@@ -182,24 +178,9 @@ impl Session<'_> {
             ("steps", json!(self.manifest.steps)),
             // `neat distill` may have chosen others than those of config.toml.
             ("distill", json!(self.plan.config().distill)),
-            (REPORT, json!(distilled.report)),
-            (AGREEMENT, json!(agreement)),
         ];
-        (facts.into_iter().chain(refined))
-            .map(|(key, value)| (key.to_owned(), value))
-            .collect()
+        let mut metadata = distilled.metadata(agreement);
+        metadata.extend(facts.map(|(key, value)| (key.to_owned(), value)));
+        metadata
     }
-}
-
-/// For each view the rows of its camera-to-world matrix, in the frame of the user's files.
-fn poses_in_original(scene: &Scene) -> BTreeMap<&str, [[f64; 4]; 3]> {
-    let pose = |camera: &Camera| {
-        let camera = scene.original_from_world.apply_to_camera(camera);
-        let (center, turn) = (camera.center_in_world, camera.world_from_camera);
-        [0, 1, 2].map(|row| [turn[(row, 0)], turn[(row, 1)], turn[(row, 2)], center[row]])
-    };
-    let views = scene.views.iter();
-    views
-        .map(|view| (view.name.as_str(), pose(&view.camera)))
-        .collect()
 }

@@ -41,20 +41,20 @@ impl<'de, T: Deserialize<'de>> Deserialize<'de> for Choice<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::FieldUse;
+    use crate::config::Background;
 
     #[test]
     fn a_choice_is_a_word() {
-        let read = |text: &str| serde_json::from_str::<Choice<FieldUse>>(text);
+        let read = |text: &str| serde_json::from_str::<Choice<Background>>(text);
         for (text, choice) in [
             ("\"auto\"", Choice::Auto),
-            ("\"trained\"", Choice::Given(FieldUse::Trained)),
+            ("\"photo\"", Choice::Given(Background::Photo)),
         ] {
             assert_eq!(read(text).unwrap(), choice);
             assert_eq!(serde_json::to_string(&choice).unwrap(), text);
         }
-        let error = read("\"trainde\"").unwrap_err().to_string();
-        assert!(error.contains("`none` or `auto`"), "{error}");
+        let error = read("\"phtoo\"").unwrap_err().to_string();
+        assert!(error.contains("`photo` or `auto`"), "{error}");
         assert!(read("3").is_err());
     }
 }

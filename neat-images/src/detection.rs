@@ -4,7 +4,7 @@ mod folder;
 
 pub use folder::{DetectOptions, Detected, SegmentSource, detect_folder};
 
-use crate::error::PipelineError;
+use crate::error::ImagesError;
 use crate::event::{Event, OnEvent, Stage, Warning, WarningKind};
 use crate::resources::Resources;
 use image::RgbImage;
@@ -31,15 +31,15 @@ const DETECTOR_VERSION: u32 = 1;
 ///
 /// # Errors
 /// If the configuration is out of range, or no view has a segment;
-/// [`PipelineError::InterruptedIn`] once that is wanted.
-pub fn detect_wireframes(
+/// [`ImagesError::InterruptedIn`] once that is wanted.
+pub fn detect_wireframes<R>(
     scene: &mut Scene,
     dir: &Path,
     config: &DetectorConfig,
     min_segment_score: f64,
     resources: Resources<'_>,
-    on_event: OnEvent<'_>,
-) -> Result<(), PipelineError> {
+    on_event: OnEvent<'_, R>,
+) -> Result<(), ImagesError> {
     config.validate()?;
     let memory_limit = resources.memory_limit;
     let warn = |text: String| Event::Warning(Warning::new(WarningKind::Detection, text));
@@ -51,7 +51,7 @@ pub fn detect_wireframes(
     // Some at a time, so that progress can be told in between.
     for chunk in scene.views.chunks_mut(4 * rayon::current_num_threads()) {
         if resources.is_cancelled() {
-            return Err(PipelineError::InterruptedIn(Stage::Detect));
+            return Err(ImagesError::InterruptedIn(Stage::Detect));
         }
         let cache = resources.cache;
         let found =
@@ -66,6 +66,7 @@ pub fn detect_wireframes(
                 cache_works = false;
                 on_event(warn(warning));
             }
+            on_event(Event::Detected(view));
         }
         done += chunk.len();
         on_event(Event::StageProgress {
@@ -81,7 +82,7 @@ pub fn detect_wireframes(
     }
     scene.retain_views(has_segments);
     if scene.views.is_empty() {
-        return Err(PipelineError::Scene(SceneError::NoUsableView {
+        return Err(ImagesError::Scene(SceneError::NoUsableView {
             path: dir.into(),
             views,
             min_segment_score,
@@ -160,10 +161,7 @@ mod tests {
         }
     }
 
-    fn detected(
-        scene: &mut Scene,
-        cache: Option<&FileCache>,
-    ) -> Result<Vec<String>, PipelineError> {
+    fn detected(scene: &mut Scene, cache: Option<&FileCache>) -> Result<Vec<String>, ImagesError> {
         let mut warnings = Vec::new();
         detect_wireframes(
             scene,
@@ -171,7 +169,7 @@ mod tests {
             &DetectorConfig::default(),
             0.05,
             with(cache),
-            &mut |event| {
+            &mut |event: Event<'_, ()>| {
                 if let Event::Warning(warning) = event {
                     warnings.push(warning.message);
                 }
@@ -216,7 +214,7 @@ mod tests {
             &config,
             0.05,
             with(Some(&cache)),
-            &mut |_| {},
+            &mut |_: Event<'_, ()>| {},
         )
         .unwrap();
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 6);

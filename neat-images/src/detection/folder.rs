@@ -1,7 +1,7 @@
 //! 2D wireframes of a folder of images, as files.
 
 use super::{BYTES_PER_PIXEL, DETECTED_WITH_PIXEL_CENTER, DETECTING};
-use crate::error::PipelineError;
+use crate::error::ImagesError;
 use crate::event::{Event, OnEvent, Stage, timed};
 use crate::overlay::draw_detection;
 use image::RgbImage;
@@ -61,10 +61,10 @@ pub struct Detected {
 /// # Errors
 /// If the settings are out of range, there is no image, an image or the file of its
 /// segments cannot be read, or a result cannot be written.
-pub fn detect_folder(
+pub fn detect_folder<R>(
     options: &DetectOptions,
-    on_event: OnEvent<'_>,
-) -> Result<Vec<Detected>, PipelineError> {
+    on_event: OnEvent<'_, R>,
+) -> Result<Vec<Detected>, ImagesError> {
     options.config.validate()?;
     let images = list_images(&options.images)?;
     if images.is_empty() {
@@ -76,7 +76,7 @@ pub fn detect_folder(
     }
     let mut names = BTreeSet::new();
     if let Some(path) = images.iter().find(|path| !names.insert(path.file_stem())) {
-        return Err(PipelineError::Scene(SceneError::Malformed {
+        return Err(ImagesError::Scene(SceneError::Malformed {
             path: path.clone(),
             reason: "another image has this name with another ending: rename one".into(),
         }));
@@ -243,7 +243,7 @@ mod tests {
             SegmentSource::EdgeMaps(dir.path().join("edges")),
         ] {
             let options = options(dir.path(), source);
-            let detected = detect_folder(&options, &mut |_| {}).unwrap();
+            let detected = detect_folder(&options, &mut |_: Event<'_, ()>| {}).unwrap();
             assert_eq!(detected.len(), 2);
             for one in detected {
                 assert!(one.edges > 3, "{:?}: {one:?}", options.source);
@@ -263,7 +263,7 @@ mod tests {
     fn what_is_missing_is_named() {
         let dir = tempfile::tempdir().unwrap();
         let message = |options: &DetectOptions| {
-            let error = detect_folder(options, &mut |_| {}).unwrap_err();
+            let error = detect_folder(options, &mut |_: Event<'_, ()>| {}).unwrap_err();
             error.to_string()
         };
         let built_in = options(dir.path(), SegmentSource::BuiltIn);

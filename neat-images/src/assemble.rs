@@ -1,0 +1,150 @@
+//! From the images of a scene to its wireframe: edgels, the assembler, and how sure it is.
+
+use crate::distilled::{BackEndReport, Distilled};
+use nalgebra::Matrix4;
+use neat_core::{Camera, CircularArc, EdgelMap, Scene, SceneError, Wireframe3d};
+use neat_detect::{DetectorConfig, edgel_maps};
+use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble_with_progress};
+use neat_wireframe::confidence::{ConfidenceConfig, assess};
+use neat_wireframe::faces::{MeasuredGraph, find_shells};
+use neat_wireframe::kinds::edge_kinds;
+use neat_wireframe::paper::NeatLine;
+use neat_wireframe::validity::WireframeFlaw;
+use neat_wireframe::{SignedDistance, ViewObservation};
+use std::ops::ControlFlow;
+
+/// Who listens to the progress wants the distillation to end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("interrupted")]
+pub struct Cancelled;
+
+/// Receives the share that is done, from 0 to 1, and says whether to go on.
+pub type OnProgress<'a> = &'a mut dyn FnMut(f64) -> Result<(), Cancelled>;
+
+/// Why no wireframe could be made of images.
+#[derive(Debug, thiserror::Error)]
+pub enum AssembleError {
+    /// Nobody wants it any more.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// An image lies in a file that cannot be read.
+    #[error(transparent)]
+    Image(#[from] SceneError),
+    /// The wireframe has a point that is no point.
+    #[error("the wireframe is not valid")]
+    Invalid(#[from] WireframeFlaw),
+}
+
+/// What a back end has made, before it is asked how sure that is.
+#[derive(Clone, Debug)]
+pub struct Draft {
+    /// In the world frame of the scene's cameras.
+    pub wireframe: Wireframe3d,
+    /// Arcs of circles beside its edges, likewise.
+    pub arcs: Vec<CircularArc>,
+    /// How sure their centres and radii are, see [`Assembled::arc_covariances`].
+    pub arc_covariances: Vec<Option<Matrix4<f64>>>,
+    /// What each step kept and removed.
+    pub report: BackEndReport,
+    /// The cameras where the images show the wireframe, if they were moved.
+    pub refined_cameras: Option<Vec<Camera>>,
+}
+
+/// The assembler, which asks the images. `lines` are NEAT lines of the 2D segments of
+/// each view: they take the place of epipolar matches. `views` is of the same scene.
+///
+/// # Errors
+/// If an image lies in a file that cannot be read, or `progress` says so.
+pub fn assemble_images(
+    scene: &Scene,
+    views: &[ViewObservation],
+    lines: Option<&[Vec<NeatLine>]>,
+    scene_radius: f64,
+    detector: &DetectorConfig,
+    config: &AssembleConfig,
+    progress: OnProgress<'_>,
+) -> Result<Draft, AssembleError> {
+    let edgels = edgels(scene, detector, &mut |share| progress(share / 3.0))?;
+    let on_progress = &mut |share| match progress((1.0 + 2.0 * share) / 3.0) {
+        Ok(()) => ControlFlow::Continue(()),
+        Err(Cancelled) => ControlFlow::Break(()),
+    };
+    match assemble_with_progress(views, &edgels, lines, scene_radius, config, on_progress) {
+        ControlFlow::Continue(built) => Ok(Draft::from(built)),
+        ControlFlow::Break(()) => Err(Cancelled.into()),
+    }
+}
+
+impl From<Assembled> for Draft {
+    fn from(built: Assembled) -> Self {
+        Self {
+            wireframe: built.wireframe,
+            arcs: built.arcs,
+            arc_covariances: built.arc_covariances,
+            report: BackEndReport::Assembler {
+                steps: built.report,
+            },
+            refined_cameras: built.refined_cameras,
+        }
+    }
+}
+
+impl Draft {
+    /// Asks the images, and the surface that may hide things where one is given, how sure
+    /// everything is and what each edge is.
+    ///
+    /// # Errors
+    /// If an image lies in a file that cannot be read, or the wireframe is not valid.
+    pub fn assess(
+        self,
+        scene: &Scene,
+        min_segment_score: f64,
+        hiding: Option<&dyn SignedDistance>,
+        scene_radius: f64,
+        config: &ConfidenceConfig,
+    ) -> Result<Distilled, AssembleError> {
+        let refined_scene =
+            (self.refined_cameras).map(|cameras| scene.clone().with_cameras(&cameras));
+        // The images are asked from where they show the wireframe.
+        let scene = refined_scene.as_ref().unwrap_or(scene);
+        let views = ViewObservation::from_scene(scene, min_segment_score);
+        let confidence = assess(&self.wireframe, &views, hiding, scene_radius, config)?;
+        let edges = confidence.edges.iter();
+        let shown: Vec<Vec<usize>> = edges.map(|edge| edge.showing_views.clone()).collect();
+        let kinds = edge_kinds(&self.wireframe, scene, &shown)?;
+        let junctions = confidence.junctions.iter();
+        let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
+        let graph = MeasuredGraph {
+            wireframe: &self.wireframe,
+            arcs: &self.arcs,
+            covariances: &covariances,
+        };
+        let shells = find_shells(&graph, &views);
+        Ok(Distilled {
+            wireframe: self.wireframe,
+            arcs: self.arcs,
+            shells,
+            arc_covariances: self.arc_covariances,
+            confidence,
+            kinds,
+            report: self.report,
+            refined_scene,
+        })
+    }
+}
+
+/// The edgels of all images.
+fn edgels(
+    scene: &Scene,
+    config: &DetectorConfig,
+    progress: OnProgress<'_>,
+) -> Result<Vec<EdgelMap>, AssembleError> {
+    let views = &scene.views;
+    let mut maps = Vec::with_capacity(views.len());
+    // Some at a time, so that progress can be told in between.
+    for chunk in views.chunks(4 * rayon::current_num_threads()) {
+        maps.extend(edgel_maps(chunk, config, scene.pixel_center)?);
+        progress(maps.len() as f64 / views.len() as f64)?;
+    }
+    Ok(maps)
+}
