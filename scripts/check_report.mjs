@@ -131,7 +131,15 @@ async function checkDesktop(browser) {
 
 async function checkControls(browser) {
   await open(browser, sample, DESKTOP);
+  // A face alone is lighter than what counts as drawn, but not two before each other.
+  const withFaces = await drawnPixels(browser);
+  assert.ok(await browser.evaluate("neat.data.faces.length") > 5, "the sample has no faces");
+  const facesPressed = () => browser.evaluate("document.querySelector('#show-faces').getAttribute('aria-pressed')");
+  assert.equal(await facesPressed(), "true");
+  await browser.clickOn("#show-faces");
+  assert.equal(await facesPressed(), "false");
   const all = await drawnPixels(browser);
+  assert.ok(all < 0.5 * withFaces, "hidden faces are still drawn");
   const total = await browser.evaluate("neat.data.edges.length");
   await slide(browser, ".panel input[aria-label='Minimum probability']", 0.5);
   const shown = await browser.evaluate("neat.viewer.visibleCount");
@@ -323,6 +331,7 @@ async function checkHostile(browser) {
 async function checkEmpty(browser) {
   await open(browser, empty, DESKTOP);
   assert.match(await text(browser, "#notice"), /no segments/);
+  assert.ok(await browser.evaluate("document.querySelector('#show-faces').hidden"));
   assert.equal(await browser.evaluate("document.querySelector('#evolution, #charts')"), null);
   for (const [key, code] of [["n", "KeyN"], ["f", "KeyF"], ["0", "Digit0"]]) {
     await browser.evaluate("neat.viewer.canvas.focus()");

@@ -13,6 +13,7 @@ use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
 use neat_core::{LineSegment2, file};
 use neat_report::{Curve, FactGroup, JunctionSnapshot, PhotographConfig, Report, ReportError};
 use neat_wireframe::export::{EdgeFields, JunctionFields, SupportingSegment, WireframeDocument};
+use neat_wireframe::faces::{MeasuredGraph, find_shells};
 use std::error::Error;
 use std::path::PathBuf;
 
@@ -91,6 +92,12 @@ fn empty(sample: &Report) -> Report {
 /// The truth, slightly moved, with two edges too many and what the 2D segments say.
 fn document(data: &SyntheticData) -> WireframeDocument {
     let views = &data.scene.views;
+    let graph = MeasuredGraph {
+        wireframe: &data.truth,
+        arcs: &[],
+        covariances: &[],
+    };
+    let shells = find_shells(&graph, &[]);
     let mut wireframe = data.truth.clone();
     for (index, junction) in wireframe.junctions.iter_mut().enumerate() {
         *junction += wave(index as f64) * 0.002;
@@ -146,6 +153,7 @@ fn document(data: &SyntheticData) -> WireframeDocument {
         },
         views: views.iter().map(|view| view.name.clone()).collect(),
         edge_support: support,
+        shells,
         ..WireframeDocument::from(&wireframe)
     }
 }

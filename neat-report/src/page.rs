@@ -19,6 +19,7 @@ const SCRIPTS: &[&str] = &[
     include_str!("page/orbit.js"),
     include_str!("page/camera_control.js"),
     include_str!("page/webgl_renderer.js"),
+    include_str!("page/faces.js"),
     include_str!("page/canvas_renderer.js"),
     include_str!("page/drawing.js"),
     include_str!("page/photograph.js"),

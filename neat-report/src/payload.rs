@@ -5,6 +5,7 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use neat_wireframe::export::{EdgeFields, JunctionFields, WireframeDocument};
+use neat_wireframe::faces::{CurveIndex, Step};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -17,6 +18,7 @@ pub(crate) struct Payload<'a> {
     edges: &'a [[usize; 2]],
     /// Points along each arc.
     arcs: Vec<Vec<Vector3<f64>>>,
+    faces: Vec<FacePayload>,
     junction_fields: &'a JunctionFields,
     edge_fields: &'a EdgeFields,
     /// Largest standard deviation of each junction, where it is known.
@@ -29,6 +31,14 @@ pub(crate) struct Payload<'a> {
     configuration: &'a str,
     facts: Vec<(&'a str, &'a [(String, String)])>,
     warnings: &'a [String],
+}
+
+#[derive(Serialize)]
+struct FacePayload {
+    /// That bound it, with those of its holes.
+    edges: Vec<usize>,
+    /// Of the junctions, and behind them the points of the arcs: of a whole circle the first once.
+    triangles: Vec<[usize; 3]>,
 }
 
 #[derive(Serialize)]
@@ -86,6 +96,7 @@ impl<'a> Payload<'a> {
             arcs: (document.arcs.iter())
                 .map(|arc| arc.points(WireframeDocument::TURN_OF_DRAWN_ARCS))
                 .collect(),
+            faces: faces(document),
             junction_fields: &document.junction_fields,
             edge_fields: &document.edge_fields,
             sigmas: sigmas(report),
@@ -146,6 +157,20 @@ impl<'a> CurvePayload<'a> {
             points: thinned(&curve.points, Report::MAX_CURVE_POINTS),
         }
     }
+}
+
+fn faces(document: &WireframeDocument) -> Vec<FacePayload> {
+    let faces = document.shells.iter().flat_map(|shell| &shell.faces);
+    let edge = |step: &Step| match step.curve {
+        CurveIndex::Edge(edge) => Some(edge),
+        CurveIndex::Arc(_) => None,
+    };
+    (faces.zip(document.triangles_of_faces()))
+        .map(|(face, triangles)| FacePayload {
+            edges: face.loops.iter().flatten().filter_map(edge).collect(),
+            triangles,
+        })
+        .collect()
 }
 
 /// A hundredth of a pixel is finer than any detector.

@@ -5,16 +5,22 @@ class CanvasRenderer {
     this.canvas = canvas;
     this.kind = "canvas";
     this.layers = new Map();
+    this.triangles = [];
   }
 
   load(layer, batches) {
     this.layers.set(layer, batches);
   }
 
+  loadFaces(triangles) {
+    this.triangles = triangles;
+  }
+
   draw(view) {
     const { matrix, width, height, near, fog, distance } = view;
     const context = sharpContext(this.canvas, width, height);
     context.lineCap = "round";
+    this.drawFaces(context, view);
     const strokes = [];
     for (const { numbers, count, bias, haze, clearance } of [...this.layers.values()].flat()) {
       for (let i = 0; i < 10 * count; i += 10) {
@@ -37,5 +43,21 @@ class CanvasRenderer {
       context.lineTo(b[0] + 0.01, b[1]);
       context.stroke();
     }
+  }
+
+  /** Behind all strokes: nothing tells here what hides what. */
+  drawFaces(context, { matrix, width, height, near }) {
+    context.globalAlpha = FACE_OPACITY;
+    for (const { corners, color } of this.triangles) {
+      const [a, b, c] = corners.map((corner) => project(matrix, corner, width, height));
+      if ([a, b, c].some(([, , depth]) => depth < near)) continue;
+      context.fillStyle = cssColor(scale(color, 255));
+      context.beginPath();
+      context.moveTo(a[0], a[1]);
+      context.lineTo(b[0], b[1]);
+      context.lineTo(c[0], c[1]);
+      context.fill();
+    }
+    context.globalAlpha = 1;
   }
 }

@@ -55,6 +55,7 @@ function theme() {
     ink: read("--ink"),
     muted: read("--camera"),
     accent: read("--accent"),
+    face: read("--face"),
     evolution: read("--evolution"),
   };
   return knownTheme;

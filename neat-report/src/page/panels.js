@@ -99,7 +99,7 @@ function makeToolbar(viewer) {
   byId("zoom-out").addEventListener("click", zoom(1 / 1.3));
   byId("frame").addEventListener("click", () => viewer.fit());
   byId("reset").addEventListener("click", () => viewer.navigator.reset());
-  for (const [id, key] of [["show-cameras", "showCameras"], ["show-junctions", "showJunctions"]]) {
+  for (const [id, key] of [["show-cameras", "showCameras"], ["show-junctions", "showJunctions"], ["show-faces", "showFaces"]]) {
     const button = byId(id);
     const show = () => button.setAttribute("aria-pressed", String(viewer.state[key]));
     button.addEventListener("click", () => viewer.change({ [key]: !viewer.state[key] }));
@@ -107,6 +107,7 @@ function makeToolbar(viewer) {
     show();
   }
   byId("show-cameras").hidden = !viewer.data.views.length;
+  byId("show-faces").hidden = !viewer.data.faces.length;
   const [help, keys] = [byId("show-help"), byId("keys")];
   help.addEventListener("click", () => {
     keys.hidden = !keys.hidden;

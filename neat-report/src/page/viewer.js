@@ -19,6 +19,7 @@ class Viewer {
       onlyStructure: false,
       showCameras: data.views.length > 0,
       showJunctions: true,
+      showFaces: data.faces.length > 0,
       showSegments: false,
       /** { kind: "segment" | "junction" | "view", index } or null. */
       selection: null,
@@ -114,7 +115,10 @@ class Viewer {
   draw() {
     const [width, height] = this.size();
     if (!width || !height) return;
-    if (this.stale) this.renderer.load("scene", drawScene(this));
+    if (this.stale) {
+      this.renderer.loadFaces(drawFaces(this));
+      this.renderer.load("scene", drawScene(this));
+    }
     if (this.stale || this.markedStale) this.renderer.load("marked", drawMarked(this));
     this.stale = this.markedStale = false;
     this.renderer.draw(this.navigator.view(width, height));

@@ -66,6 +66,22 @@ const VERTEX_FLOATS = 12;
 /** Two triangles. */
 const CORNERS = [[0, -1], [1, -1], [0, 1], [0, 1], [1, -1], [1, 1]];
 
+/** A program of two shaders. Throws where they do not work. */
+function linkedProgram(gl, vertex, fragment) {
+  const program = gl.createProgram();
+  for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(type);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+    throw new Error(`the shaders do not work here: ${gl.getProgramInfoLog(program)}`);
+  }
+  return program;
+}
+
 /** The vertices of strokes, see Strokes. */
 function strokeVertices({ numbers, count }) {
   const vertices = new Float32Array(count * CORNERS.length * VERTEX_FLOATS);
@@ -99,18 +115,9 @@ class WebglRenderer {
   /** Everything that lives in the graphics memory, again after it was lost. */
   prepare() {
     const { gl } = this;
-    const program = gl.createProgram();
-    for (const [type, source] of [[gl.VERTEX_SHADER, VERTEX_SHADER], [gl.FRAGMENT_SHADER, FRAGMENT_SHADER]]) {
-      const shader = gl.createShader(type);
-      gl.shaderSource(shader, source);
-      gl.compileShader(shader);
-      gl.attachShader(program, shader);
-    }
-    gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
-      throw new Error(`the shaders do not work here: ${gl.getProgramInfoLog(program)}`);
-    }
-    gl.useProgram(program);
+    const program = linkedProgram(gl, VERTEX_SHADER, FRAGMENT_SHADER);
+    this.program = program;
+    this.faces = new FacePainter(gl);
     this.uniforms = {};
     for (const name of ["clipFromModel", "size", "ratio", "near", "bias", "fog", "clearance", "background", "fringe"]) {
       this.uniforms[name] = gl.getUniformLocation(program, name);
@@ -139,6 +146,11 @@ class WebglRenderer {
     }));
   }
 
+  /** Takes the triangles of the faces to show, see drawFaces. */
+  loadFaces(triangles) {
+    this.faces.load(triangles);
+  }
+
   /** Draws for a view, see Orbit.view. */
   draw(view) {
     const { gl, uniforms, canvas } = this;
@@ -152,12 +164,15 @@ class WebglRenderer {
     gl.clearColor(0, 0, 0, 0);
     gl.depthMask(true);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.useProgram(this.program);
     gl.uniformMatrix4fv(uniforms.clipFromModel, false, new Float32Array(view.matrix));
     gl.uniform2f(uniforms.size, width, height);
     gl.uniform1f(uniforms.ratio, ratio);
     gl.uniform1f(uniforms.near, view.near);
     gl.uniform3fv(uniforms.background, theme().stage.map((c) => c / 255));
     for (const fringe of [0, 1]) {
+      if (fringe) this.faces.draw(view);
+      gl.useProgram(this.program);
       gl.uniform1f(uniforms.fringe, fringe);
       gl.depthMask(!fringe);
       for (const batch of [...this.layers.values()].flat()) this.drawBatch(batch, view);

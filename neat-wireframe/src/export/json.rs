@@ -113,6 +113,11 @@ impl WireframeDocument {
     /// The faces as triangles of the junctions of [`Self::drawn`], counterclockwise as seen from
     /// outside. Those of a closed shell are watertight.
     pub fn drawn_triangles(&self) -> Vec<[usize; 3]> {
+        self.triangles_of_faces().concat()
+    }
+
+    /// Likewise, those of each face of each shell.
+    pub fn triangles_of_faces(&self) -> Vec<Vec<[usize; 3]>> {
         if self.shells.is_empty() {
             return Vec::new();
         }

@@ -1,6 +1,6 @@
 //! Triangles of faces, for what knows neither planes nor cylinders.
 
-use super::face::{CurveIndex, Shell, Step, Surface};
+use super::face::{CurveIndex, Face, Shell, Step, Surface};
 use super::plane_fit::{PlaneFrame, across};
 use earcut::Earcut;
 use nalgebra::{Vector2, Vector3};
@@ -9,7 +9,7 @@ use std::f64::consts::{PI, TAU};
 /// A corner of a loop: the index of its point, and where that lies in the plane.
 type Corner = (usize, Vector2<f64>);
 
-/// The triangles of all faces, counterclockwise as seen from the side to which normals point.
+/// The triangles of each face, counterclockwise as seen from the side to which normals point.
 /// Faces that share a curve share the points along it: the triangles of a closed shell are
 /// watertight.
 ///
@@ -22,9 +22,9 @@ pub(crate) fn triangles(
     edges: &[[usize; 2]],
     chains: &[Vec<usize>],
     points: &[Vector3<f64>],
-) -> Vec<[usize; 3]> {
-    let mut triangles = Vec::new();
-    for face in shells.iter().flat_map(|shell| &shell.faces) {
+) -> Vec<Vec<[usize; 3]>> {
+    let of_face = |face: &Face| {
+        let mut triangles = Vec::new();
         match face.surface {
             Surface::Plane { normal, offset } => {
                 let frame = PlaneFrame::new(normal, offset);
@@ -51,8 +51,10 @@ pub(crate) fn triangles(
                 }
             }
         }
-    }
-    triangles
+        triangles
+    };
+    let faces = shells.iter().flat_map(|shell| &shell.faces);
+    faces.map(of_face).collect()
 }
 
 /// The points along a step of a loop, both ends among them. The ends of an arc are those of the
