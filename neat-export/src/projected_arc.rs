@@ -9,6 +9,10 @@ use std::fmt::Write;
 /// not determined by numbers of a millionth of a pixel.
 const MIN_RADIUS: f64 = 0.01;
 
+/// Shorter pieces, in radians, join the piece beside them: of numbers of a millionth of a pixel
+/// some programs make the whole ellipse instead.
+const MIN_PIECE: f64 = 1e-5;
+
 /// The commands of an SVG path that draw it, by elliptical arcs from one end of the ellipse's
 /// axes to the next.
 pub fn elliptical_path(arc: &CircularArc, drawing: &Drawing) -> String {
@@ -28,8 +32,8 @@ pub fn elliptical_path(arc: &CircularArc, drawing: &Drawing) -> String {
     let start = at(angle);
     let mut path = format!("M{:.6} {:.6}", start.x, start.y);
     while angle < last {
-        let next = ((angle / FRAC_PI_2 + 1e-9).floor() + 1.0) * FRAC_PI_2;
-        angle = next.min(last);
+        let next = (((angle + MIN_PIECE) / FRAC_PI_2).floor() + 1.0) * FRAC_PI_2;
+        angle = if next < last - MIN_PIECE { next } else { last };
         let end = at(angle);
         let _ = write!(
             path,
@@ -40,4 +44,32 @@ pub fn elliptical_path(arc: &CircularArc, drawing: &Drawing) -> String {
         );
     }
     path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ViewDirection;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn no_piece_is_too_short_to_be_told() {
+        // From above it is an ellipse whose longer axis is that of x.
+        for (ends, pieces) in [
+            ([0.0, FRAC_PI_2 + 1e-8], 1),
+            ([-1e-8, FRAC_PI_2], 1),
+            ([0.0, FRAC_PI_2 + 0.01], 2),
+            ([0.0, 4.0 * FRAC_PI_2], 4),
+        ] {
+            let arc = CircularArc {
+                center: Vector3::zeros(),
+                axes: [Vector3::x(), Vector3::new(0.0, 0.6, 0.8)],
+                radius: 1.0,
+                angles: ends,
+            };
+            let drawing = Drawing::new(&arc.points(0.1), ViewDirection::Top, 1000).unwrap();
+            let path = elliptical_path(&arc, &drawing);
+            assert_eq!(path.matches('A').count(), pieces, "{path}");
+        }
+    }
 }
