@@ -31,10 +31,10 @@ def formula(match):
 
 
 for name in sys.argv[1:]:
-    parts = re.split(r"(```.*?```|`[^`\n]*`)", Path(name).read_text(), flags=re.DOTALL)
+    text = re.sub(r"\[([^\]]*)\]\(\.\./[^)]*\)", r"\1", Path(name).read_text())
+    parts = re.split(r"(```.*?```|`[^`\n]*`)", text, flags=re.DOTALL)
     # Every other part is code.
     for k in range(0, len(parts), 2):
-        parts[k] = re.sub(r"\[([^\]]*)\]\(\.\./[^)]*\)", r"\1", parts[k])
         parts[k] = re.sub(r"\$\$(.+?)\$\$|\$([^$\n]+)\$", formula, parts[k], flags=re.DOTALL)
     Path(name).write_text("".join(parts))
 END
