@@ -28,6 +28,7 @@
 //! assert!((geometry.volume(&shells[0]) - 1.0).abs() < 1e-9);
 //! ```
 
+mod bounds;
 mod candidates;
 mod cells;
 mod chain;

@@ -1,13 +1,17 @@
 //! Which planes hold faces: those in which curves of the wireframe lie together, within what is
 //! known of their positions.
 
+use super::bounds::Bounds;
 use super::curves::{Curve, Curves};
 use super::plane_fit::{FittedPlane, PlaneFit};
 use nalgebra::Vector3;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Edges under a smaller sine to each other span no plane.
 const MIN_SINE: f64 = 0.03;
+/// What is asked whether it lies in a plane lies in the box around its curves, but for so many
+/// standard deviations of an arc.
+const REACH: f64 = 4.0;
 /// After so many rounds the curves of a plane are taken as they are.
 const ROUNDS: usize = 4;
 
@@ -23,6 +27,7 @@ pub(super) fn coplanar_curves(curves: &Curves) -> Vec<CoplanarCurves> {
     let mut planes: Vec<CoplanarCurves> = Vec::new();
     // For each curve the planes that hold it.
     let mut planes_of: Vec<BTreeSet<usize>> = vec![BTreeSet::new(); curves.all.len()];
+    let neighbours = Neighbours::new(curves);
     for seed in seeds(curves) {
         let mut of_seed = seed.iter().map(|curve| &planes_of[*curve]);
         let first = of_seed.next().cloned().unwrap_or_default();
@@ -30,7 +35,7 @@ pub(super) fn coplanar_curves(curves: &Curves) -> Vec<CoplanarCurves> {
         if !known.is_empty() {
             continue;
         }
-        let Some(plane) = grown(curves, &seed) else {
+        let Some(plane) = grown(curves, &seed, &neighbours) else {
             continue;
         };
         if planes.iter().all(|other| other.curves != plane.curves) {
@@ -71,39 +76,34 @@ fn seeds(curves: &Curves) -> Vec<Vec<usize>> {
     seeds.into_iter().map(|(_, seed)| seed).collect()
 }
 
-/// All curves in the plane of the first ones: taken in from where the plane is known well to
-/// where it is not, and asked again when all are in.
-fn grown(curves: &Curves, seed: &[usize]) -> Option<CoplanarCurves> {
-    let fit_of = |members: &[usize]| {
-        let points = members.iter().flat_map(|m| curves.all[*m].measured.iter());
-        PlaneFit::through(points, curves.extent)
-    };
-    let holds = |plane: &FittedPlane, curve: &Curve| {
-        (curve.measured.iter()).all(|(point, covariance)| plane.holds(point, covariance))
-    };
-    let mut fit = fit_of(seed)?;
-    let order = most_certain_first(curves, &fit.solved()?);
-    let mut members = seed.to_vec();
-    for place in order.into_iter().filter(|place| !seed.contains(place)) {
-        if holds(&fit.solved()?, &curves.all[place]) {
-            for (point, covariance) in &curves.all[place].measured {
-                fit.add(point, covariance);
-            }
-            members.push(place);
-        }
-    }
+/// The curves that hang together with the first ones in their plane, and those that lie in it
+/// among them. Curves farther away are not taken: what a few short edges tell of a plane there is
+/// little, and would be told by what lies there by chance.
+fn grown(curves: &Curves, seed: &[usize], neighbours: &Neighbours) -> Option<CoplanarCurves> {
+    let mut members = neighbours.around(seed, curves);
     for _ in 0..ROUNDS {
-        members.sort_unstable();
-        let fit = fit_of(&members)?;
+        let fit = fit_of(curves, &members)?;
         let plane = fit.solved()?;
-        let kept = (0..curves.all.len()).filter(|place| holds(&plane, &curves.all[*place]));
-        let kept: Vec<usize> = kept.collect();
-        if kept == members {
+        let kept = neighbours.connected(seed, |place| holds(&plane, &curves.all[place]));
+        if kept == members || kept.is_empty() {
             break;
         }
         members = kept;
     }
-    let (normal, offset) = fit_of(&members)?.solved()?.plane();
+    let fit = fit_of(curves, &members)?;
+    let plane = fit.solved()?;
+    let around = Bounds::of(members.iter().flat_map(|m| &curves.all[*m].points))
+        .widened(REACH * curves.arc_sigma());
+    let within = (0..curves.all.len()).filter(|place| {
+        let curve = &curves.all[*place];
+        Bounds::of(&curve.points).lies_in(&around)
+            && holds(&plane, curve)
+            && members.binary_search(place).is_err()
+    });
+    let within: Vec<usize> = within.collect();
+    let (normal, offset) = plane.plane();
+    members.extend(within);
+    members.sort_unstable();
     Some(CoplanarCurves {
         curves: members,
         normal,
@@ -111,17 +111,81 @@ fn grown(curves: &Curves, seed: &[usize]) -> Option<CoplanarCurves> {
     })
 }
 
-/// The places of all curves, those first where a plane is known best.
-fn most_certain_first(curves: &Curves, plane: &FittedPlane) -> Vec<usize> {
-    let variance = |curve: &Curve| {
-        let of_points = curve
-            .measured
-            .iter()
-            .map(|(point, _)| plane.variance(point));
-        of_points.fold(0.0, f64::max)
-    };
-    let variances: Vec<f64> = curves.all.iter().map(variance).collect();
-    let mut order: Vec<usize> = (0..variances.len()).collect();
-    order.sort_by(|a, b| variances[*a].total_cmp(&variances[*b]).then(a.cmp(b)));
-    order
+fn fit_of(curves: &Curves, members: &[usize]) -> Option<PlaneFit> {
+    let points = (members.iter()).flat_map(|member| curves.all[*member].measured.iter());
+    PlaneFit::through(points, curves.extent)
+}
+
+fn holds(plane: &FittedPlane, curve: &Curve) -> bool {
+    (curve.measured.iter()).all(|(point, covariance)| plane.holds(point, covariance))
+}
+
+/// Which curves meet at junctions.
+struct Neighbours {
+    /// For each curve those that share an end with it, ascending.
+    of: Vec<Vec<usize>>,
+}
+
+impl Neighbours {
+    fn new(curves: &Curves) -> Self {
+        let mut at_junction: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (place, curve) in curves.all.iter().enumerate() {
+            for end in curve.ends.iter().flatten() {
+                at_junction.entry(*end).or_default().push(place);
+            }
+        }
+        let of = |(place, curve): (usize, &Curve)| {
+            let ends = curve.ends.iter().flatten();
+            let all: BTreeSet<usize> = ends.flat_map(|end| &at_junction[end]).copied().collect();
+            all.into_iter().filter(|other| *other != place).collect()
+        };
+        Self {
+            of: curves.all.iter().enumerate().map(of).collect(),
+        }
+    }
+
+    /// The curves in the plane of the first ones that hang together with them: taken in from where
+    /// the plane is known well to where it is not, ascending.
+    fn around(&self, seed: &[usize], curves: &Curves) -> Vec<usize> {
+        let mut members: BTreeSet<usize> = seed.iter().copied().collect();
+        let mut open: BTreeSet<usize> = seed.iter().flat_map(|s| &self.of[*s]).copied().collect();
+        let mut asked = members.clone();
+        let Some(mut fit) = fit_of(curves, seed) else {
+            return seed.to_vec();
+        };
+        loop {
+            open.retain(|place| !asked.contains(place));
+            let Some(plane) = fit.solved() else { break };
+            let variance = |place: &usize| {
+                let points = curves.all[*place].measured.iter();
+                points.fold(0.0_f64, |most, (point, _)| most.max(plane.variance(point)))
+            };
+            let surest = open.iter().map(|place| (variance(place), *place));
+            let Some((_, place)) = surest.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+                break;
+            };
+            asked.insert(place);
+            if holds(&plane, &curves.all[place]) {
+                for (point, covariance) in &curves.all[place].measured {
+                    fit.add(point, covariance);
+                }
+                members.insert(place);
+                open.extend(&self.of[place]);
+            }
+        }
+        members.into_iter().collect()
+    }
+
+    /// The curves of a kind that hang together with the first ones by such, ascending.
+    fn connected(&self, seed: &[usize], is_one: impl Fn(usize) -> bool) -> Vec<usize> {
+        let mut found = BTreeSet::new();
+        let mut open: Vec<usize> = seed.to_vec();
+        while let Some(place) = open.pop() {
+            if !found.contains(&place) && is_one(place) {
+                found.insert(place);
+                open.extend(&self.of[place]);
+            }
+        }
+        found.into_iter().collect()
+    }
 }

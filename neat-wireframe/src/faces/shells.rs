@@ -1,5 +1,6 @@
 //! Faces become shells: what hangs together, with its outer side found, and closed or not.
 
+use super::bounds::Bounds;
 use super::chain::{distance_to_chain, point_along};
 use super::curves::{Curve, Curves, MeasuredGraph, TURN};
 use super::face::{CurveIndex, Face, Shell, Step, Surface};
@@ -14,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 const RAY: [f64; 3] = [0.5381, 0.2837, 0.7937];
 /// Points of each curve that are asked whether they lie within a solid or on it.
 const POINTS: usize = 7;
-/// Points are on a face or an edge that are so near to it, by the extent of the wireframe.
+/// Points are on a face or an edge that are so near to it, by the extent of the shell.
 const MARGIN: f64 = 0.02;
 
 /// The shells of the chosen faces: closed ones first, then those with the most faces.
@@ -147,7 +148,9 @@ fn leave_out_where_curves_are(shell: &mut Shell, curves: &Curves) -> bool {
         .collect();
     let (bounding, others): (Vec<&Curve>, Vec<&Curve>) =
         (curves.all.iter()).partition(|curve| own.contains(&curve.index));
-    let margin = MARGIN * curves.extent;
+    let bounds = Bounds::of(bounding.iter().flat_map(|curve| &curve.points));
+    let margin = MARGIN * bounds.extent();
+    let around = bounds.widened(margin);
     // Beside an edge of the shell another one may be that edge once more.
     let apart = |point: &Vector3<f64>| {
         (bounding.iter()).all(|curve| distance_to_chain(&curve.points, point) > margin)
@@ -155,7 +158,8 @@ fn leave_out_where_curves_are(shell: &mut Shell, curves: &Curves) -> bool {
     let chains = others
         .iter()
         .map(|curve| &curve.points)
-        .chain(&curves.loose);
+        .chain(&curves.loose)
+        .filter(|points| Bounds::of(*points).meets(&around));
     let samples: Vec<Vec<Vector3<f64>>> = chains
         .map(|points| {
             let places = (0..POINTS).map(|k| (k as f64 + 0.5) / POINTS as f64);

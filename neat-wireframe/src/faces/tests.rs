@@ -188,6 +188,24 @@ fn rounded_ends_are_parts_of_cylinders() {
 }
 
 #[test]
+fn small_solids_far_apart_have_planes_of_their_own() {
+    // At the noise of so large a scene, each side may lie in a plane with those of others.
+    let mut model = Model::default();
+    let count = 40;
+    for k in 0..count {
+        let number = |step: usize| f64::from((k * step % 1000) as u32) * 0.1;
+        let [x, y, z] = [7919, 104_729, 1_299_709].map(number);
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let corners = square.map(|[u, v]| [x + u, y + v]);
+        model = model.prism(&corners, [z, z + 1.0]);
+    }
+    let shells = model.turned().shells();
+    let is_box = |shell: &Shell| shell.closed && shell.faces.len() == 6;
+    assert_eq!(shells.len(), count);
+    assert!(shells.iter().all(is_box));
+}
+
+#[test]
 fn what_does_not_close_is_a_sheet() {
     // A box without the edge at one corner has three faces, or a hole whose bottom is missing.
     let mut open = Model::default().prism(&SQUARE, [0.0, 1.0]);
