@@ -18,9 +18,9 @@ const MAX_ARRAY_BYTES: u64 = 1 << 26;
 const MAX_HEADER_BYTES: usize = 4096;
 /// With so few digits the product of the header's numbers fits in 64 bits.
 const MAX_HEADER_DIGITS: usize = 18;
-/// More brackets than this are no float array, and could exhaust the stack of a
-/// recursive parser.
-const MAX_HEADER_BRACKETS: usize = 16;
+/// A dictionary with a tuple, and a record type, which is refused by its name. More opening brackets
+/// are no array, and the parser takes twice as long or more for each that is nested.
+const MAX_HEADER_BRACKETS: usize = 4;
 
 /// A dense array of floats.
 #[derive(Clone, Debug, PartialEq)]
@@ -396,6 +396,15 @@ mod tests {
         let bytes = archive.finish().unwrap().into_inner();
         assert!(bytes.len() < 1 << 18, "a bomb is small");
         assert!(matches!(read_a(&bytes), Err(SceneError::TooLarge { .. })));
+    }
+
+    #[test]
+    fn nested_headers_are_refused_before_they_are_parsed() {
+        // Each bracket more takes the parser twice as long or more: of 16 nobody has seen the end.
+        let mut bytes = b"\x93NUMPY\x01\x00\x40\x00".to_vec();
+        bytes.extend([b'{'; 64]);
+        let message = parse(&bytes).unwrap_err().to_string();
+        assert!(message.contains("plain array"), "{message}");
     }
 
     #[test]
