@@ -3,6 +3,7 @@
 
 use super::curves::{Curve, Curves};
 use super::face::{CurveIndex, Step};
+use super::groups::groups;
 use super::plane_fit::PlaneFrame;
 use super::polygon::{contains, crosses_itself, signed_area};
 use nalgebra::Vector2;
@@ -138,15 +139,8 @@ fn components(open: &[&Curve]) -> BTreeMap<CurveIndex, usize> {
         .iter()
         .filter_map(|c| c.ends.map(|e| e.to_vec()))
         .collect();
-    let groups = pathfinding::undirected::connected_components::components(&ends);
     let mut component_of_junction = BTreeMap::new();
-    let mut groups: Vec<Vec<usize>> = groups
-        .into_iter()
-        .map(|g| g.into_iter().collect())
-        .collect();
-    groups.iter_mut().for_each(|group| group.sort_unstable());
-    groups.sort();
-    for (number, group) in groups.iter().enumerate() {
+    for (number, group) in groups(&ends).iter().enumerate() {
         component_of_junction.extend(group.iter().map(|junction| (*junction, number)));
     }
     let of_curve = |curve: &&Curve| Some((curve.index, component_of_junction[&curve.ends?[0]]));

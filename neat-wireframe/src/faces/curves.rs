@@ -1,6 +1,7 @@
 //! The curves of a wireframe as boundaries of faces: straight edges, whole circles, and arcs
 //! whose ends are junctions.
 
+use super::bounds::Bounds;
 use super::face::{CurveIndex, Step};
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{CircularArc, Wireframe3d};
@@ -144,9 +145,8 @@ fn ends_of(arc: &CircularArc, junctions: &[Vector3<f64>], reach: f64) -> Option<
 
 fn extent(graph: &MeasuredGraph) -> f64 {
     let of_arcs = graph.arcs.iter().flat_map(|arc| arc.points(TURN));
-    let points = graph.wireframe.junctions.iter().copied().chain(of_arcs);
-    let low_high = points.fold(None, |range: Option<[Vector3<f64>; 2]>, p| {
-        Some(range.map_or([p, p], |[low, high]| [low.inf(&p), high.sup(&p)]))
-    });
-    low_high.map_or(0.0, |[low, high]| (high - low).max())
+    let of_arcs: Vec<Vector3<f64>> = of_arcs.collect();
+    let bounds = Bounds::of(graph.wireframe.junctions.iter().chain(&of_arcs));
+    // There may be nothing.
+    bounds.extent().max(0.0)
 }

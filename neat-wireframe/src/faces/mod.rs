@@ -35,6 +35,7 @@ mod chain;
 mod curves;
 mod face;
 mod geometry;
+mod groups;
 mod plane_fit;
 mod planes;
 mod polygon;

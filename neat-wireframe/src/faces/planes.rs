@@ -95,9 +95,8 @@ fn grown(curves: &Curves, seed: &[usize], neighbours: &Neighbours) -> Option<Cop
     let around = Bounds::of(members.iter().flat_map(|m| &curves.all[*m].points))
         .widened(REACH * curves.arc_sigma());
     let within = (0..curves.all.len()).filter(|place| {
-        let curve = &curves.all[*place];
-        Bounds::of(&curve.points).lies_in(&around)
-            && holds(&plane, curve)
+        neighbours.bounds[*place].lies_in(&around)
+            && holds(&plane, &curves.all[*place])
             && members.binary_search(place).is_err()
     });
     let within: Vec<usize> = within.collect();
@@ -122,8 +121,10 @@ fn holds(plane: &FittedPlane, curve: &Curve) -> bool {
 
 /// Which curves meet at junctions.
 struct Neighbours {
-    /// For each curve those that share an end with it, ascending.
+    /// For each curve those that share an end with it, ascending …
     of: Vec<Vec<usize>>,
+    /// … and the box around it.
+    bounds: Vec<Bounds>,
 }
 
 impl Neighbours {
@@ -141,6 +142,9 @@ impl Neighbours {
         };
         Self {
             of: curves.all.iter().enumerate().map(of).collect(),
+            bounds: (curves.all.iter())
+                .map(|curve| Bounds::of(&curve.points))
+                .collect(),
         }
     }
 

@@ -8,8 +8,8 @@
 
 use super::curves::Curves;
 use super::face::{CurveIndex, Face, Step, Surface};
+use super::groups::groups;
 use nalgebra::Vector3;
-use pathfinding::undirected::connected_components::components;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Edges of a solid have two faces: that one lacks one is as likely as that a line of the
@@ -60,11 +60,7 @@ pub(super) fn select(curves: &Curves, faces: &[Face], against: &[f64]) -> Vec<us
             }
         }
     }
-    let mut groups: Vec<Vec<usize>> = (components(&contended).into_iter())
-        .map(|group| group.into_iter().collect())
-        .collect();
-    groups.iter_mut().for_each(|group| group.sort_unstable());
-    let mut chosen: Vec<usize> = (groups.into_iter())
+    let mut chosen: Vec<usize> = (groups(&contended).into_iter())
         .flat_map(|group| Search::new(faces, against, &beside, group).best())
         .collect();
     chosen.sort_unstable();

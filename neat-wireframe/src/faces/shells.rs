@@ -5,10 +5,10 @@ use super::chain::{distance_to_chain, point_along};
 use super::curves::{Curve, Curves, MeasuredGraph, TURN};
 use super::face::{CurveIndex, Face, Shell, Step, Surface};
 use super::geometry::ShellGeometry;
+use super::groups::groups;
 use super::region::Region;
 use crate::ViewObservation;
 use nalgebra::Vector3;
-use pathfinding::undirected::connected_components::components;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Rays along it hardly meet edges: it is no direction that objects prefer.
@@ -33,13 +33,8 @@ pub(super) fn shells(
     }
     let mut joined: Vec<Vec<usize>> = of_curve.values().cloned().collect();
     joined.extend((0..faces.len()).map(|place| vec![place]));
-    let mut groups: Vec<Vec<usize>> = (components(&joined).into_iter())
-        .map(|group| group.into_iter().collect())
-        .collect();
-    groups.iter_mut().for_each(|group| group.sort_unstable());
-    groups.sort();
     let mut shells = Vec::new();
-    for group in groups {
+    for group in groups(&joined) {
         let mut faces: Vec<Face> = group.iter().map(|place| faces[*place].clone()).collect();
         let orientable = orient(&mut faces);
         let has_two = |face: &Face| face.steps().all(|step| of_curve[&step.curve].len() == 2);
