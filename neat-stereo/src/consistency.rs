@@ -98,6 +98,9 @@ fn offset_in(
         return None;
     }
     let to_pixel = other.pixels_from_calibrated(0);
-    let (a, b) = (to_pixel * in_camera / in_camera.z, to_pixel * moved / moved.z);
+    let (a, b) = (
+        to_pixel * in_camera / in_camera.z,
+        to_pixel * moved / moved.z,
+    );
     ((a - b).norm() <= MAX_OFFSET).then_some(offset)
 }

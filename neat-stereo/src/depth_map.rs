@@ -145,15 +145,23 @@ impl DepthMap {
     fn sweep(&mut self, matcher: &Matcher<'_>, ball_radius: f64) {
         for index in 0..self.matches.len() {
             let pixel = self.pixel(index, matcher.level);
-            let Some(patch) = matcher.patch(pixel) else { continue };
-            let Some([low, high]) = inverse_depths(matcher, pixel, ball_radius) else { continue };
+            let Some(patch) = matcher.patch(pixel) else {
+                continue;
+            };
+            let Some([low, high]) = inverse_depths(matcher, pixel, ball_radius) else {
+                continue;
+            };
             let steps = ((high - low) / matcher.step).ceil() as usize;
             let mut best: Option<Match> = None;
             for k in 0..=steps {
                 let plane = Vector3::new(0.0, 0.0, low + k as f32 * matcher.step);
                 let score = matcher.score(&patch, pixel, &plane);
                 if let Some(score) = score.filter(|&s| best.is_none_or(|b| s > b.score)) {
-                    best = Some(Match { plane, score, deviation: f32::INFINITY });
+                    best = Some(Match {
+                        plane,
+                        score,
+                        deviation: f32::INFINITY,
+                    });
                 }
             }
             self.matches[index] = best;
@@ -167,16 +175,22 @@ impl DepthMap {
             .collect();
         for (index, patch) in patches.iter().enumerate() {
             let pixel = self.pixel(index, matcher.level);
-            let found = self.matches[index].zip(patch.as_ref()).and_then(|(found, patch)| {
-                let score = matcher.score(patch, pixel, &found.plane)?;
-                Some(Match { score, ..found })
-            });
+            let found = self.matches[index]
+                .zip(patch.as_ref())
+                .and_then(|(found, patch)| {
+                    let score = matcher.score(patch, pixel, &found.plane)?;
+                    Some(Match { score, ..found })
+                });
             self.matches[index] = found;
         }
         for pass in 0..PASSES {
             let forward = pass % 2 == 0;
             for k in 0..self.matches.len() {
-                let index = if forward { k } else { self.matches.len() - 1 - k };
+                let index = if forward {
+                    k
+                } else {
+                    self.matches.len() - 1 - k
+                };
                 if let Some(patch) = &patches[index] {
                     self.improve(matcher, patch, index, forward, pass, rng);
                 }
@@ -209,13 +223,17 @@ impl DepthMap {
                 self.try_plane(matcher, patch, index, pixel, &ray, proposal.plane);
             }
         }
-        let Some(found) = self.matches[index] else { return };
+        let Some(found) = self.matches[index] else {
+            return;
+        };
         let reach = 1.0 / (1 << pass) as f32;
         let mut draw = || rng.random_range(-1.0f32..1.0);
         let w = found.plane.dot(&ray);
         let moved = found.plane * ((w + reach * matcher.step * draw()) / w);
         self.try_plane(matcher, patch, index, pixel, &ray, moved);
-        let Some(found) = self.matches[index] else { return };
+        let Some(found) = self.matches[index] else {
+            return;
+        };
         let w = found.plane.dot(&ray);
         let normal = found.plane.normalize();
         let turned = normal + 0.5 * reach * Vector3::new(draw(), draw(), draw());
@@ -236,9 +254,15 @@ impl DepthMap {
         if !(plane.dot(ray) >= MIN_COSINE * plane.norm() * ray.norm()) {
             return;
         }
-        let Some(score) = matcher.score(patch, pixel, &plane) else { return };
+        let Some(score) = matcher.score(patch, pixel, &plane) else {
+            return;
+        };
         if self.matches[index].is_none_or(|found| score > found.score) {
-            self.matches[index] = Some(Match { plane, score, deviation: f32::INFINITY });
+            self.matches[index] = Some(Match {
+                plane,
+                score,
+                deviation: f32::INFINITY,
+            });
         }
     }
 
@@ -246,7 +270,9 @@ impl DepthMap {
     /// how well they determine it.
     fn settle(&mut self, matcher: &Matcher<'_>) {
         for index in 0..self.matches.len() {
-            let Some(found) = self.matches[index] else { continue };
+            let Some(found) = self.matches[index] else {
+                continue;
+            };
             let pixel = self.pixel(index, matcher.level);
             self.matches[index] = matcher.patch(pixel).and_then(|patch| {
                 let w = found.plane.dot(&matcher.ray(pixel));
@@ -268,11 +294,7 @@ impl DepthMap {
 }
 
 /// Least and largest inverse depth of a pixel within the ball.
-fn inverse_depths(
-    matcher: &Matcher<'_>,
-    pixel: [usize; 2],
-    ball_radius: f64,
-) -> Option<[f32; 2]> {
+fn inverse_depths(matcher: &Matcher<'_>, pixel: [usize; 2], ball_radius: f64) -> Option<[f32; 2]> {
     let camera = &matcher.view.camera;
     let ray: Vector3<f64> = matcher.ray(pixel).cast();
     let length = ray.norm();

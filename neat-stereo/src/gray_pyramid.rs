@@ -24,9 +24,8 @@ impl GrayImage {
     pub fn halved(&self) -> Option<Self> {
         let (width, height) = (self.width / 2, self.height / 2);
         let at = |x: usize, y: usize| self.values[y * self.width + x];
-        let mean = |x: usize, y: usize| {
-            0.25 * (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1))
-        };
+        let mean =
+            |x: usize, y: usize| 0.25 * (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1));
         (width > 0 && height > 0).then(|| Self {
             width,
             height,
@@ -41,5 +40,7 @@ impl GrayImage {
 pub(crate) fn pyramid(photo: &RgbImage, levels: usize) -> Vec<GrayImage> {
     let first = GrayImage::of(photo);
     let next = |image: &GrayImage| image.halved();
-    std::iter::successors(Some(first), next).take(levels).collect()
+    std::iter::successors(Some(first), next)
+        .take(levels)
+        .collect()
 }

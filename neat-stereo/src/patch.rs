@@ -83,7 +83,11 @@ impl Patch {
             }
         }
         let variance = squares - sum * sum / PIXELS as f32;
-        Some(if variance > 1e-3 { product / variance.sqrt() } else { 0.0 })
+        Some(if variance > 1e-3 {
+            product / variance.sqrt()
+        } else {
+            0.0
+        })
     }
 }
 

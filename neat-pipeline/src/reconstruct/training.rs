@@ -13,9 +13,9 @@ use nalgebra::Vector3;
 use neat_tensor::backend::is_on_host;
 use neat_tensor::checkpoint::Checkpoint;
 use neat_tensor::{Backend, Kernels};
-use neat_train::TrainedField;
 use neat_train::Trainer;
 use neat_train::step_log::{JunctionsLine, StepLog};
+use neat_train::{OrientedPoint, TrainedField};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -62,6 +62,9 @@ impl Session<'_> {
         options: &RunOptions,
         cancelled: &AtomicBool,
     ) -> Result<TrainedField, PipelineError> {
+        if self.plan.config().train.dense_points {
+            self.match_photographs()?;
+        }
         (self.on_event)(Event::StageStarted(Stage::Train));
         let field = loop {
             // Only a GPU fails by itself; a panic on the CPU is our mistake.
@@ -77,6 +80,20 @@ impl Session<'_> {
         let stage = Stage::Train;
         (self.on_event)(Event::StageFinished { stage, seconds });
         Ok(field)
+    }
+
+    /// Finds points on surfaces by matching the photographs.
+    fn match_photographs(&mut self) -> Result<(), PipelineError> {
+        let radius = self.plan.config().data.scene_radius;
+        let radius = radius.unwrap_or(self.scene.sphere_radius);
+        let points = neat_stereo::surface_points(&self.scene, radius)?;
+        self.dense_points = (points.iter())
+            .map(|point| OrientedPoint {
+                position: point.position_in_world.map(|x| x as f32).into(),
+                normal: point.normal_in_world.map(|x| x as f32).into(),
+            })
+            .collect();
+        Ok(())
     }
 
     /// Trains on the device of the session; after a numerical failure with lower
@@ -196,10 +213,11 @@ impl Session<'_> {
             config.train.ray_chunk = Some(chunk);
         }
         let (scene, device, seed) = (&self.scene, &self.device, options.seed);
-        Ok(match self.dir.usable_checkpoint()? {
+        let trainer = match self.dir.usable_checkpoint()? {
             Some(usable) => Trainer::resume(scene, &config, seed, device, usable.checkpoint)?,
             None => Trainer::new(scene, &config, seed, device)?,
-        })
+        };
+        Ok(trainer.with_oriented_points(&self.dense_points))
     }
 
     /// Takes less memory, or another device, after the device has failed.
