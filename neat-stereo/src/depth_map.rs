@@ -11,6 +11,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// Passes over the pixels at each level.
 const PASSES: usize = 2;
+/// One of so many pixels along each side is swept; the others take over its plane.
+const SWEPT: usize = 2;
 /// Levels that refine a sweep.
 pub(crate) const REFINED_LEVELS: usize = 3;
 /// Patches seen at a flatter angle than this to the surface are no evidence.
@@ -143,7 +145,10 @@ impl DepthMap {
 
     /// Fronto-parallel patches at all depths.
     fn sweep(&mut self, matcher: &Matcher<'_>, ball_radius: f64) {
-        for index in 0..self.matches.len() {
+        let swept = |index: &usize| {
+            (index % self.columns).is_multiple_of(SWEPT) && (index / self.columns).is_multiple_of(SWEPT)
+        };
+        for index in (0..self.matches.len()).filter(swept).collect::<Vec<_>>() {
             let pixel = self.pixel(index, matcher.level);
             let Some(patch) = matcher.patch(pixel) else {
                 continue;
