@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 /// Passes over the pixels at each level.
 const PASSES: usize = 2;
 /// One of so many pixels along each side is swept; the others take over its plane.
-const SWEPT: usize = 2;
+const SWEPT: usize = 4;
 /// Levels that refine a sweep.
 pub(crate) const REFINED_LEVELS: usize = 3;
 /// Patches seen at a flatter angle than this to the surface are no evidence.

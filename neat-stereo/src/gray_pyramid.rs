@@ -2,17 +2,20 @@
 
 use image::RgbImage;
 
-/// Brightness, 0 to 255, row by row.
+/// Brightness, row by row.
 #[derive(Clone, Debug)]
 pub(crate) struct GrayImage {
     pub width: usize,
     pub height: usize,
-    pub values: Vec<f32>,
+    pub values: Vec<u8>,
 }
 
 impl GrayImage {
-    pub fn of(photo: &RgbImage) -> Self {
-        let brightness = |rgb: &[u8]| rgb.iter().map(|&c| f32::from(c)).sum::<f32>() / 3.0;
+    fn of(photo: &RgbImage) -> Self {
+        let brightness = |rgb: &[u8]| {
+            let sum: u16 = rgb.iter().map(|&c| u16::from(c)).sum();
+            ((sum + 1) / 3) as u8
+        };
         Self {
             width: photo.width() as usize,
             height: photo.height() as usize,
@@ -21,11 +24,13 @@ impl GrayImage {
     }
 
     /// Means of squares of two by two pixels; `None` where nothing would be left.
-    pub fn halved(&self) -> Option<Self> {
+    fn halved(&self) -> Option<Self> {
         let (width, height) = (self.width / 2, self.height / 2);
-        let at = |x: usize, y: usize| self.values[y * self.width + x];
-        let mean =
-            |x: usize, y: usize| 0.25 * (at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1));
+        let at = |x: usize, y: usize| u16::from(self.values[y * self.width + x]);
+        let mean = |x: usize, y: usize| {
+            let sum = at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1);
+            ((sum + 2) / 4) as u8
+        };
         (width > 0 && height > 0).then(|| Self {
             width,
             height,
@@ -34,13 +39,42 @@ impl GrayImage {
                 .collect(),
         })
     }
+
+    /// The value at a point within the image, linear between pixels.
+    #[inline]
+    pub fn sample(&self, x: f32, y: f32) -> f32 {
+        let (column, row) = (x as usize, y as usize);
+        let (s, t) = (x - column as f32, y - row as f32);
+        let start = row * self.width + column;
+        let pair = |start: usize| {
+            let pair = &self.values[start..start + 2];
+            let [left, right] = [pair[0], pair[1]].map(f32::from);
+            left + s * (right - left)
+        };
+        let (above, below) = (pair(start), pair(start + self.width));
+        above + t * (below - above)
+    }
 }
 
 /// Level 0 is the image, each further one half as wide.
 pub(crate) fn pyramid(photo: &RgbImage, levels: usize) -> Vec<GrayImage> {
     let first = GrayImage::of(photo);
     let next = |image: &GrayImage| image.halved();
-    std::iter::successors(Some(first), next)
-        .take(levels)
-        .collect()
+    (std::iter::successors(Some(first), next).take(levels)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+
+    #[test]
+    fn levels_halve_and_samples_lie_between_pixels() {
+        let photo = RgbImage::from_fn(5, 4, |x, y| Rgb([(10 * x + 40 * y) as u8; 3]));
+        let levels = pyramid(&photo, 9);
+        let sizes: Vec<_> = levels.iter().map(|l| (l.width, l.height)).collect();
+        assert_eq!(sizes, [(5, 4), (2, 2), (1, 1)]);
+        assert_eq!(levels[1].values, [25, 45, 105, 125]);
+        assert_eq!(levels[0].sample(1.5, 2.25), 105.0);
+    }
 }

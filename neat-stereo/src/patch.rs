@@ -28,7 +28,10 @@ impl Patch {
         let mut values = [0.0; PIXELS];
         for (row, line) in values.chunks_exact_mut(SIDE).enumerate() {
             let start = (y + row - HALF) * image.width + x - HALF;
-            line.copy_from_slice(&image.values[start..start + SIDE]);
+            let pixels = &image.values[start..start + SIDE];
+            for (value, &pixel) in line.iter_mut().zip(pixels) {
+                *value = f32::from(pixel);
+            }
         }
         let mean = values.iter().sum::<f32>() / PIXELS as f32;
         values.iter_mut().for_each(|value| *value -= mean);
@@ -76,7 +79,7 @@ impl Patch {
             let (u, v) = (u + uy * dy, v + vy * dy);
             for column in 0..SIDE {
                 let dx = column as f32 - half;
-                let value = bilinear(image, u + ux * dx, v + vx * dx);
+                let value = image.sample(u + ux * dx, v + vx * dx);
                 sum += value;
                 squares += value * value;
                 product += value * self.values[row * SIDE + column];
@@ -91,15 +94,3 @@ impl Patch {
     }
 }
 
-/// The value at a point within the image, linear between pixels.
-#[inline]
-fn bilinear(image: &GrayImage, x: f32, y: f32) -> f32 {
-    let (column, row) = (x as usize, y as usize);
-    let (s, t) = (x - column as f32, y - row as f32);
-    let start = row * image.width + column;
-    let upper = &image.values[start..start + 2];
-    let lower = &image.values[start + image.width..start + image.width + 2];
-    let above = upper[0] + s * (upper[1] - upper[0]);
-    let below = lower[0] + s * (lower[1] - lower[0]);
-    above + t * (below - above)
-}
