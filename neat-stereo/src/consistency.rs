@@ -1,106 +1,114 @@
-//! Which matches other views confirm.
+//! Which planes of a view other views confirm (as in the fusion of Schönberger et al. 2016).
 
 use crate::SurfacePoint;
 use crate::depth_map::DepthMap;
 use crate::view::StereoView;
 use nalgebra::Vector3;
 
-/// Views that have to confirm a point.
+/// Views that have to confirm a point: one more than agree on many a wrong one.
 const MIN_CONFIRMING: usize = 2;
-/// How far a confirming surface may lie off, in pixels.
+/// How far a confirming surface may lie off, in pixels of its view.
 const MAX_OFFSET: f64 = 1.0;
-/// Cosine of the largest angle of two normals of one surface.
+/// Cosine of the largest angle between normals of one surface: 37°.
 const MIN_COSINE: f64 = 0.8;
 
-pub(crate) fn confirmed_points(
-    views: &[StereoView],
-    maps: &[DepthMap],
-    view: usize,
-    neighbours: &[usize],
-    ball_radius: f64,
-) -> Vec<SurfacePoint> {
-    let (here, map) = (&views[view], &maps[view]);
-    let calibrated = here.calibrated_from_pixels(0);
-    let mut points = Vec::new();
-    for (index, found) in map.matches.iter().enumerate() {
-        let Some(found) = found else { continue };
-        let [x, y] = map.pixel(index, 0);
-        let ray = calibrated * Vector3::new(x as f64, y as f64, 1.0);
-        let plane: Vector3<f64> = found.plane.cast();
-        let inverse_depth = plane.dot(&ray);
-        let to_world = |v: Vector3<f64>| here.camera.world_from_camera * v;
-        let position = here.camera.center_in_world + to_world(ray / inverse_depth);
-        if position.norm() >= ball_radius {
-            continue;
-        }
-        let normal = to_world(-plane.normalize());
-        let mut confirmed_by = Vec::new();
-        let mut offsets = vec![];
-        for &other in neighbours {
-            if let Some(offset) = offset_in(here, &views[other], &maps[other], &position, &normal) {
-                confirmed_by.push(other);
+/// All views with what they see.
+#[derive(Clone, Copy)]
+pub(crate) struct Maps<'a> {
+    pub views: &'a [StereoView],
+    pub maps: &'a [DepthMap],
+}
+
+/// A plane of one view at a pixel.
+struct Seen<'a> {
+    view: &'a StereoView,
+    /// Unit direction from the camera.
+    sight: Vector3<f64>,
+    distance: f64,
+    normal: Vector3<f64>,
+}
+
+impl Maps<'_> {
+    /// The points of `view` within the ball that at least two of `others` confirm.
+    pub fn confirmed(self, view: usize, others: &[usize], ball_radius: f64) -> Vec<SurfacePoint> {
+        let map = &self.maps[view];
+        let found = map.planes.iter().enumerate();
+        found
+            .filter_map(|(index, plane)| {
+                let seen = Seen::new(&self.views[view], map.pixel(index), &(*plane)?.cast());
+                let point = self.confirm(&seen, view, others)?;
+                (point.position_in_world.norm() < ball_radius).then_some(point)
+            })
+            .collect()
+    }
+
+    /// The mean of the surface that is seen and those that confirm it.
+    fn confirm(self, seen: &Seen<'_>, view: usize, others: &[usize]) -> Option<SurfacePoint> {
+        let mut views = vec![view];
+        let mut offsets = vec![0.0];
+        for &other in others {
+            if let Some(offset) = seen.offset_in(&self.views[other], &self.maps[other]) {
+                views.push(other);
                 offsets.push(offset);
             }
         }
-        if confirmed_by.len() < MIN_CONFIRMING {
-            continue;
+        if views.len() <= MIN_CONFIRMING {
+            return None;
         }
-        let mean = offsets.iter().sum::<f64>() / (offsets.len() + 1) as f64;
-        let variance = offsets.iter().map(|o| (o - mean).powi(2)).sum::<f64>() + mean * mean;
-        let sight = to_world(ray).normalize();
-        points.push(SurfacePoint {
-            position_in_world: position + sight * mean,
-            normal_in_world: normal,
-            view,
-            confirmed_by,
-            deviation: (variance / offsets.len() as f64).sqrt(),
-            score: found.score,
-            sharpness: found.deviation,
-        });
+        let mean = offsets.iter().sum::<f64>() / offsets.len() as f64;
+        let squares: f64 = offsets.iter().map(|offset| (offset - mean).powi(2)).sum();
+        views.sort_unstable();
+        Some(SurfacePoint {
+            position_in_world: seen.position(mean),
+            normal_in_world: seen.normal,
+            deviation: (squares / (offsets.len() - 1) as f64).sqrt(),
+            views,
+        })
     }
-    points
 }
 
-/// How far behind `position`, along the ray from `here`, the surface of `other` lies, where
-/// that is nearly the same surface.
-fn offset_in(
-    here: &StereoView,
-    other: &StereoView,
-    map: &DepthMap,
-    position: &Vector3<f64>,
-    normal: &Vector3<f64>,
-) -> Option<f64> {
-    let in_camera = other.camera.to_camera(position);
-    if in_camera.z <= 0.0 {
-        return None;
+impl<'a> Seen<'a> {
+    fn new(view: &'a StereoView, [x, y]: [usize; 2], plane: &Vector3<f64>) -> Self {
+        let ray = view.calibrated_from_pixels(0) * Vector3::new(x as f64, y as f64, 1.0);
+        let to_world = &view.camera.world_from_camera;
+        Self {
+            view,
+            sight: (to_world * ray).normalize(),
+            distance: ray.norm() / plane.dot(&ray),
+            normal: to_world * -plane.normalize(),
+        }
     }
-    let pixel = other.pixels_from_calibrated(map.level) * in_camera / in_camera.z;
-    let cell = |at: f64, count: usize| {
-        let at = at.round();
-        (0.0..count as f64).contains(&at).then_some(at as usize)
-    };
-    let (column, row) = (cell(pixel.x, map.columns)?, cell(pixel.y, map.rows)?);
-    let found = map.matches[row * map.columns + column]?;
-    let plane: Vector3<f64> = found.plane.cast();
-    let normal_there = other.camera.world_from_camera * -plane.normalize();
-    if normal_there.dot(normal) < MIN_COSINE {
-        return None;
+
+    /// The point `offset` behind it.
+    fn position(&self, offset: f64) -> Vector3<f64> {
+        self.view.camera.center_in_world + self.sight * (self.distance + offset)
     }
-    // The plane of `other` met by the ray from `here`.
-    let from = other.camera.to_camera(&here.camera.center_in_world);
-    let sight = (position - here.camera.center_in_world).normalize();
-    let along = other.camera.world_from_camera.tr_mul(&sight);
-    let distance = (1.0 - plane.dot(&from)) / plane.dot(&along);
-    let offset = distance - (position - here.camera.center_in_world).norm();
-    // In pixels of `other`.
-    let moved = other.camera.to_camera(&(position + sight * offset));
-    if !offset.is_finite() || moved.z <= 0.0 {
-        return None;
+
+    /// How far behind it, along the sight line, the surface that `other` sees lies; `None`
+    /// if that is another surface, or is not seen.
+    fn offset_in(&self, other: &StereoView, map: &DepthMap) -> Option<f64> {
+        let pixel_of = |point: &Vector3<f64>, level: usize| {
+            let in_camera = other.camera.to_camera(point);
+            let pixel = other.pixels_from_calibrated(level) * in_camera / in_camera.z;
+            (in_camera.z > 0.0).then_some(pixel.xy())
+        };
+        let position = self.position(0.0);
+        let on_lattice = pixel_of(&position, map.level)?.map(f64::round);
+        let inside =
+            |at: f64, count: usize| (0.0..count as f64).contains(&at).then_some(at as usize);
+        let (column, row) = (
+            inside(on_lattice.x, map.columns)?,
+            inside(on_lattice.y, map.rows)?,
+        );
+        let plane: Vector3<f64> = map.planes[row * map.columns + column]?.cast();
+        let normal = other.camera.world_from_camera * -plane.normalize();
+        if normal.dot(&self.normal) < MIN_COSINE {
+            return None;
+        }
+        let from = other.camera.to_camera(&self.view.camera.center_in_world);
+        let along = other.camera.world_from_camera.tr_mul(&self.sight);
+        let offset = (1.0 - plane.dot(&from)) / plane.dot(&along) - self.distance;
+        let moved = pixel_of(&self.position(offset), 0)? - pixel_of(&position, 0)?;
+        (moved.norm() <= MAX_OFFSET).then_some(offset)
     }
-    let to_pixel = other.pixels_from_calibrated(0);
-    let (a, b) = (
-        to_pixel * in_camera / in_camera.z,
-        to_pixel * moved / moved.z,
-    );
-    ((a - b).norm() <= MAX_OFFSET).then_some(offset)
 }

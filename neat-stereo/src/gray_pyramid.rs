@@ -1,20 +1,24 @@
 //! Brightness of a photograph at halved and halved again resolution.
 
 use image::RgbImage;
+use std::ops::RangeInclusive;
 
-/// Brightness, row by row.
+/// One step of an eight-bit image: means of several pixels need finer ones.
+pub(crate) const STEP: f32 = 192.0;
+
+/// Brightness in [`STEP`]ths of a step, row by row.
 #[derive(Clone, Debug)]
 pub(crate) struct GrayImage {
     pub width: usize,
     pub height: usize,
-    pub values: Vec<u8>,
+    pub values: Vec<u16>,
 }
 
 impl GrayImage {
     fn of(photo: &RgbImage) -> Self {
         let brightness = |rgb: &[u8]| {
             let sum: u16 = rgb.iter().map(|&c| u16::from(c)).sum();
-            ((sum + 1) / 3) as u8
+            sum * (STEP as u16 / 3)
         };
         Self {
             width: photo.width() as usize,
@@ -26,10 +30,10 @@ impl GrayImage {
     /// Means of squares of two by two pixels; `None` where nothing would be left.
     fn halved(&self) -> Option<Self> {
         let (width, height) = (self.width / 2, self.height / 2);
-        let at = |x: usize, y: usize| u16::from(self.values[y * self.width + x]);
+        let at = |x: usize, y: usize| u32::from(self.values[y * self.width + x]);
         let mean = |x: usize, y: usize| {
             let sum = at(x, y) + at(x + 1, y) + at(x, y + 1) + at(x + 1, y + 1);
-            ((sum + 2) / 4) as u8
+            ((sum + 2) / 4) as u16
         };
         (width > 0 && height > 0).then(|| Self {
             width,
@@ -56,11 +60,12 @@ impl GrayImage {
     }
 }
 
-/// Level 0 is the image, each further one half as wide.
-pub(crate) fn pyramid(photo: &RgbImage, levels: usize) -> Vec<GrayImage> {
-    let first = GrayImage::of(photo);
+/// The image at `levels`, as far as it can be halved; level 0 is the image itself.
+pub(crate) fn pyramid(photo: &RgbImage, levels: RangeInclusive<usize>) -> Vec<GrayImage> {
+    let (first, count) = (*levels.start(), levels.count());
     let next = |image: &GrayImage| image.halved();
-    (std::iter::successors(Some(first), next).take(levels)).collect()
+    let all = std::iter::successors(Some(GrayImage::of(photo)), next);
+    all.skip(first).take(count).collect()
 }
 
 #[cfg(test)]
@@ -71,10 +76,11 @@ mod tests {
     #[test]
     fn levels_halve_and_samples_lie_between_pixels() {
         let photo = RgbImage::from_fn(5, 4, |x, y| Rgb([(10 * x + 40 * y) as u8; 3]));
-        let levels = pyramid(&photo, 9);
+        let levels = pyramid(&photo, 0..=9);
         let sizes: Vec<_> = levels.iter().map(|l| (l.width, l.height)).collect();
         assert_eq!(sizes, [(5, 4), (2, 2), (1, 1)]);
-        assert_eq!(levels[1].values, [25, 45, 105, 125]);
-        assert_eq!(levels[0].sample(1.5, 2.25), 105.0);
+        assert_eq!(pyramid(&photo, 1..=1)[0].values, levels[1].values);
+        assert_eq!(levels[1].values, [25, 45, 105, 125].map(|v| 192 * v));
+        assert_eq!(levels[0].sample(1.5, 2.25), 105.0 * STEP);
     }
 }

@@ -1,82 +1,153 @@
-//! Oriented points on the surfaces that posed images show.
+//! Points with normals on the surfaces that posed photographs show, by multi-view
+//! photo-consistency: classical stereo without learning and without a field.
+//!
+//! Each view is matched with its neighbours: a plane sweep (Collins 1996) on small images,
+//! then slanted patches that neighbouring pixels propose to each other on ever larger ones
+//! (Bleyer, Rhemann and Rother 2011), compared by normalised cross-correlation over those
+//! neighbours that agree best (Goesele et al. 2007). What two further views confirm is a
+//! point (Schönberger et al. 2016). Where nothing is photo-consistent there are no points.
+//!
+//! The points do not depend on the number of threads.
+//!
+//! ```no_run
+//! use neat_core::{LoadOptions, load_scene};
+//! use neat_stereo::match_views;
+//! use std::ops::ControlFlow;
+//!
+//! let scene = load_scene("SCENE", &LoadOptions::default())?.scene;
+//! let points = match_views(&scene, scene.sphere_radius, &mut |share| {
+//!     println!("{:.0} %", 100.0 * share);
+//!     ControlFlow::Continue(())
+//! })?;
+//! println!("{} points", points.len());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
 #![forbid(unsafe_code)]
 
 mod consistency;
 mod depth_map;
 mod gray_pyramid;
+mod matcher;
 mod neighbours;
 mod patch;
 mod view;
 
-use consistency::confirmed_points;
-use depth_map::{DepthMap, REFINED_LEVELS};
+use consistency::Maps;
+use depth_map::DepthMap;
+use matcher::MAX_OTHERS;
 use nalgebra::Vector3;
 use neat_core::{Camera, Scene, SceneError};
+use neighbours::neighbours;
 use rayon::prelude::*;
+use std::ops::ControlFlow;
+use thiserror::Error;
 use view::StereoView;
 
-/// A point of a surface.
+/// Views that may confirm a point of another one.
+const CONFIRMING: usize = 8;
+/// The lattice of pixels, and the images that are swept, have at least so many on their
+/// longer side: enough for the planes of a building, which the finer levels put right.
+const LATTICE: u32 = 128;
+/// Finer levels that are matched after a sweep: up to 1024 to 2048 pixels.
+const FINER_LEVELS: usize = 3;
+
+/// A point on a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfacePoint {
     /// Where it is.
     pub position_in_world: Vector3<f64>,
-    /// Unit normal, towards the views.
+    /// Of length 1, to the side of the views.
     pub normal_in_world: Vector3<f64>,
-    /// The view whose pixel it is.
-    pub view: usize,
-    /// Views that confirm it.
-    pub confirmed_by: Vec<usize>,
-    /// Standard deviation along the sight line.
+    /// Standard deviation of the surfaces that the views see, along the sight line of one,
+    /// in the world.
     pub deviation: f64,
-    /// Score.
-    pub score: f32,
-    /// Sharpness in pixels.
-    pub sharpness: f32,
+    /// The views that agree on it, at least three, ascending.
+    pub views: Vec<usize>,
 }
 
-/// Neighbours that patches are compared with.
-const MATCHED: usize = 4;
-/// Neighbours that may confirm.
-const CONFIRMING: usize = 8;
-/// Least pixels along the longer side of the lattice.
-const LATTICE: u32 = 128;
+/// Why there are no points.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StereoError {
+    /// An image cannot be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Nobody wants them any more.
+    #[error("matching the views was interrupted")]
+    Interrupted,
+}
 
-/// Points of all views.
+/// Receives the share that is done, from 0 to 1, ascending, and says whether to go on.
+pub type OnProgress<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
+
+/// Points on what the views of `scene` show within the ball of radius `ball_radius` around
+/// the origin of its world, in the order of the views and their pixels. There are none where
+/// fewer than three views show the same, or nothing has texture.
+///
+/// Of each image two bytes a pixel are kept, up to 2048 pixels wide.
 ///
 /// # Errors
-/// If an image cannot be read.
-pub fn surface_points(scene: &Scene, ball_radius: f64) -> Result<Vec<SurfacePoint>, SceneError> {
-    let start = std::time::Instant::now();
+/// If an image cannot be read, or `progress` says so.
+pub fn match_views(
+    scene: &Scene,
+    ball_radius: f64,
+    progress: OnProgress<'_>,
+) -> Result<Vec<SurfacePoint>, StereoError> {
+    let longer_side = |camera: &Camera| camera.width.max(camera.height);
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
-    let longer = |camera: &Camera| camera.width.max(camera.height);
-    let largest = cameras.iter().map(longer).max().unwrap_or(0);
-    let coarsest = (largest / LATTICE).max(1).ilog2() as usize;
+    let Some(smallest) = cameras.iter().map(longer_side).min() else {
+        return Ok(Vec::new());
+    };
+    let coarsest = (smallest / LATTICE).max(1).ilog2() as usize;
+    let finest = coarsest.saturating_sub(FINER_LEVELS);
     let views: Vec<StereoView> = (scene.views.par_iter())
-        .map(|view| StereoView::new(view, scene.pixel_center, coarsest + 1))
+        .map(|view| StereoView::new(view, scene.pixel_center, finest..=coarsest))
         .collect::<Result<_, _>>()?;
-    let _ = REFINED_LEVELS;
-    let neighbours: Vec<Vec<usize>> = (0..views.len())
-        .into_par_iter()
-        .map(|view| neighbours::neighbours(&cameras, view, ball_radius, CONFIRMING))
+    // A strip of an image cannot be halved as often.
+    let last_levels = views.iter().map(StereoView::coarsest);
+    let Some(coarsest) = last_levels.min().flatten().filter(|&last| last >= finest) else {
+        return Ok(Vec::new());
+    };
+    let all = (0..views.len()).into_par_iter();
+    let neighbours: Vec<Vec<usize>> = all
+        .map(|view| neighbours(&cameras, view, ball_radius, CONFIRMING))
         .collect();
-    let maps: Vec<DepthMap> = (0..views.len())
+    let estimate = |view: usize| {
+        let others = neighbours[view].iter().take(MAX_OTHERS);
+        let others: Vec<&StereoView> = others.map(|&other| &views[other]).collect();
+        let levels = [finest, coarsest];
+        DepthMap::estimate(&views[view], &others, levels, ball_radius, view as u64)
+    };
+    let maps = with_progress(views.len(), estimate, progress)?;
+    let maps = Maps {
+        views: &views,
+        maps: &maps,
+    };
+    let confirmed = (0..views.len())
         .into_par_iter()
-        .map(|view| {
-            let nearest = neighbours[view].iter().take(MATCHED);
-            let others: Vec<&StereoView> = nearest.map(|&other| &views[other]).collect();
-            DepthMap::estimate(&views[view], &others, ball_radius, view as u64)
-        })
-        .collect();
-    tell(format_args!("maps {:.2} s", start.elapsed().as_secs_f64()));
-    let points = (0..views.len())
-        .into_par_iter()
-        .map(|view| confirmed_points(&views, &maps, view, &neighbours[view], ball_radius))
-        .collect::<Vec<_>>();
-    tell(format_args!("all {:.2} s", start.elapsed().as_secs_f64()));
-    Ok(points.into_iter().flatten().collect())
+        .map(|view| maps.confirmed(view, &neighbours[view], ball_radius));
+    Ok(confirmed
+        .collect::<Vec<_>>()
+        .into_iter()
+        .flatten()
+        .collect())
 }
 
-#[allow(clippy::print_stderr)]
-fn tell(what: std::fmt::Arguments<'_>) {
-    eprintln!("{what}");
+/// `work` on all of `count` views, as many at a time as there are threads.
+fn with_progress<T: Send>(
+    count: usize,
+    work: impl Fn(usize) -> T + Sync,
+    progress: OnProgress<'_>,
+) -> Result<Vec<T>, StereoError> {
+    let mut done = Vec::with_capacity(count);
+    while done.len() < count {
+        if progress(done.len() as f64 / count as f64).is_break() {
+            return Err(StereoError::Interrupted);
+        }
+        let end = count.min(done.len() + rayon::current_num_threads());
+        let next: Vec<T> = (done.len()..end).into_par_iter().map(&work).collect();
+        done.extend(next);
+    }
+    Ok(done)
 }

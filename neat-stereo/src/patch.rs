@@ -1,13 +1,13 @@
 //! How alike a patch of one image is to what other images show, if it lies in a plane.
 
-use crate::gray_pyramid::GrayImage;
+use crate::gray_pyramid::{GrayImage, STEP};
 use nalgebra::Matrix3;
 
 /// Pixels from the middle of a patch to its border.
-pub(crate) const HALF: usize = 3;
+const HALF: usize = 3;
 const SIDE: usize = 2 * HALF + 1;
 /// Pixels of a patch.
-pub(crate) const PIXELS: usize = SIDE * SIDE;
+const PIXELS: usize = SIDE * SIDE;
 
 /// A patch around a pixel, without its mean, of length 1.
 #[derive(Clone, Debug)]
@@ -16,11 +16,11 @@ pub(crate) struct Patch {
 }
 
 impl Patch {
-    /// Around pixel (`x`, `y`); `None` at the border, and where nothing stands out of the
-    /// rounding of an eight-bit image.
+    /// Around pixel (`x`, `y`); `None` at the border, and where the contrast is
+    /// less than an eight-bit image can tell.
     pub fn around(image: &GrayImage, x: usize, y: usize) -> Option<Self> {
-        /// Variance of rounding to whole numbers.
-        const ROUNDING: f32 = 1.0 / 12.0;
+        /// Twelve times the variance of rounding.
+        const MIN_VARIANCE: f32 = STEP * STEP;
         let inside = |at: usize, size: usize| at >= HALF && at + HALF < size;
         if !inside(x, image.width) || !inside(y, image.height) {
             return None;
@@ -36,7 +36,7 @@ impl Patch {
         let mean = values.iter().sum::<f32>() / PIXELS as f32;
         values.iter_mut().for_each(|value| *value -= mean);
         let squares = values.iter().map(|value| value * value).sum::<f32>();
-        (squares > PIXELS as f32 * ROUNDING).then(|| {
+        (squares > PIXELS as f32 * MIN_VARIANCE).then(|| {
             let scale = 1.0 / squares.sqrt();
             Self {
                 values: values.map(|value| value * scale),
@@ -50,8 +50,7 @@ impl Patch {
         &self,
         image: &GrayImage,
         homography: &Matrix3<f32>,
-        x: f32,
-        y: f32,
+        [x, y]: [f32; 2],
     ) -> Option<f32> {
         let h = homography;
         let w = h[(2, 0)] * x + h[(2, 1)] * y + h[(2, 2)];
@@ -86,11 +85,10 @@ impl Patch {
             }
         }
         let variance = squares - sum * sum / PIXELS as f32;
-        Some(if variance > 1e-3 {
+        Some(if variance > 0.0 {
             product / variance.sqrt()
         } else {
             0.0
         })
     }
 }
-

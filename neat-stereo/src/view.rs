@@ -3,29 +3,49 @@
 use crate::gray_pyramid::{GrayImage, pyramid};
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{Camera, SceneError, View};
+use std::ops::RangeInclusive;
 
 /// Camera and brightness of a view.
 #[derive(Clone, Debug)]
 pub(crate) struct StereoView {
     pub camera: Camera,
-    pub levels: Vec<GrayImage>,
+    finest: usize,
+    images: Vec<GrayImage>,
     pixel_center: f64,
 }
 
-/// Leads from the frame of one camera to pixels of another: `pixels ~ linear · x + offset`.
-#[derive(Clone, Copy, Debug)]
+/// From the frame of one camera to pixels of another.
 pub(crate) struct Transfer {
     pub linear: Matrix3<f64>,
     pub offset: Vector3<f64>,
 }
 
 impl StereoView {
-    pub fn new(view: &View, pixel_center: f64, levels: usize) -> Result<Self, SceneError> {
+    /// With its image at `levels`, as far as it can be halved.
+    ///
+    /// # Errors
+    /// If the image cannot be read.
+    pub fn new(
+        view: &View,
+        pixel_center: f64,
+        levels: RangeInclusive<usize>,
+    ) -> Result<Self, SceneError> {
         Ok(Self {
             camera: view.camera,
-            levels: pyramid(&*view.image.read()?, levels),
+            finest: *levels.start(),
+            images: pyramid(&*view.image.read()?, levels),
             pixel_center,
         })
+    }
+
+    /// The image at one of its levels.
+    pub fn image(&self, level: usize) -> &GrayImage {
+        &self.images[level - self.finest]
+    }
+
+    /// The last of its levels.
+    pub fn coarsest(&self) -> Option<usize> {
+        (self.finest + self.images.len()).checked_sub(1)
     }
 
     /// Calibrated coordinates (on z = 1) → column and row at `level`.
@@ -43,7 +63,8 @@ impl StereoView {
         matrix.try_inverse().expect("focal lengths are positive")
     }
 
-    /// From this camera's frame to pixels of `other` at `level`.
+    /// From this camera's frame to pixels of `other` at `level`: a point `x` lies at
+    /// `linear · x + offset`, up to scale.
     pub fn transfer_to(&self, other: &Self, level: usize) -> Transfer {
         let pixels = other.pixels_from_calibrated(level);
         let (here, there) = (&self.camera, &other.camera);
@@ -52,12 +73,5 @@ impl StereoView {
             linear: pixels * there.world_from_camera.tr_mul(&here.world_from_camera),
             offset: pixels * there.world_from_camera.tr_mul(&between),
         }
-    }
-}
-
-impl Transfer {
-    /// The homography of the plane `plane · x = 1`, from calibrated coordinates.
-    pub fn homography(&self, plane: &Vector3<f64>) -> Matrix3<f64> {
-        self.linear + self.offset * plane.transpose()
     }
 }
