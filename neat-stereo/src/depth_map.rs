@@ -21,7 +21,7 @@ const MAX_TURN: f32 = 0.5;
 const MIN_SCORE: f32 = 0.5;
 
 /// Planes on a lattice of pixels.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct DepthMap {
     pub columns: usize,
     pub rows: usize,
@@ -47,35 +47,35 @@ struct Lattice {
 }
 
 impl DepthMap {
-    /// Of `view` by `others`, within the ball around the origin. `levels` are those of the
-    /// pyramids that are used, from the finest to the coarsest.
+    /// Of `view` by `others`, within the ball around the origin. Without others, or levels,
+    /// there is nothing on it.
     pub fn estimate(
         view: &StereoView,
         others: &[&StereoView],
-        [finest, coarsest]: [usize; 2],
         ball_radius: f64,
         seed: u64,
     ) -> Self {
-        let image = view.image(coarsest);
-        let (columns, rows) = (image.width, image.height);
-        let mut lattice = Lattice {
-            columns,
-            rows,
-            level: coarsest,
-            matches: vec![None; columns * rows],
+        let Some(levels) = view.levels().filter(|_| !others.is_empty()) else {
+            return Self::default();
         };
-        if !others.is_empty() {
-            lattice.sweep(&Matcher::new(view, others, coarsest), ball_radius);
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            for level in (finest..=coarsest).rev() {
-                lattice.refine(&Matcher::new(view, others, level), &mut rng);
-            }
-            lattice.settle(&Matcher::new(view, others, finest));
+        let (finest, coarsest) = levels.into_inner();
+        let image = view.image(coarsest);
+        let mut lattice = Lattice {
+            columns: image.width,
+            rows: image.height,
+            level: coarsest,
+            matches: vec![None; image.width * image.height],
+        };
+        lattice.sweep(&Matcher::new(view, others, coarsest), ball_radius);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        for level in (finest..=coarsest).rev() {
+            lattice.refine(&Matcher::new(view, others, level), &mut rng);
         }
+        lattice.settle(&Matcher::new(view, others, finest));
         let planes = lattice.matches.into_iter();
         Self {
-            columns,
-            rows,
+            columns: lattice.columns,
+            rows: lattice.rows,
             level: coarsest,
             planes: planes.map(|found| Some(found?.plane)).collect(),
         }

@@ -37,7 +37,7 @@ use consistency::Maps;
 use depth_map::DepthMap;
 use matcher::MAX_OTHERS;
 use nalgebra::Vector3;
-use neat_core::{Camera, Scene, SceneError};
+use neat_core::{Scene, SceneError, View};
 use neighbours::neighbours;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -94,30 +94,21 @@ pub fn match_views(
     ball_radius: f64,
     progress: OnProgress<'_>,
 ) -> Result<Vec<SurfacePoint>, StereoError> {
-    let longer_side = |camera: &Camera| camera.width.max(camera.height);
-    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
-    let Some(smallest) = cameras.iter().map(longer_side).min() else {
-        return Ok(Vec::new());
-    };
-    let coarsest = (smallest / LATTICE).max(1).ilog2() as usize;
-    let finest = coarsest.saturating_sub(FINER_LEVELS);
+    let longer_side = |view: &View| view.camera.width.max(view.camera.height);
+    let largest = scene.views.iter().map(longer_side).max().unwrap_or(0);
+    let coarsest = (largest / LATTICE).max(1).ilog2() as usize;
+    let levels = coarsest.saturating_sub(FINER_LEVELS)..=coarsest;
     let views: Vec<StereoView> = (scene.views.par_iter())
-        .map(|view| StereoView::new(view, scene.pixel_center, finest..=coarsest))
+        .map(|view| StereoView::new(view, scene.pixel_center, levels.clone()))
         .collect::<Result<_, _>>()?;
-    // A strip of an image cannot be halved as often.
-    let last_levels = views.iter().map(StereoView::coarsest);
-    let Some(coarsest) = last_levels.min().flatten().filter(|&last| last >= finest) else {
-        return Ok(Vec::new());
-    };
-    let all = (0..views.len()).into_par_iter();
-    let neighbours: Vec<Vec<usize>> = all
-        .map(|view| neighbours(&cameras, view, ball_radius, CONFIRMING))
+    let neighbours: Vec<Vec<usize>> = (0..views.len())
+        .into_par_iter()
+        .map(|view| neighbours(&views, view, ball_radius, CONFIRMING))
         .collect();
     let estimate = |view: usize| {
         let others = neighbours[view].iter().take(MAX_OTHERS);
         let others: Vec<&StereoView> = others.map(|&other| &views[other]).collect();
-        let levels = [finest, coarsest];
-        DepthMap::estimate(&views[view], &others, levels, ball_radius, view as u64)
+        DepthMap::estimate(&views[view], &others, ball_radius, view as u64)
     };
     let maps = with_progress(views.len(), estimate, progress)?;
     let maps = Maps {

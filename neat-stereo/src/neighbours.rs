@@ -1,5 +1,6 @@
 //! For each view the other views that show the same under a useful angle.
 
+use crate::view::StereoView;
 use nalgebra::{Vector2, Vector3};
 use neat_core::Camera;
 
@@ -12,22 +13,22 @@ const SAMPLED_PIXELS: usize = 8;
 /// … times depths within the scene ball.
 const SAMPLED_DEPTHS: usize = 6;
 
-/// The neighbours of `cameras[view]`, at most `count`, best first.
+/// The neighbours of `views[view]`, at most `count`, best first.
 ///
 /// Points within the ball of radius `ball_radius` around the origin stand for what there
 /// is to see. A neighbour is worth the number of those that it sees under a useful angle,
 /// small angles less.
 pub(crate) fn neighbours(
-    cameras: &[Camera],
+    views: &[StereoView],
     view: usize,
     ball_radius: f64,
     count: usize,
 ) -> Vec<usize> {
-    let here = &cameras[view];
+    let here = &views[view].camera;
     let points = sample_points(here, ball_radius);
-    let mut worths: Vec<(f64, usize)> = (cameras.iter().enumerate())
-        .filter(|(other, _)| *other != view)
-        .map(|(other, camera)| (worth(here, camera, &points), other))
+    let mut worths: Vec<(f64, usize)> = (views.iter().enumerate())
+        .filter(|(index, other)| *index != view && other.levels().is_some())
+        .map(|(index, other)| (worth(here, &other.camera, &points), index))
         .filter(|(worth, _)| *worth > 0.0)
         .collect();
     worths.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));

@@ -9,7 +9,7 @@ use std::ops::RangeInclusive;
 #[derive(Clone, Debug)]
 pub(crate) struct StereoView {
     pub camera: Camera,
-    finest: usize,
+    levels: RangeInclusive<usize>,
     images: Vec<GrayImage>,
     pixel_center: f64,
 }
@@ -32,20 +32,24 @@ impl StereoView {
     ) -> Result<Self, SceneError> {
         Ok(Self {
             camera: view.camera,
-            finest: *levels.start(),
-            images: pyramid(&*view.image.read()?, levels),
+            images: pyramid(&*view.image.read()?, levels.clone()),
+            levels,
             pixel_center,
         })
     }
 
     /// The image at one of its levels.
+    ///
+    /// # Panics
+    /// If it has no such level.
     pub fn image(&self, level: usize) -> &GrayImage {
-        &self.images[level - self.finest]
+        &self.images[level - self.levels.start()]
     }
 
-    /// The last of its levels.
-    pub fn coarsest(&self) -> Option<usize> {
-        (self.finest + self.images.len()).checked_sub(1)
+    /// Its levels, or none if the image is too small for all of them.
+    pub fn levels(&self) -> Option<RangeInclusive<usize>> {
+        let is_whole = self.images.len() == self.levels.clone().count();
+        is_whole.then(|| self.levels.clone())
     }
 
     /// Calibrated coordinates (on z = 1) → column and row at `level`.
