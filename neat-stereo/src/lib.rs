@@ -68,7 +68,6 @@ pub struct SurfacePoint {
 
 /// Why there are no points.
 #[derive(Debug, Error)]
-#[non_exhaustive]
 pub enum StereoError {
     /// An image cannot be read.
     #[error(transparent)]

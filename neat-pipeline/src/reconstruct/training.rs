@@ -6,7 +6,7 @@ use super::device_failure::{self, Replacement};
 use super::session::Session;
 use crate::changes::Belonging;
 use crate::error::PipelineError;
-use crate::event::{Event, Stage, WarningKind};
+use crate::event::{Event, Stage, WarningKind, timed};
 use crate::manifest::Manifest;
 use crate::run_dir::{Existing, RunDir};
 use nalgebra::Vector3;
@@ -16,6 +16,7 @@ use neat_tensor::{Backend, Kernels};
 use neat_train::Trainer;
 use neat_train::step_log::{JunctionsLine, StepLog};
 use neat_train::{OrientedPoint, TrainedField};
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -63,7 +64,7 @@ impl Session<'_> {
         cancelled: &AtomicBool,
     ) -> Result<TrainedField, PipelineError> {
         if self.plan.config().train.dense_points {
-            self.match_photographs()?;
+            self.match_photographs(cancelled)?;
         }
         (self.on_event)(Event::StageStarted(Stage::Train));
         let field = loop {
@@ -82,11 +83,27 @@ impl Session<'_> {
         Ok(field)
     }
 
-    /// Finds points on surfaces by matching the photographs.
-    fn match_photographs(&mut self) -> Result<(), PipelineError> {
+    /// Finds points on surfaces by matching the photographs. A run that goes on finds the
+    /// same ones again.
+    fn match_photographs(&mut self, cancelled: &AtomicBool) -> Result<(), PipelineError> {
         let radius = self.plan.config().data.scene_radius;
         let radius = radius.unwrap_or(self.scene.sphere_radius);
-        let points = neat_stereo::surface_points(&self.scene, radius)?;
+        let (scene, stage) = (&self.scene, Stage::Match);
+        let points = timed(self.on_event, stage, |on_event| {
+            neat_stereo::match_views(scene, radius, &mut |fraction| {
+                on_event(Event::StageProgress { stage, fraction });
+                match cancelled.load(Ordering::Relaxed) {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                }
+            })
+        })?;
+        let views = self.scene.views.len();
+        let text = format!(
+            "{} points on surfaces by matching {views} views",
+            points.len()
+        );
+        (self.on_event)(Event::Note(text));
         self.dense_points = (points.iter())
             .map(|point| OrientedPoint {
                 position: point.position_in_world.map(|x| x as f32).into(),
