@@ -31,7 +31,8 @@ pub struct LossConfig {
     pub junction_3d: f64,
     /// Distance of their projections (calibrated).
     pub junction_2d: f64,
-    /// Distance of the surface from sparse points of the scene, in the world.
+    /// Error of the distance at points on the surface, or of known distance from it, in
+    /// the world.
     #[serde(default)]
     pub points: f64,
     /// Rays whose segment misses its 2D segment by this many pixels or more do
@@ -104,7 +105,7 @@ pub struct Losses {
     pub junction_3d: f64,
     /// Junctions in the image, calibrated.
     pub junction_2d: f64,
-    /// Distance of the surface from sparse points.
+    /// Error of the distance at points where it is known.
     #[serde(default)]
     pub points: f64,
 }
@@ -214,7 +215,7 @@ pub static LOSS_TERMS: [LossTerm; 7] = [
     LossTerm {
         name: "points",
         label: "Sparse point",
-        what: "distance of sparse points: `neat_sdf::losses::point_loss`",
+        what: "distance at points of known distance: `neat_sdf::losses::point_loss`",
         weight: |weights| weights.points,
         value: |losses| &mut losses.points,
         mean_over: MeanOver::Batch,
