@@ -131,4 +131,40 @@ mod tests {
         assert_eq!(drawn, points.draw(64, 0.0, 7, 3));
         assert_ne!(drawn, points.draw(64, 0.0, 7, 4));
     }
+
+    #[test]
+    fn points_with_normals_are_drawn_beside_the_surface() {
+        let mut points = SurfacePoints {
+            in_world: vec![[0.0; 3]],
+            ..SurfacePoints::default()
+        };
+        let oriented = |x: f32| OrientedPoint {
+            position: [x, 0.0, 0.0],
+            normal: [0.0, 0.0, 1.0],
+        };
+        points.extend(&[oriented(0.5), oriented(1.5)], 1.0);
+        let drawn = points.draw(200, 0.1, 3, 4);
+        let (sparse, dense): (Vec<_>, Vec<_>) = drawn.iter().partition(|d| d.point[0] == 0.0);
+        assert!(sparse.len() > 50 && dense.len() > 50);
+        // Without a normal a point speaks for itself alone.
+        assert!(
+            sparse
+                .iter()
+                .all(|known| known.distance == 0.0 && known.point == [0.0; 3])
+        );
+        assert!(
+            dense
+                .iter()
+                .all(|known| known.point == [0.5, 0.0, known.distance])
+        );
+        let most = |side: f32| dense.iter().map(|d| side * d.distance).fold(0.0, f32::max);
+        let near_the_reach = 0.08..=0.1;
+        assert!(near_the_reach.contains(&most(1.0)) && near_the_reach.contains(&most(-1.0)));
+        assert!(
+            points
+                .draw(9, 0.0, 3, 4)
+                .iter()
+                .all(|known| known.distance == 0.0)
+        );
+    }
 }
