@@ -144,7 +144,8 @@ mod tests {
         };
         points.extend(&[oriented(0.5), oriented(1.5)], 1.0);
         let drawn = points.draw(200, 0.1, 3, 4);
-        let (sparse, dense): (Vec<_>, Vec<_>) = drawn.iter().partition(|d| d.point[0] == 0.0);
+        let (sparse, dense): (Vec<KnownDistance>, Vec<KnownDistance>) =
+            drawn.into_iter().partition(|known| known.point[0] == 0.0);
         assert!(sparse.len() > 50 && dense.len() > 50);
         // Without a normal a point speaks for itself alone.
         assert!(
