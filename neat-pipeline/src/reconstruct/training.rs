@@ -88,22 +88,25 @@ impl Session<'_> {
     fn match_photographs(&mut self, cancelled: &AtomicBool) -> Result<(), PipelineError> {
         let radius = self.plan.config().data.scene_radius;
         let radius = radius.unwrap_or(self.scene.sphere_radius);
-        let (scene, stage) = (&self.scene, Stage::Match);
-        let points = timed(self.on_event, stage, |on_event| {
+        let (scene, manifest, on_event) = (&self.scene, &mut self.manifest, &mut self.on_event);
+        let tell = &mut |event: Event<'_>| {
+            manifest.record(&event);
+            on_event(event);
+        };
+        let stage = Stage::Match;
+        let points = timed(tell, stage, |tell| {
             neat_stereo::match_views(scene, radius, &mut |fraction| {
-                on_event(Event::StageProgress { stage, fraction });
+                tell(Event::StageProgress { stage, fraction });
                 match cancelled.load(Ordering::Relaxed) {
                     true => ControlFlow::Break(()),
                     false => ControlFlow::Continue(()),
                 }
             })
         })?;
-        let views = self.scene.views.len();
-        let text = format!(
-            "{} points on surfaces by matching {views} views",
-            points.len()
-        );
-        (self.on_event)(Event::Note(text));
+        let (found, views) = (points.len(), scene.views.len());
+        tell(Event::Note(format!(
+            "{found} points on surfaces by matching {views} views"
+        )));
         self.dense_points = (points.iter())
             .map(|point| OrientedPoint {
                 position: point.position_in_world.map(|x| x as f32).into(),
