@@ -168,7 +168,10 @@ impl Trainer {
         Ok(trainer)
     }
 
-    /// With more points on surfaces than the sparse ones of the scene.
+    /// With more points on surfaces than the sparse ones of the scene, such as whoever runs
+    /// the trainer finds where [`TrainConfig::dense_points`] asks for them.
+    ///
+    /// [`TrainConfig::dense_points`]: crate::config::TrainConfig::dense_points
     pub fn with_oriented_points(mut self, points: &[OrientedPoint]) -> Self {
         self.surface_points.extend(points, self.scene_radius);
         self
