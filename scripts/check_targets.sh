@@ -8,7 +8,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-crates=(neat-core neat-detect neat-doctor neat-wireframe neat-eval neat-export neat-report neat-images)
+crates=(neat-core neat-detect neat-stereo neat-doctor neat-wireframe neat-eval neat-export neat-report neat-images)
 # What starts processes, which a page in a browser cannot.
 native=(neat-batch)
 if [ "${1:-}" = --all ]; then

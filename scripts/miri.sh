@@ -14,7 +14,7 @@ cd "$(dirname "$0")/.."
 seconds=${1:?usage: miri.sh SECONDS [CRATE]...}
 shift
 crates=("$@")
-[ $# -gt 0 ] || crates=(neat-core neat-detect neat-wireframe neat-eval neat-export neat-report neat-images neat-batch neat-doctor)
+[ $# -gt 0 ] || crates=(neat-core neat-detect neat-stereo neat-wireframe neat-eval neat-export neat-report neat-images neat-batch neat-doctor)
 # Tests read files and ask for the time. Rayon's queues need the newer model of borrows. Without
 # the last, each sine differs by some random last digits: tests of equality mean none of that.
 export MIRIFLAGS="-Zmiri-disable-isolation -Zmiri-tree-borrows -Zmiri-ignore-leaks -Zmiri-deterministic-floats"

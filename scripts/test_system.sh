@@ -5,7 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 built=(--locked --release --package neat-cli --package neat-capi)
-free=(neat-core neat-detect neat-doctor neat-wireframe neat-eval neat-export neat-report neat-images neat-web neat-batch)
+free=(neat-core neat-detect neat-stereo neat-doctor neat-wireframe neat-eval neat-export neat-report neat-images neat-web neat-batch)
 cargo build "${built[@]}"
 for crate in "${free[@]}"; do
     built+=(--package "$crate")

@@ -79,6 +79,25 @@ fn reconstruct_leaves_every_result() {
 }
 
 #[test]
+fn photographs_are_matched_before_a_field_is_trained() {
+    let scene = TestScene::new();
+    let manifest = |background: &str| {
+        let mut command = scene.run("train", "1");
+        command.args(["--overwrite", "--set", "train.dense_points=true", "--set"]);
+        let assert = command.arg(format!("data.background={background}"));
+        let told = stderr(&assert.assert().success());
+        (json(&scene.file("run/manifest.json")), told)
+    };
+    let (photo, told) = manifest("photo");
+    assert!(photo["seconds"]["match"].is_number(), "{photo}");
+    assert!(told.contains("points on surfaces by matching"), "{told}");
+
+    let (black, told) = manifest("black");
+    assert!(black["seconds"].get("match").is_none(), "{black}");
+    assert!(told.contains("train.dense_points: false"), "{told}");
+}
+
+#[test]
 fn programs_read_what_is_decided_and_what_has_no_effect() {
     let scene = TestScene::new();
     let mut command = scene.run("reconstruct", "1");

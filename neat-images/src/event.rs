@@ -20,6 +20,8 @@ pub enum Stage {
     Detect,
     /// Poses and images are examined, see the crate `neat-doctor`.
     Examine,
+    /// Photographs are matched for points on surfaces.
+    Match,
     /// The fields are optimised.
     Train,
     /// The wireframe is taken out of the fields.
@@ -37,6 +39,7 @@ impl fmt::Display for Stage {
             Self::Load => "load",
             Self::Detect => "detect",
             Self::Examine => "examine",
+            Self::Match => "match",
             Self::Train => "train",
             Self::Distill => "distill",
             Self::Export => "export",

@@ -7,6 +7,7 @@ use crate::run_dir::RunDirError;
 use neat_core::SceneError;
 use neat_images::error::ImagesError;
 use neat_report::ReportError;
+use neat_stereo::StereoError;
 use neat_tensor::BackendError;
 use neat_tensor::checkpoint::CheckpointError;
 use neat_train::TrainError;
@@ -110,6 +111,15 @@ impl From<PlanError> for PipelineError {
             PlanError::Open(_) | PlanError::NoField(_) | PlanError::NoFieldForPartners => {
                 Self::Train(TrainError::Config(error.to_string()))
             }
+        }
+    }
+}
+
+impl From<StereoError> for PipelineError {
+    fn from(error: StereoError) -> Self {
+        match error {
+            StereoError::Interrupted => Self::InterruptedIn(Stage::Match),
+            StereoError::Scene(error) => Self::Scene(error),
         }
     }
 }

@@ -147,6 +147,12 @@ fn settle_field(
         let reason = "as photographs show no silhouettes".to_owned();
         decide("train.loss.mask", &0, reason);
     }
+    let is_black = config.data.background == Some(Choice::Given(Background::Black));
+    if trains && is_black && config.train.dense_points {
+        config.train.dense_points = false;
+        let reason = "as objects on black have outlines and little texture".to_owned();
+        decide("train.dense_points", &false, reason);
+    }
     if config.model.implicit.bounding_sphere_slope == 0.0 {
         let slope = &mut config.model.implicit.bounding_sphere_slope;
         match earlier {

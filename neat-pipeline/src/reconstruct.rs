@@ -145,6 +145,7 @@ pub fn distill_run(
         manifest: opened.manifest,
         scene: opened.scene,
         device: opened.device,
+        dense_points: Vec::new(),
         ray_chunk: None,
         finished: false,
         on_event,

@@ -30,10 +30,10 @@ fn eikonal_terms(gradient: Tensor<2>) -> Tensor<2> {
         .square()
 }
 
-/// Mean absolute distance `sdf` `[N, 1]` at points that lie on the surface, as in
-/// Geo-NeuS (Fu et al., NeurIPS 2022).
-pub fn point_loss(sdf: Tensor<2>) -> Tensor<1> {
-    sdf.abs().mean()
+/// Mean absolute error of `sdf` `[N, 1]` at points whose distance from the surface is
+/// known: on it as in Geo-NeuS (Fu et al., NeurIPS 2022), or `distance` `[N, 1]` away.
+pub fn point_loss(sdf: Tensor<2>, distance: Tensor<2>) -> Tensor<1> {
+    (sdf - distance).abs().mean()
 }
 
 /// Mean binary cross entropy of the accumulated weight `opacity` `[R, 1]`

@@ -69,6 +69,14 @@ pub struct TrainConfig {
     /// a scene without sparse points has no such term.
     #[serde(default)]
     pub surface_points: usize,
+    /// Before the training, points on surfaces are found by matching the photographs (crate
+    /// `neat-stereo`) and join the sparse points.
+    #[serde(default)]
+    pub dense_points: bool,
+    /// Points with a normal also speak for what lies off the surface: they are moved along it
+    /// by up to so much (world), to either side, where the distance should be as much.
+    #[serde(default)]
+    pub surface_point_reach: f64,
     /// Weights of the loss terms.
     pub loss: LossConfig,
     /// How rendered end points become targets of the global junctions.
@@ -130,6 +138,8 @@ impl Default for TrainConfig {
             min_sample_weight: None,
             eikonal: EikonalConfig::default(),
             surface_points: 0,
+            dense_points: false,
+            surface_point_reach: 0.0,
             loss: LossConfig::default(),
             candidates: CandidateConfig::published(),
             only_counted_ends: false,

@@ -40,4 +40,5 @@ pub use error::TrainError;
 pub use field::{SurfaceGrid, TrainedField};
 pub use losses::{LOSS_TERMS, StepInput};
 pub use step::{StepLoss, StepTimings, step_loss};
+pub use surface_points::{KnownDistance, OrientedPoint};
 pub use trainer::Trainer;

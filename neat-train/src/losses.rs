@@ -5,6 +5,7 @@
 
 use crate::batch::Batch;
 use crate::model::{NeatModel, PlacedSamples, Rendering};
+use crate::surface_points::KnownDistance;
 use burn::tensor::{Device, Tensor, TensorData};
 use neat_field::segment_loss::SegmentLossConfig;
 use neat_gjp::candidates::JunctionView;
@@ -30,7 +31,8 @@ pub struct LossConfig {
     pub junction_3d: f64,
     /// Distance of their projections (calibrated).
     pub junction_2d: f64,
-    /// Distance of the surface from sparse points of the scene, in the world.
+    /// Error of the distance at points on the surface, or of known distance from it, in
+    /// the world.
     #[serde(default)]
     pub points: f64,
     /// Rays whose segment misses its 2D segment by this many pixels or more do
@@ -103,7 +105,7 @@ pub struct Losses {
     pub junction_3d: f64,
     /// Junctions in the image, calibrated.
     pub junction_2d: f64,
-    /// Distance of the surface from sparse points.
+    /// Error of the distance at points where it is known.
     #[serde(default)]
     pub points: f64,
 }
@@ -213,15 +215,19 @@ pub static LOSS_TERMS: [LossTerm; 7] = [
     LossTerm {
         name: "points",
         label: "Sparse point",
-        what: "distance of sparse points: `neat_sdf::losses::point_loss`",
+        what: "distance at points of known distance: `neat_sdf::losses::point_loss`",
         weight: |weights| weights.points,
         value: |losses| &mut losses.points,
         mean_over: MeanOver::Batch,
         function: |batch| {
             let points = batch.step.surface_points;
             (!points.is_empty()).then(|| {
-                let points = point_tensor(points, batch.device);
-                point_loss(batch.model.implicit_network.sdf_uncapped(points))
+                let places: Vec<[f32; 3]> = points.iter().map(|known| known.point).collect();
+                let distances: Vec<f32> = points.iter().map(|known| known.distance).collect();
+                let distances = TensorData::new(distances, [points.len(), 1]);
+                let sdf = (batch.model.implicit_network)
+                    .sdf_uncapped(point_tensor(&places, batch.device));
+                point_loss(sdf, Tensor::from_data(distances, batch.device))
             })
         },
     },
@@ -239,8 +245,8 @@ pub struct StepInput<'a> {
     pub eikonal_points: &'a [[f32; 3]],
     /// More of them that only the device knows, `[K, 3]`, without gradient.
     pub eikonal_samples: Option<&'a Tensor<2>>,
-    /// Points that should lie on the surface.
-    pub surface_points: &'a [[f32; 3]],
+    /// Points on the surface or at known distances from it.
+    pub surface_points: &'a [KnownDistance],
     /// The views that [`Batch::view_of_ray`] speaks of: camera and 2D junctions.
     pub views: &'a [JunctionView<'a>],
     /// Whether the junction terms are due.

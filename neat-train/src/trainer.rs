@@ -9,7 +9,7 @@ use crate::flops::StepRows;
 use crate::losses::Losses;
 use crate::model::NeatModel;
 use crate::step::{Step, StepExecutor, StepOutcome, StepTimings};
-use crate::surface_points::SurfacePoints;
+use crate::surface_points::{OrientedPoint, SurfacePoints};
 use crate::training_data::TrainingData;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -168,6 +168,15 @@ impl Trainer {
         Ok(trainer)
     }
 
+    /// With more points on surfaces than the sparse ones of the scene, such as whoever runs
+    /// the trainer finds where [`TrainConfig::dense_points`] asks for them.
+    ///
+    /// [`TrainConfig::dense_points`]: crate::config::TrainConfig::dense_points
+    pub fn with_oriented_points(mut self, points: &[OrientedPoint]) -> Self {
+        self.surface_points.extend(points, self.scene_radius);
+        self
+    }
+
     /// Factor on all learning rates of the configuration.
     pub fn learning_rate_scale(&self) -> f64 {
         self.learning_rate_scale
@@ -291,7 +300,12 @@ impl Trainer {
             density: &model.density,
             batch: &batch,
             views: &views,
-            surface_points: &self.surface_points.draw(points, self.seed, self.iteration),
+            surface_points: &self.surface_points.draw(
+                points,
+                train.surface_point_reach,
+                self.seed,
+                self.iteration,
+            ),
             seed: self.seed,
             iteration: self.iteration,
             schedule,

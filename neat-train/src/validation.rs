@@ -63,6 +63,15 @@ impl TrainingConfig {
         if self.scene_radius.is_some_and(|r| !positive(r)) {
             return refuse("data.scene_radius must be positive");
         }
+        let reach = train.surface_point_reach;
+        if !(0.0..f64::INFINITY).contains(&reach) {
+            return refuse("train.surface_point_reach must be 0 or more");
+        }
+        if train.dense_points && (train.surface_points == 0 || train.loss.points == 0.0) {
+            return refuse(
+                "train.dense_points needs train.surface_points and train.loss.points above 0",
+            );
+        }
         let rates = [
             train.learning_rate,
             train.grid_learning_rate,
@@ -212,6 +221,24 @@ mod tests {
             grid.contains("grids of model.attraction.encoding"),
             "{grid}"
         );
+    }
+
+    #[test]
+    fn points_that_nobody_asks_are_refused() {
+        for reach in [-0.1, f64::NAN, f64::INFINITY] {
+            let refused = refusal(|config| config.train.surface_point_reach = reach);
+            assert!(refused.contains("surface_point_reach"), "{refused}");
+        }
+        let dense = |count: usize, weight: f64| {
+            refusal(|config| {
+                config.train.dense_points = true;
+                config.train.surface_points = count;
+                config.train.loss.points = weight;
+            })
+        };
+        assert!(dense(0, 1.0).contains("needs train.surface_points"));
+        assert!(dense(8, 0.0).contains("needs train.surface_points"));
+        assert_eq!(dense(8, 1.0), "");
     }
 
     #[test]

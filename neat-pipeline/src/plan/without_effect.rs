@@ -87,12 +87,19 @@ fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)>
     if plan.background() == Some(Background::Photo) {
         idle.push(("train.loss.mask", "photographs show no silhouettes"));
     }
-    if !given.sparse_points {
+    let dense_points = plan.config().train.dense_points;
+    if !given.sparse_points && !dense_points {
         let reason = "the scene has no sparse points";
         idle.extend([
             ("train.loss.points", reason),
             ("train.surface_points", reason),
         ]);
+    }
+    if !dense_points {
+        idle.push(("train.surface_point_reach", "sparse points have no normals"));
+    }
+    if plan.background() == Some(Background::Black) {
+        idle.push(("train.dense_points", "the background is black"));
     }
     if !given.detected {
         let reason = "the scene has 2D wireframes";
@@ -185,5 +192,15 @@ mod tests {
         assert!(told_of_run[0].message.contains("train.steps = 5"));
         let points = with(black, "train.surface_points=8");
         assert!(points[0].contains("no sparse points"), "{points:?}");
+        let reach = with(photo, "train.surface_point_reach=0.1");
+        assert!(reach[0].contains("no normals"), "{reach:?}");
+        let dense = [
+            "distill.field=trained",
+            photo,
+            "train.dense_points=true",
+            "train.surface_points=8",
+            "train.surface_point_reach=0.1",
+        ];
+        assert!(told(&dense).is_empty());
     }
 }

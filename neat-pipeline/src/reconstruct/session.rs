@@ -18,7 +18,7 @@ use burn::tensor::Device;
 use neat_core::{Scene, SceneError, file, hawp_json};
 use neat_tensor::Backend;
 use neat_tensor::backend::gpu_name;
-use neat_train::TrainError;
+use neat_train::{OrientedPoint, TrainError};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,6 +31,8 @@ pub(super) struct Session<'a> {
     pub manifest: Manifest,
     pub scene: Scene,
     pub device: Device,
+    /// Points on surfaces beside the sparse ones of the scene.
+    pub dense_points: Vec<OrientedPoint>,
     /// Rays per pass, where the device could not take as many as planned.
     pub ray_chunk: Option<usize>,
     /// Whether the run had ended when the session began.
@@ -102,6 +104,7 @@ impl<'a> Session<'a> {
             manifest,
             scene: prepared.scene,
             device,
+            dense_points: Vec::new(),
             ray_chunk: None,
             finished,
             on_event,

@@ -6,16 +6,17 @@ use super::device_failure::{self, Replacement};
 use super::session::Session;
 use crate::changes::Belonging;
 use crate::error::PipelineError;
-use crate::event::{Event, Stage, WarningKind};
+use crate::event::{Event, Stage, WarningKind, timed};
 use crate::manifest::Manifest;
 use crate::run_dir::{Existing, RunDir};
 use nalgebra::Vector3;
 use neat_tensor::backend::is_on_host;
 use neat_tensor::checkpoint::Checkpoint;
 use neat_tensor::{Backend, Kernels};
-use neat_train::TrainedField;
 use neat_train::Trainer;
 use neat_train::step_log::{JunctionsLine, StepLog};
+use neat_train::{OrientedPoint, TrainedField};
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -62,6 +63,9 @@ impl Session<'_> {
         options: &RunOptions,
         cancelled: &AtomicBool,
     ) -> Result<TrainedField, PipelineError> {
+        if self.plan.config().train.dense_points {
+            self.match_photographs(cancelled)?;
+        }
         (self.on_event)(Event::StageStarted(Stage::Train));
         let field = loop {
             // Only a GPU fails by itself; a panic on the CPU is our mistake.
@@ -77,6 +81,39 @@ impl Session<'_> {
         let stage = Stage::Train;
         (self.on_event)(Event::StageFinished { stage, seconds });
         Ok(field)
+    }
+
+    /// Finds points on surfaces by matching the photographs. A run that goes on finds the
+    /// same ones again.
+    fn match_photographs(&mut self, cancelled: &AtomicBool) -> Result<(), PipelineError> {
+        let radius = self.plan.config().data.scene_radius;
+        let radius = radius.unwrap_or(self.scene.sphere_radius);
+        let (scene, manifest, on_event) = (&self.scene, &mut self.manifest, &mut self.on_event);
+        let tell = &mut |event: Event<'_>| {
+            manifest.record(&event);
+            on_event(event);
+        };
+        let stage = Stage::Match;
+        let points = timed(tell, stage, |tell| {
+            neat_stereo::match_views(scene, radius, &mut |fraction| {
+                tell(Event::StageProgress { stage, fraction });
+                match cancelled.load(Ordering::Relaxed) {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                }
+            })
+        })?;
+        let (found, views) = (points.len(), scene.views.len());
+        tell(Event::Note(format!(
+            "{found} points on surfaces by matching {views} views"
+        )));
+        self.dense_points = (points.iter())
+            .map(|point| OrientedPoint {
+                position: point.position_in_world.map(|x| x as f32).into(),
+                normal: point.normal_in_world.map(|x| x as f32).into(),
+            })
+            .collect();
+        Ok(())
     }
 
     /// Trains on the device of the session; after a numerical failure with lower
@@ -196,10 +233,11 @@ impl Session<'_> {
             config.train.ray_chunk = Some(chunk);
         }
         let (scene, device, seed) = (&self.scene, &self.device, options.seed);
-        Ok(match self.dir.usable_checkpoint()? {
+        let trainer = match self.dir.usable_checkpoint()? {
             Some(usable) => Trainer::resume(scene, &config, seed, device, usable.checkpoint)?,
             None => Trainer::new(scene, &config, seed, device)?,
-        })
+        };
+        Ok(trainer.with_oriented_points(&self.dense_points))
     }
 
     /// Takes less memory, or another device, after the device has failed.

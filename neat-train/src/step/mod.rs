@@ -17,6 +17,7 @@ use crate::device_sampling::DeviceSampling;
 use crate::flops::StepRows;
 use crate::losses::{Losses, StepInput};
 use crate::model::{NeatModel, PlacedSamples};
+use crate::surface_points::KnownDistance;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor};
 use neat_core::assignment::AssignmentError;
@@ -39,8 +40,8 @@ pub(crate) struct Step<'a> {
     pub density: &'a DensityConfig,
     pub batch: &'a Batch,
     pub views: &'a [JunctionView<'a>],
-    /// Points that should lie on the surface.
-    pub surface_points: &'a [[f32; 3]],
+    /// Points on the surface or at known distances from it.
+    pub surface_points: &'a [KnownDistance],
     pub seed: u64,
     /// Steps done before.
     pub iteration: u64,
