@@ -9,7 +9,7 @@ use super::line_fitting::directions_across;
 use super::line_selection::ChosenLine;
 use super::projected_line::ProjectedLine;
 use super::straightness::{BOW_AGREEMENT, CORRELATION};
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 
@@ -107,34 +107,58 @@ struct Parabola {
     gain: f64,
 }
 
-/// The best parabola that leaves the line at the first of some stations.
-fn parabola<'s>(stations: impl Iterator<Item = (usize, &'s Station)>) -> Option<Parabola> {
-    let mut matrix = Matrix2::zeros();
-    let mut right = Vector2::zeros();
-    for (k, station) in stations {
-        let square = (k as f64 + 0.5).powi(2);
-        matrix += station.matrix * (square * square);
-        right += station.right * square;
+/// The parabola that leaves the line at station `start`. It gains what it does beside this line,
+/// or beside the best one through all stations if that is less: a line that lies a little off
+/// is left by its edgels, too, but not for an arc.
+fn parabola(stations: &[Station], start: usize) -> Option<Parabola> {
+    let mut matrix = Matrix6::zeros();
+    let mut right = Vector6::zeros();
+    let count = stations.len() as f64;
+    for (k, station) in stations.iter().enumerate() {
+        let beyond = (k + 1).saturating_sub(start) as f64 - 0.5;
+        let basis = [1.0, k as f64 / count, beyond.max(0.0).powi(2) / count];
+        for (row, a) in basis.iter().enumerate() {
+            let mut part = right.fixed_rows_mut::<2>(2 * row);
+            part += station.right * *a;
+            for (column, b) in basis.iter().enumerate() {
+                let mut block = matrix.fixed_view_mut::<2, 2>(2 * row, 2 * column);
+                block += station.matrix * (a * b);
+            }
+        }
     }
     // A direction that no view tells of stays where it is.
-    let ridge = 1e-9 * matrix.trace();
-    let factor = (matrix + Matrix2::identity() * ridge).cholesky()?;
-    let bend = factor.solve(&right);
-    let gain = 0.5 * right.dot(&bend);
-    Some(Parabola { bend, gain })
+    matrix += Matrix6::identity() * (1e-9 * matrix.trace());
+    let (line, bent) = (
+        matrix.fixed_view::<4, 4>(0, 0),
+        matrix.fixed_view::<2, 2>(4, 4),
+    );
+    let (of_line, of_bend) = (right.fixed_rows::<4>(0), right.fixed_rows::<2>(4));
+    let best_line = line.into_owned().cholesky()?.solve(&of_line);
+    let best_bend = bent.into_owned().cholesky()?.solve(&of_bend);
+    let best_of_both = matrix.cholesky()?.solve(&right);
+    let beside_best_line = right.dot(&best_of_both) - of_line.dot(&best_line);
+    Some(Parabola {
+        bend: best_bend,
+        gain: 0.5 * of_bend.dot(&best_bend).min(beside_best_line),
+    })
 }
 
 /// The station after which a parabola leaves the line, or all of them.
 fn straight_until(halves: &[Vec<Station>; 2], variance: f64) -> usize {
     let count = halves[0].len();
     let first = count - (MOST * count as f64) as usize;
-    let of_half = |half: usize, start: usize| parabola(halves[half][start..].iter().enumerate());
+    let whole: Vec<Station> = (halves[0].iter().zip(&halves[1]))
+        .map(|(one, other)| Station {
+            matrix: one.matrix + other.matrix,
+            right: one.right + other.right,
+        })
+        .collect();
     let gain = |start: usize| {
-        let both = (0..2).flat_map(|half| halves[half][start..].iter().enumerate());
-        let whole = parabola(both)?;
-        let [one, other] = [of_half(0, start)?.bend, of_half(1, start)?.bend];
+        let found = parabola(&whole, start).filter(|found| found.gain > ADVANTAGE * variance)?;
+        let one = parabola(&halves[0], start)?.bend;
+        let other = parabola(&halves[1], start)?.bend;
         let agree = one.dot(&other) > BOW_AGREEMENT * one.norm() * other.norm();
-        (agree && whole.gain > ADVANTAGE * variance).then_some((whole.gain, start))
+        agree.then_some((found.gain, start))
     };
     let best = (first..=count.saturating_sub(MIN_STATIONS))
         .filter_map(gain)
@@ -175,9 +199,15 @@ mod tests {
         assert!(end_distance(&cut, &truth) < 0.01, "{cut:?}");
         assert_eq!(cut.start, late.start);
 
-        // A corner is none.
+        // Nor does an edge beside its line begin an arc.
         let cube = TestViews::of_cube(20);
         let images = cube.images();
+        let edge = cube_edge(3);
+        let evidence = images.evidence(&edge, None, 0.0);
+        let aside = LineSegment3::new(edge.start, edge.end + Vector3::new(0.002, 0.002, 0.002));
+        assert_eq!(images.without_tangent_ends(&aside, &evidence, 0.02), aside);
+
+        // A corner is none.
         for edge in 0..12 {
             let evidence = images.evidence(&cube_edge(edge), None, 0.0);
             let cut = images.without_tangent_ends(&cube_edge(edge), &evidence, 0.05);
