@@ -131,6 +131,19 @@ pub struct Ray {
     pub direction: Vector3<f64>,
 }
 
+impl Ray {
+    /// Distances at which it enters and leaves the ball of radius `radius` around the origin,
+    /// from its own origin on; `None` where it misses the ball.
+    pub fn interval_in_ball(&self, radius: f64) -> Option<[f64; 2]> {
+        let middle = -self.origin.dot(&self.direction);
+        let nearest = self.origin + middle * self.direction;
+        let squared_half = radius * radius - nearest.norm_squared();
+        let half = (squared_half > 0.0).then(|| squared_half.sqrt())?;
+        let far = middle + half;
+        (far > 0.0).then(|| [(middle - half).max(0.0), far])
+    }
+}
+
 /// Where a world point appears in a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection {
@@ -334,5 +347,20 @@ impl Camera {
     /// Viewing direction (+Z of the camera) in the world.
     pub fn forward(&self) -> Vector3<f64> {
         self.world_from_camera.column(2).into_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_cross_the_ball_where_they_should() {
+        let interval = |origin, direction| Ray { origin, direction }.interval_in_ball(1.0);
+        let origin = Vector3::new(-3.0, 0.0, 0.0);
+        assert_eq!(interval(origin, Vector3::x()), Some([2.0, 4.0]));
+        assert_eq!(interval(origin, -Vector3::x()), None);
+        assert_eq!(interval(origin, Vector3::y()), None);
+        assert_eq!(interval(Vector3::zeros(), Vector3::y()), Some([0.0, 1.0]));
     }
 }

@@ -1,9 +1,9 @@
 //! A view held against its neighbours at one level of their pyramids.
 
-use crate::neighbours::ball_interval;
 use crate::patch::Patch;
 use crate::view::{StereoView, Transfer};
 use nalgebra::{Matrix3, Vector3};
+use neat_core::Ray;
 
 /// Neighbours that a view is held against, at most.
 pub(crate) const MAX_OTHERS: usize = 4;
@@ -84,7 +84,11 @@ impl<'a> Matcher<'a> {
         let ray: Vector3<f64> = target.ray.cast();
         let length = ray.norm();
         let direction = camera.world_from_camera * ray / length;
-        let [near, far] = ball_interval(&camera.center_in_world, &direction, ball_radius)?;
+        let sight = Ray {
+            origin: camera.center_in_world,
+            direction,
+        };
+        let [near, far] = sight.interval_in_ball(ball_radius)?;
         let [low, high] = [far, near].map(|distance| (length / distance) as f32);
         Some([low, high.min(self.nearest)])
     }

@@ -7,9 +7,9 @@
 //! 3D hypothesis (Hofer et al., *Efficient 3D scene abstraction using line
 //! segments*, 2017, Sec. 3.2).
 
-use super::neighbours::ball_interval;
 use super::view_segments::PreparedView;
 use nalgebra::Vector3;
+use neat_core::Ray;
 use std::f64::consts::{PI, TAU};
 
 /// The common arc must be at least this share of the longer of the two arcs.
@@ -204,8 +204,9 @@ impl<'a> ViewPair<'a> {
 
     fn seed(&self, segment: usize, ball_radius: f64) -> Option<Seed<'_>> {
         let rays = &self.view.segments[segment].rays;
-        let center = &self.view.camera.center_in_world;
-        let [start, end] = rays.map(|ray| ball_interval(center, &ray, ball_radius));
+        let origin = self.view.camera.center_in_world;
+        let [start, end] =
+            rays.map(|direction| Ray { origin, direction }.interval_in_ball(ball_radius));
         Some(Seed {
             rays,
             arc: self.pencil.arc(rays)?,
