@@ -4,7 +4,8 @@
 //! the field is still wrong; the means of the piles are the candidates for
 //! junctions (paper §4.2).
 
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use kiddo::leaf_strategies::VecOfArenas;
+use kiddo::{EytzingerNoPf, KdTree, SquaredEuclidean};
 
 /// Query radii are widened by this factor: the tree may round at the boundary,
 /// the distance test behind it does not.
@@ -105,11 +106,14 @@ fn means(points: &[[f32; 3]], labels: &[Option<usize>]) -> Vec<[f32; 3]> {
         .collect()
 }
 
+/// Kiddo's usual tree but for its prefetching, which computes addresses outside of what it owns.
+type Tree = KdTree<f64, u32, EytzingerNoPf, VecOfArenas<f64, u32, 3, 32>, 3, 32>;
+
 /// Which points lie within `eps` of which, both inclusive.
 struct Neighborhoods {
     points: Vec<[f64; 3]>,
     /// Over the finite points only: a NaN breaks the order of a k-d tree.
-    tree: ImmutableKdTree<f64, 3>,
+    tree: Tree,
     /// Point index of each item of the tree.
     finite: Vec<usize>,
     squared_eps: f64,
@@ -122,7 +126,7 @@ impl Neighborhoods {
         let finite: Vec<usize> = (0..points.len()).filter(is_finite).collect();
         let in_tree: Vec<[f64; 3]> = finite.iter().map(|&i| points[i]).collect();
         Self {
-            tree: ImmutableKdTree::new_from_slice(&in_tree)
+            tree: Tree::new_from_slice(&in_tree)
                 .expect("dbscan_means: more than u32::MAX points"),
             points,
             finite,

@@ -3,15 +3,19 @@
 
 use super::MetricsError;
 use crate::validity::is_finite;
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use kiddo::leaf_strategies::VecOfArenas;
+use kiddo::{EytzingerNoPf, KdTree, SquaredEuclidean};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 
+/// Kiddo's usual tree but for its prefetching, which computes addresses outside of what it owns.
+type Tree = KdTree<f64, u32, EytzingerNoPf, VecOfArenas<f64, u32, 3, 32>, 3, 32>;
+
 /// Points that can be asked for the nearest of them.
 pub struct PointCloud {
     /// `None` without points: there is no nearest one.
-    tree: Option<ImmutableKdTree<f64, 3>>,
+    tree: Option<Tree>,
 }
 
 impl PointCloud {
@@ -27,7 +31,7 @@ impl PointCloud {
             return Ok(Self { tree: None });
         }
         let coordinates: Vec<[f64; 3]> = points.iter().map(|p| [p.x, p.y, p.z]).collect();
-        let tree = ImmutableKdTree::new_from_slice(&coordinates).map_err(|_| {
+        let tree = Tree::new_from_slice(&coordinates).map_err(|_| {
             MetricsError::TooManyPoints {
                 points: points.len(),
             }
