@@ -215,7 +215,7 @@ fn scene_scores(input: &Input, dir: &Path) -> Result<String> {
     );
     for shares in &scores.thresholds {
         text += &format!(
-            "; within {}: precision {:.3}, recall {:.3}",
+            "; within {:.4}: precision {:.3}, recall {:.3}",
             shares.threshold,
             shares.precision.unwrap_or(0.0),
             shares.recall.unwrap_or(0.0)

@@ -1,6 +1,5 @@
 //! Points spread evenly over triangles.
 
-use crate::total::total;
 use crate::triangle::{Triangle, area};
 use nalgebra::Vector3;
 
@@ -17,17 +16,14 @@ pub(super) struct AreaSample {
     pub triangle: usize,
 }
 
-/// `count` points, each for the same area: systematic sampling along the sum of all areas, so that
-/// no triangle has more than one point too many or too few. None without an area.
-pub(super) fn area_samples(triangles: &[Triangle], count: usize) -> Vec<AreaSample> {
-    let step = total(triangles.iter().map(area)) / count as f64;
+/// Points that each stand for a square of this side: systematic sampling along the sum of all
+/// areas, so that no triangle has more than one point too many or too few.
+pub(super) fn area_samples(triangles: &[Triangle], side: f64) -> Vec<AreaSample> {
+    let step = side * side;
     let (mut samples, mut sum) = (Vec::new(), 0.0);
-    if step <= 0.0 {
-        return samples;
-    }
     for (index, corners) in triangles.iter().enumerate() {
         sum += area(corners);
-        while samples.len() < count && (samples.len() as f64 + 0.5) * step < sum {
+        while (samples.len() as f64 + 0.5) * step < sum {
             samples.push(AreaSample {
                 point: inner_point(corners, samples.len()),
                 triangle: index,
@@ -62,7 +58,8 @@ mod tests {
                 Vector3::y() + Vector3::z(),
             ],
         ];
-        let samples = area_samples(&triangles, 400);
+        // 400 points for an area of 2.
+        let samples = area_samples(&triangles, 0.005_f64.sqrt());
         let of = |index: usize| samples.iter().filter(move |s| s.triangle == index);
         assert_eq!([of(0).count(), of(1).count(), of(2).count()], [300, 0, 100]);
         assert!(of(2).all(|s| s.point.z == 1.0 && s.point.x + s.point.y <= 1.0 + 1e-12));
@@ -72,6 +69,6 @@ mod tests {
             (mean - Vector3::new(1.0, 1.0 / 3.0, 0.0)).norm() < 0.02,
             "{mean}"
         );
-        assert!(area_samples(&[], 10).is_empty());
+        assert!(area_samples(&[], 1.0).is_empty());
     }
 }

@@ -1,7 +1,8 @@
 //! How much of the found faces is surface, and how much of the planar surface is found.
 //!
 //! Source: ours, for rendered scenes with their exact mesh. Points are spread evenly over the found
-//! faces, and over the planar parts of the mesh that at least three views see. A point is right
+//! faces, and over the planar parts of the mesh that at least three views see, as far as the true
+//! creases reach: the ground goes on for ever. A point is right
 //! if a triangle of the other side is at most a threshold away whose normal agrees to 10°: what
 //! passes through a wall at right angles is none of its faces.
 
@@ -18,8 +19,8 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Coordinates beyond it overflow where they are squared and multiplied.
-const MAX_COORDINATE: f64 = 1e30;
+/// More points than these are those of another scene or scale.
+const MOST_SAMPLES: f64 = 2e7;
 
 /// The constants. Lengths are in metres of a house: times the scale of the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,8 +29,8 @@ pub struct SceneFaces {
     pub thresholds: Vec<f64>,
     /// How far normals may be turned against each other, in degrees.
     pub max_angle: f64,
-    /// Points on either side.
-    pub samples: usize,
+    /// Each point on either side stands for a square of this side.
+    pub spacing: f64,
     /// Planar parts of the mesh count from this area on: none of leaves, most of a wall.
     pub min_patch: f64,
     /// The triangles of a planar part lie so near to the plane of the largest.
@@ -43,7 +44,7 @@ impl Default for SceneFaces {
         Self {
             thresholds: vec![0.01, 0.02, 0.05],
             max_angle: 10.0,
-            samples: 50_000,
+            spacing: 0.1,
             min_patch: 0.1,
             thickness: 0.001,
             min_views: 3,
@@ -81,8 +82,8 @@ impl SceneFaces {
     /// Measures the faces of a result, which are in the frame of the truth.
     ///
     /// # Errors
-    /// If the mesh has no triangles or one that names no vertex, or either side is too large to be
-    /// of this scene.
+    /// If the mesh has no triangles or one that names no vertex, or either side is not finite or
+    /// too large to be of this scene.
     pub fn evaluate(
         &self,
         found: &[FoundFace],
@@ -105,20 +106,24 @@ impl SceneFaces {
             let views = cameras.filter(|camera| surface.shows(camera, point, margin));
             truth.cameras.is_empty() || views.take(self.min_views).count() == self.min_views
         };
+        let around = box_around(&truth.wireframe.junctions, &thresholds);
+        let counts = |point: &Vector3<f64>| {
+            let inside = |[low, high]: [Vector3<f64>; 2]| *point >= low && *point <= high;
+            around.is_none_or(inside) && is_seen(point)
+        };
         let of_found = self.distances(&found_triangles, &surface, scale, |_| true);
         let faces = Surface::of_triangles(found_triangles);
-        let of_truth = self.distances(&planar, &faces, scale, is_seen);
+        let of_truth = self.distances(&planar, &faces, scale, counts);
         let shares = |threshold: &f64| FaceShares {
             threshold: *threshold,
             precision: share(&of_found, *threshold),
             recall: share(&of_truth, *threshold),
         };
-        let all_planar = total(planar.iter().map(area));
         Ok(SceneFaceScores {
             scale,
             faces: found.len(),
             found_area: total(found.iter().map(|face| face.area)),
-            planar_area: all_planar * of_truth.len() as f64 / self.samples as f64,
+            planar_area: of_truth.len() as f64 * (self.spacing * scale).powi(2),
             thresholds: thresholds.iter().map(shares).collect(),
         })
     }
@@ -133,7 +138,7 @@ impl SceneFaces {
     ) -> Vec<Option<f64>> {
         let reach = scale * self.thresholds.iter().copied().fold(0.0, f64::max);
         let cosine = self.max_angle.to_radians().cos();
-        let samples = area_samples(triangles, self.samples);
+        let samples = area_samples(triangles, self.spacing * scale);
         let counted = samples.par_iter().filter(|sample| counts(&sample.point));
         let distance = |sample: &AreaSample| {
             let along = normal(&triangles[sample.triangle])?;
@@ -152,23 +157,32 @@ impl SceneFaces {
         if let Some(triangle) = truth.surface.broken_triangle() {
             return Err(EvalError::BrokenSurface { triangle });
         }
+        let spacing = self.spacing * truth.scale;
         // No comparison holds of NaN.
-        let is_fine = |point: &Vector3<f64>| point.iter().all(|x| x.abs() <= MAX_COORDINATE);
-        let has_scale = truth.scale.is_normal() && truth.scale > 0.0;
+        let is_fine = |triangles: &[Triangle]| {
+            let samples = total(triangles.iter().map(area)) / spacing.powi(2);
+            samples <= MOST_SAMPLES && triangles.iter().flatten().all(|p| p.norm().is_finite())
+        };
         for (what, is_fine) in [
-            ("result", found.iter().flatten().all(is_fine)),
-            (
-                "truth",
-                has_scale && truth.surface.vertices.iter().all(is_fine),
-            ),
+            ("result", is_fine(found)),
+            ("truth", is_fine(&truth.surface.corners())),
         ] {
             if !is_fine {
-                let spacing = truth.scale;
                 return Err(EvalError::OutOfScale { what, spacing });
             }
         }
         Ok(())
     }
+}
+
+/// The least and greatest coordinates of some points, and as much more as is near; `None` without
+/// any.
+fn box_around(points: &[Vector3<f64>], near: &[f64]) -> Option<[Vector3<f64>; 2]> {
+    let margin = near.iter().copied().fold(0.0, f64::max);
+    let boxes = points
+        .iter()
+        .map(|p| [p.add_scalar(-margin), p.add_scalar(margin)]);
+    boxes.reduce(|[low, high], [from, to]| [low.inf(&from), high.sup(&to)])
 }
 
 fn share(distances: &[Option<f64>], threshold: f64) -> Option<f64> {
@@ -237,6 +251,14 @@ mod tests {
         }
     }
 
+    /// Fine enough for a cube.
+    fn protocol() -> SceneFaces {
+        SceneFaces {
+            spacing: 0.005,
+            ..SceneFaces::default()
+        }
+    }
+
     fn scene() -> SceneTruth {
         SceneTruth {
             surface: cube(),
@@ -245,7 +267,7 @@ mod tests {
     }
 
     fn shares(found: &[FoundFace], truth: &SceneTruth) -> Vec<[f64; 2]> {
-        let scores = SceneFaces::default().evaluate(found, truth).unwrap();
+        let scores = protocol().evaluate(found, truth).unwrap();
         let of = |s: &FaceShares| [s.precision.unwrap(), s.recall.unwrap()];
         scores.thresholds.iter().map(of).collect()
     }
@@ -278,10 +300,24 @@ mod tests {
             scale: 0.1,
             ..scene()
         };
-        let [[fine, _], [middle, _], _] = shares(&[square(1.0, 1.0015, 0.0)], &truth)[..] else {
-            unreachable!("three thresholds");
-        };
-        assert_eq!([fine, middle], [0.0, 1.0]);
+        let scores = SceneFaces::default().evaluate(&[square(1.0, 1.0015, 0.0)], &truth);
+        let scores = scores.unwrap();
+        let precisions: Vec<_> = scores.thresholds.iter().map(|s| s.precision).collect();
+        assert_eq!(precisions, [Some(0.0), Some(1.0), Some(1.0)]);
+    }
+
+    #[test]
+    fn what_lies_beyond_the_creases_cannot_be_missing() {
+        let mut truth = scene();
+        truth.wireframe.junctions = vec![Vector3::new(0.0, 0.0, 0.9), Vector3::repeat(1.0)];
+        let scores = protocol().evaluate(&[square(1.0, 1.0, 0.0)], &truth);
+        // The top, and 0.15 of the four sides.
+        let scores = scores.unwrap();
+        assert!(
+            (scores.planar_area - 1.6).abs() < 0.05,
+            "{}",
+            scores.planar_area
+        );
     }
 
     #[test]
@@ -295,7 +331,7 @@ mod tests {
         };
         let mut truth = scene();
         truth.cameras = vec![from_above; 3];
-        let scores = SceneFaces::default().evaluate(&[square(1.0, 1.0, 0.0)], &truth);
+        let scores = protocol().evaluate(&[square(1.0, 1.0, 0.0)], &truth);
         let scores = scores.unwrap();
         // Of the sides only what is nearer to the top than what hides it may be before it.
         assert!(
@@ -305,7 +341,7 @@ mod tests {
         );
         assert!(scores.thresholds[0].recall.unwrap() > 0.9);
         truth.cameras.pop();
-        let unseen = SceneFaces::default().evaluate(&[], &truth).unwrap();
+        let unseen = protocol().evaluate(&[], &truth).unwrap();
         assert_eq!(
             (unseen.planar_area, unseen.thresholds[0].recall),
             (0.0, None)
@@ -315,7 +351,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_measured_is_refused() {
-        let protocol = SceneFaces::default();
+        let protocol = protocol();
         let nothing = protocol.evaluate(&[], &SceneTruth::default());
         assert!(matches!(nothing, Err(EvalError::EmptyTruth { .. })));
         let mut broken = scene();

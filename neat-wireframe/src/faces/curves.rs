@@ -123,7 +123,7 @@ impl Curves {
 }
 
 /// The junctions nearest to the ends of an arc; `None` without junctions.
-pub(super) fn nearest_junctions(
+pub(crate) fn nearest_junctions(
     arc: &CircularArc,
     junctions: &[Vector3<f64>],
 ) -> Option<[usize; 2]> {

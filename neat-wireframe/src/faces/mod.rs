@@ -49,6 +49,7 @@ mod visibility;
 mod tests;
 
 pub use curves::MeasuredGraph;
+pub(crate) use curves::nearest_junctions;
 pub use face::{CurveIndex, Face, Shell, Step, Surface};
 pub(crate) use triangulation::triangles;
 
