@@ -134,7 +134,7 @@ impl CadFaces {
 
     /// For each true face the one that is found for it: one to one, those first whose middles are
     /// nearest.
-    fn partners(&self, found: &[FoundFace], truth: &[TrueFace]) -> Vec<Option<usize>> {
+    pub fn partners(&self, found: &[FoundFace], truth: &[TrueFace]) -> Vec<Option<usize>> {
         let mut near: Vec<(f64, usize, usize)> = Vec::new();
         for (true_face, of_truth) in truth.iter().enumerate() {
             near.extend((found.iter().enumerate()).filter_map(|(face, of_result)| {

@@ -16,6 +16,7 @@ use std::f64::consts::{PI, TAU};
 pub(super) fn places(document: &WireframeDocument, face: &Face) -> Vec<Place> {
     let of_step = |steps: &[Step], step: &Step| match step.curve {
         CurveIndex::Edge(edge) => document.edges[edge].map(Place::Junction).to_vec(),
+        CurveIndex::Smooth(ends) => ends.map(Place::Junction).to_vec(),
         CurveIndex::Arc(arc) => {
             let ends = nearest_junctions(&document.arcs[arc], &document.junctions);
             let ends = ends.filter(|_| steps.len() > 1).into_iter().flatten();
@@ -58,7 +59,7 @@ pub(super) fn value(document: &WireframeDocument, face: &Face, points: &[Vector3
     for steps in &face.loops {
         for step in steps {
             let piece = match step.curve {
-                CurveIndex::Edge(_) => Piece::Edge([take(), take()]),
+                CurveIndex::Edge(_) | CurveIndex::Smooth(_) => Piece::Edge([take(), take()]),
                 CurveIndex::Arc(arc) => {
                     let (center, radius) = (take(), take().x);
                     let ends = (steps.len() > 1).then(|| [take(), take()]);
