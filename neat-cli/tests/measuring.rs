@@ -94,6 +94,35 @@ fn selections_and_scale_reach_the_numbers() {
 }
 
 #[test]
+fn areas_of_faces_are_in_the_square_of_the_unit() {
+    let rectangle = Rectangle::new();
+    let path = rectangle.file("wireframe.json");
+    let mut wireframe: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let steps: Vec<Value> = (0..4).map(|edge| json!({"edge": edge})).collect();
+    let plane = json!({"normal": [0.0, 0.0, 1.0], "offset": 0.0});
+    wireframe["shells"] = json!([{
+        "closed": false,
+        "faces": [{"plane": plane, "loops": [steps]}],
+    }]);
+    wireframe["junction_covariances"][3] = wireframe["junction_covariances"][0].clone();
+    fs::write(&path, wireframe.to_string()).unwrap();
+    let all = rectangle.measured(&[]);
+    assert!(all.lines().last().unwrap().contains("area 0"), "{all}");
+    let text = rectangle.measured(&["--area=0", "--scale=0-1=8m"]);
+    assert!(text.contains("48.") && text.contains(" m²"), "{text}");
+    let found = rectangle.json(&["--area=0"]);
+    let area = &found["dimensions"][0];
+    assert!(
+        (area["value"].as_f64().unwrap() - 12.0).abs() < 1e-9,
+        "{found}"
+    );
+    // Each corner by half its diagonal of 5.
+    let sigma = area["sigma"].as_f64().unwrap();
+    assert!((sigma - 0.01 * 5.0).abs() < 1e-6, "{found}");
+    assert!(rectangle.refused(&["--area=1"]).contains("no face 1"));
+}
+
+#[test]
 fn parallel_edges_are_found_and_written_as_csv() {
     let rectangle = Rectangle::new();
     let text = rectangle.measured(&["--parallel", "--csv"]);

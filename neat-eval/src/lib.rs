@@ -15,6 +15,8 @@
 //! | `hss` | [`StructureScore`] | a true wireframe |
 //! | `wed` | [`EditDistance`] | a true wireframe |
 //! | `surface-and-creases` | [`SurfaceAndCreases`] | the exact truth of a rendered scene |
+//! | `cad-faces` | [`CadFaces`] | the faces of a CAD model |
+//! | `scene-faces` | [`SceneFaces`] | the exact surface of a rendered scene |
 //!
 //! All take plain points and segments, so that anything can be measured; results
 //! of other programs come in through [`foreign::read`]. An [`EvaluationReport`]
@@ -65,6 +67,7 @@ mod edge_model;
 mod edge_points;
 mod edit_distance;
 mod error;
+mod faces;
 mod limap_length;
 mod neat_abc;
 mod neat_dtu;
@@ -86,6 +89,10 @@ pub use edge_model::{CubicBezier, EdgeModel, wireframe_of_segments};
 pub use edge_points::{EdgeSampling, VoxelGrid};
 pub use edit_distance::{EditDistance, EditScores};
 pub use error::EvalError;
+pub use faces::{
+    CadFaceScores, CadFaces, FaceCounts, FaceShare, FaceShares, FoundFace, SceneFaceScores,
+    SceneFaces, TrueFace,
+};
 pub use limap_length::{LengthRecall, LengthScores, LimapLength};
 pub use neat_abc::{GraphScores, NeatAbc, NeatAbcScores};
 pub use neat_dtu::{NeatSurface, ScannedSurface, SurfaceScores};

@@ -7,6 +7,7 @@ use crate::EvalError;
 use crate::abc_nef::{EdgePointScores, EdgePoints};
 use crate::edge_model::EdgeModel;
 use crate::edit_distance::{EditDistance, EditScores};
+use crate::faces::{CadFaceScores, CadFaces, FoundFace, SceneFaceScores, SceneFaces, TrueFace};
 use crate::limap_length::{LengthScores, LimapLength};
 use crate::neat_abc::{NeatAbc, NeatAbcScores};
 use crate::neat_dtu::{NeatSurface, ScannedSurface, SurfaceScores};
@@ -48,6 +49,10 @@ pub enum Protocol {
     Wed,
     /// [`SurfaceAndCreases`](crate::SurfaceAndCreases).
     SurfaceAndCreases,
+    /// [`CadFaces`](crate::CadFaces).
+    CadFaces,
+    /// [`SceneFaces`](crate::SceneFaces).
+    SceneFaces,
 }
 
 /// What a protocol compares a result with.
@@ -89,6 +94,10 @@ pub enum Scores {
     Wed(EditScores),
     /// Surfaces and creases of rendered scenes.
     SurfaceAndCreases(CreaseScores),
+    /// Faces of CAD models.
+    CadFaces(CadFaceScores),
+    /// Faces of rendered scenes.
+    SceneFaces(SceneFaceScores),
 }
 
 impl Scores {
@@ -107,6 +116,8 @@ impl Scores {
             Self::Hss(_) => Protocol::Hss,
             Self::Wed(_) => Protocol::Wed,
             Self::SurfaceAndCreases(_) => Protocol::SurfaceAndCreases,
+            Self::CadFaces(_) => Protocol::CadFaces,
+            Self::SceneFaces(_) => Protocol::SceneFaces,
         }
     }
 
@@ -122,6 +133,8 @@ impl Scores {
             Self::Hss(scores) => vec![scores.table()],
             Self::Wed(scores) => vec![scores.table()],
             Self::SurfaceAndCreases(scores) => scores.tables(),
+            Self::CadFaces(scores) => vec![scores.table()],
+            Self::SceneFaces(scores) => vec![scores.table()],
         }
     }
 }
@@ -134,8 +147,12 @@ pub struct EvaluationInput {
     pub predicted: EdgeModel,
     /// The result before its visibility check, for `neat-abc`.
     pub before: Option<EdgeModel>,
+    /// The faces of the result, for `cad-faces` and `scene-faces`.
+    pub faces: Vec<FoundFace>,
     /// True edges.
     pub truth: GroundTruth,
+    /// True faces, for `cad-faces`.
+    pub true_faces: Vec<TrueFace>,
     /// A scanned surface, for the protocols with [`TruthKind::SurfacePoints`].
     pub surface: ScannedSurface,
     /// The exact truth of a rendered scene, for those with [`TruthKind::Scene`].
@@ -177,7 +194,7 @@ const SCENE: TruthKind = TruthKind::Scene;
 /// Every protocol, in the order of [`Protocol`]: what it needs, its constants with its
 /// function, what it measures, and where it is published.
 #[rustfmt::skip] // A table.
-static PROTOCOLS: [Row; 12] = [
+static PROTOCOLS: [Row; 14] = [
     row(Protocol::NeatAbc, "neat-abc", TRUE_EDGES, |m| m.neat_abc().map(Scores::NeatAbc),
         "precision and recall of junctions and segments at 0.01, 0.02 and 0.05, paired one to one",
         "NEAT, CVPR 2024, Table 6; evaluation/eval-abc.py of cherubicXN/neat"),
@@ -214,6 +231,12 @@ static PROTOCOLS: [Row; 12] = [
     row(Protocol::SurfaceAndCreases, "surface-and-creases", SCENE, |m| m.creases().map(Scores::SurfaceAndCreases),
         "distance to the exact surface (ACC), completeness and precision by length of exact creases, at 1, 2 and 5 cm times the scale",
         "neat, for rendered scenes with their truth; ACC as in NEAT, CVPR 2024, eq. 9"),
+    row(Protocol::CadFaces, "cad-faces", TRUE_EDGES, |m| m.cad_faces().map(Scores::CadFaces),
+        "true faces that are found, and found ones that are true, by area: same surface to 0.01, same area to 5 %",
+        "neat, for CAD models whose longest side is 1"),
+    row(Protocol::SceneFaces, "scene-faces", SCENE, |m| m.scene_faces().map(Scores::SceneFaces),
+        "area of found faces on the exact surface, and of planar surface on found faces, at 1, 2 and 5 cm times the scale, normals to 10°",
+        "neat, for rendered scenes with their truth"),
 ];
 
 const fn row(
@@ -281,6 +304,16 @@ impl Measurement<'_> {
     fn edits(&self) -> Result<EditScores, EvalError> {
         let (predicted, truth) = (&self.input.predicted, &self.input.truth);
         EditDistance::default().evaluate(&predicted.wireframe, &truth.wireframe)
+    }
+
+    fn cad_faces(&self) -> Result<CadFaceScores, EvalError> {
+        CadFaces::default().evaluate(&self.input.faces, &self.input.true_faces)
+    }
+
+    fn scene_faces(&self) -> Result<SceneFaceScores, EvalError> {
+        let mut protocol = SceneFaces::default();
+        replace(&mut protocol.thresholds, &self.options.thresholds);
+        protocol.evaluate(&self.input.faces, &self.input.scene)
     }
 
     fn creases(&self) -> Result<CreaseScores, EvalError> {

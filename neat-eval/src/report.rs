@@ -91,8 +91,9 @@ impl EvaluationReport {
 mod tests {
     use super::*;
     use crate::{
-        EdgeModel, EdgePoints, EditDistance, LimapLength, NeatAbc, NeatSurface, ScannedSurface,
-        SceneTruth, StructureScore, SurfaceAndCreases, TriangleMesh,
+        CadFaces, EdgeModel, EdgePoints, EditDistance, LimapLength, NeatAbc, NeatSurface,
+        ScannedSurface, SceneFaces, SceneTruth, StructureScore, SurfaceAndCreases, TriangleMesh,
+        TrueFace,
     };
     use nalgebra::Vector3;
     use neat_core::Wireframe3d;
@@ -152,6 +153,11 @@ Wireframe: 2 junctions, 1 segments of mean length 2.0150. Truth: 2 junctions, 1 
             wireframe: truth.clone(),
             ..SceneTruth::default()
         };
+        let cone = TrueFace {
+            surface: None,
+            area: 1.0,
+            boundary: Vec::new(),
+        };
         let model = EdgeModel::from(predicted.clone());
         let edges = GroundTruth {
             wireframe: truth.clone(),
@@ -192,6 +198,8 @@ Wireframe: 2 junctions, 1 segments of mean length 2.0150. Truth: 2 junctions, 1 
                     .evaluate(&predicted, &scene)
                     .unwrap(),
             ),
+            Scores::CadFaces(CadFaces::default().evaluate(&[], &[cone]).unwrap()),
+            Scores::SceneFaces(SceneFaces::default().evaluate(&[], &scene).unwrap()),
         ]
     }
 

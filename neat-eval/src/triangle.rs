@@ -35,6 +35,16 @@ pub(crate) fn squared_distance(triangle: &Triangle, point: &Vector3<f64>) -> f64
     sides.map(to_side).into_iter().fold(f64::INFINITY, f64::min)
 }
 
+/// Half the product of two sides and the sine between them.
+pub(crate) fn area([a, b, c]: &Triangle) -> f64 {
+    0.5 * (b - a).cross(&(c - a)).norm()
+}
+
+/// Of length 1, by the order of the corners; `None` without an area.
+pub(crate) fn normal([a, b, c]: &Triangle) -> Option<Vector3<f64>> {
+    (b - a).cross(&(c - a)).try_normalize(0.0)
+}
+
 /// Whether the way from `start` to `end` meets the triangle, from either side (Möller and
 /// Trumbore). A way within its plane does not.
 pub(crate) fn is_met(triangle: &Triangle, start: &Vector3<f64>, end: &Vector3<f64>) -> bool {

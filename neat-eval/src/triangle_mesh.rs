@@ -4,7 +4,7 @@ use crate::box_tree::{Aabb, BoxTree};
 use crate::triangle::{self, Triangle};
 use nalgebra::Vector3;
 use neat_core::ply::Ply;
-use neat_core::{SceneError, file};
+use neat_core::{Camera, SceneError, file};
 use std::path::Path;
 
 /// A surface of triangles; their order and orientation play no role.
@@ -65,7 +65,7 @@ impl TriangleMesh {
     ///
     /// # Panics
     /// If a triangle names a vertex that does not exist.
-    fn corners(&self) -> Vec<Triangle> {
+    pub(crate) fn corners(&self) -> Vec<Triangle> {
         let corner = |index: u32| self.vertices[index as usize];
         (self.triangles.iter())
             .map(|triangle| triangle.map(corner))
@@ -89,7 +89,11 @@ pub(crate) struct Surface {
 impl Surface {
     /// Of a valid mesh of finite vertices.
     pub(crate) fn new(mesh: &TriangleMesh) -> Self {
-        let triangles = mesh.corners();
+        Self::of_triangles(mesh.corners())
+    }
+
+    /// Of finite triangles.
+    pub(crate) fn of_triangles(triangles: Vec<Triangle>) -> Self {
         let boxes: Vec<Aabb> = triangles.iter().map(|t| Aabb::around(t)).collect();
         Self {
             tree: BoxTree::new(&boxes),
@@ -107,6 +111,40 @@ impl Surface {
     pub(crate) fn distance_within(&self, point: &Vector3<f64>, reach: f64) -> Option<f64> {
         let to = |index: usize| triangle::squared_distance(&self.triangles[index], point);
         self.tree.nearest(point, reach, to)
+    }
+
+    /// The same, of those triangles whose plane is turned by at most the angle of which `cosine`
+    /// is that against the one with this unit normal; orientation plays no role.
+    pub(crate) fn distance_along(
+        &self,
+        point: &Vector3<f64>,
+        normal: &Vector3<f64>,
+        cosine: f64,
+        reach: f64,
+    ) -> Option<f64> {
+        let agrees = |triangle: &Triangle| {
+            triangle::normal(triangle).is_some_and(|other| other.dot(normal).abs() >= cosine)
+        };
+        let to = |index: usize| match &self.triangles[index] {
+            triangle if agrees(triangle) => triangle::squared_distance(triangle, point),
+            _ => f64::INFINITY,
+        };
+        self.tree.nearest(point, reach, to)
+    }
+
+    /// Whether a camera sees a point: it is in the image, and no surface lies more than `margin`
+    /// before it.
+    pub(crate) fn shows(&self, camera: &Camera, point: &Vector3<f64>, margin: f64) -> bool {
+        if !camera.sees(point) {
+            return false;
+        }
+        let way = point - camera.center_in_world;
+        let distance = way.norm();
+        if distance <= margin {
+            return true;
+        }
+        let before = camera.center_in_world + way * (1.0 - margin / distance);
+        !self.hides(&camera.center_in_world, &before)
     }
 
     /// Whether the surface lies between the two points.

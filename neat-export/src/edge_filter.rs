@@ -114,10 +114,11 @@ fn with_edges(document: &WireframeDocument, passes: &[bool]) -> WireframeDocumen
     }
     let kept: Vec<usize> = (0..passes.len()).filter(|edge| passes[*edge]).collect();
     let new_edge = |edge: usize| kept.binary_search(&edge).ok();
+    let new_junction = |junction: usize| joined[junction].then_some(new_index[junction]);
     WireframeDocument {
         arcs: document.arcs.clone(),
         shells: (document.shells.iter())
-            .filter_map(|shell| shell.with_edges(new_edge))
+            .filter_map(|shell| shell.with_indices(new_edge, new_junction))
             .collect(),
         arc_covariances: document.arc_covariances.clone(),
         metadata: document.metadata.clone(),

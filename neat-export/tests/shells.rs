@@ -1,9 +1,10 @@
 //! Faces in the exports: a block with a round hole, a sheet, an edge and an arc on their own.
 
 use nalgebra::Vector3;
+use neat_core::CircularArc;
 use neat_export::{EdgeFilter, ExportOptions, Format, export};
 use neat_wireframe::export::{WireframeDocument, read_json, write_json};
-use neat_wireframe::faces::Surface;
+use neat_wireframe::faces::{CurveIndex, MeasuredGraph, Surface, find_shells};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::fs;
@@ -172,4 +173,88 @@ proptest! {
             prop_assert!(!text.contains("NaN") && !text.contains("inf"), "{format:?}");
         }
     }
+}
+
+/// A block with a rounded corner, whose cylinder goes on as planes.
+fn rounded() -> WireframeDocument {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.7], [0.7, 1.0], [0.0, 1.0]];
+    let at = |z: f64| corners.map(|[x, y]| Vector3::new(x, y, z));
+    let arc = |z: f64| CircularArc {
+        center: Vector3::new(0.7, 0.7, z),
+        axes: [Vector3::x(), Vector3::y()],
+        radius: 0.3,
+        angles: [0.0, std::f64::consts::FRAC_PI_2],
+    };
+    let level = |k: usize| [[k, k + 1], [k + 1, k + 2], [k + 3, k + 4], [k + 4, k]];
+    let mut document = WireframeDocument {
+        junctions: [at(0.0), at(0.8)].concat(),
+        edges: [&level(0)[..], &level(5)[..], &[[0, 5], [1, 6], [4, 9]]].concat(),
+        arcs: vec![arc(0.0), arc(0.8)],
+        ..WireframeDocument::default()
+    };
+    let wireframe = document.wireframe();
+    let graph = MeasuredGraph {
+        wireframe: &wireframe,
+        arcs: &document.arcs,
+        covariances: &[],
+    };
+    document.shells = find_shells(&graph, &[]);
+    document
+}
+
+#[test]
+fn inferred_lines_bound_faces_of_solids_and_are_no_edges() {
+    let document = rounded();
+    assert!(document.shells[0].closed);
+    let step = exported(&document, Format::Step, EdgeFilter::default());
+    assert_eq!(count(&step, "MANIFOLD_SOLID_BREP"), 1);
+    assert_eq!(count(&step, "ADVANCED_FACE"), 7);
+    // Eleven edges, two arcs and two inferred lines, which say so.
+    assert_eq!(count(&step, "EDGE_CURVE"), 15);
+    assert_eq!(step.matches("EDGE_CURVE('inferred',").count(), 2);
+    let json = exported(&document, Format::Json, EdgeFilter::default());
+    let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(value["edges"].as_array().unwrap().len(), 11);
+    assert_eq!(json.matches("\"smooth\"").count(), 4);
+    let again: WireframeDocument = serde_json::from_str(&json).unwrap();
+    assert_eq!(again.shells, document.shells);
+    // The triangles are watertight: every side has two.
+    let mut sides: BTreeMap<[usize; 2], usize> = BTreeMap::new();
+    for triangle in document.drawn_triangles() {
+        for [a, b] in [[0, 1], [1, 2], [2, 0]].map(|side| side.map(|k| triangle[k])) {
+            *sides.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    assert!(sides.values().all(|count| *count == 2));
+}
+
+#[test]
+fn inferred_lines_follow_their_junctions_through_a_filter() {
+    let mut document = rounded();
+    document.junctions.insert(0, Vector3::new(5.0, 5.0, 5.0));
+    document
+        .edges
+        .iter_mut()
+        .for_each(|edge| *edge = edge.map(|end| end + 1));
+    let faces = document
+        .shells
+        .iter_mut()
+        .flat_map(|shell| &mut shell.faces);
+    for step in faces.flat_map(|face| &mut face.loops).flatten() {
+        if let CurveIndex::Smooth(ends) = &mut step.curve {
+            *ends = ends.map(|end| end + 1);
+        }
+    }
+    document.check(Path::new("w")).unwrap();
+    let mut fields = BTreeMap::new();
+    fields.insert("probability".to_owned(), vec![1.0; document.edges.len()]);
+    document.edge_fields = serde_json::from_value(serde_json::json!(fields)).unwrap();
+    let filter = EdgeFilter {
+        min_probability: Some(0.5),
+        ..EdgeFilter::default()
+    };
+    // The lonely junction goes, and all others are counted anew.
+    let kept = filter.apply(&document).unwrap();
+    kept.check(Path::new("w")).unwrap();
+    assert_eq!(kept.shells, rounded().shells);
 }

@@ -140,6 +140,12 @@ fn check(
         let text = "neat-dtu needs an observation mask and a plane: use `neat eval`; neat-blended-mvs does without";
         return Err(Failure::input(text));
     }
+    let of_faces = [Protocol::CadFaces, Protocol::SceneFaces];
+    if let Some(protocol) = protocols.iter().find(|p| of_faces.contains(p)) {
+        return Err(Failure::input(format!(
+            "{protocol} needs the faces of a file: use `neat eval`"
+        )));
+    }
     for (kind, name, is_given, _) in given {
         let asks = protocols.iter().find(|protocol| protocol.truth() == *kind);
         match asks {

@@ -9,8 +9,9 @@ use clap::{Args, ValueEnum};
 use neat_core::ply::read_points;
 use neat_core::{LoadOptions, SceneError, View, file, load_scene};
 use neat_eval::{
-    EvalError, EvaluationInput, EvaluationOptions, EvaluationReport, GroundPlane, NeatAbc,
-    ObservationMask, Protocol, ScannedSurface, SceneTruth, Scores, TruthKind, foreign,
+    EvalError, EvaluationInput, EvaluationOptions, EvaluationReport, FoundFace, GroundPlane,
+    NeatAbc, ObservationMask, Protocol, ScannedSurface, SceneTruth, Scores, TrueFace, TruthKind,
+    foreign,
 };
 use neat_pipeline::config::Preset;
 use neat_pipeline::resources::{Resources, default_limit};
@@ -37,9 +38,10 @@ Examples:
   neat eval --pred RUN/wireframe.json --points stl024_total.ply --protocol neat-dtu \\
       --obs-mask ObsMask24_10.mat --plane Plane24.mat
   neat eval --pred RUN/wireframe.json --truth SCENE
+  neat eval --pred RUN/wireframe.json --gt SCENE/gt_wireframe.json --protocol cad-faces
 
 Results and truths are wireframe.json, parametric_edges.json (EMAP), .obj, .ply with edges, the
-.npz of the published NEAT, LIMAP's .npy, and Line3D++'s .txt.")]
+.npz of the published NEAT, LIMAP's .npy, and Line3D++'s .txt. Faces are those of a wireframe.json.")]
 pub struct EvalArgs {
     /// Result to measure
     #[arg(long, value_name = "FILE")]
@@ -54,7 +56,7 @@ pub struct EvalArgs {
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
     /// Rendered scene with its exact truth in the folder `truth`: stats.json, wireframe.json,
-    /// curved.json, mesh.ply, and perhaps texture_lines.json (surface-and-creases)
+    /// curved.json, mesh.ply, and perhaps texture_lines.json (surface-and-creases, scene-faces)
     #[arg(long, value_name = "SCENE")]
     truth: Option<PathBuf>,
     /// How to measure; several with commas
@@ -70,8 +72,8 @@ pub struct EvalArgs {
     /// Plane of DTU's table, PlaneN.mat (neat-dtu)
     #[arg(long, value_name = "FILE")]
     plane: Option<PathBuf>,
-    /// Distances at which shares are taken instead of the protocol's; of surface-and-creases they
-    /// are multiplied by the scale of the scene
+    /// Distances at which shares are taken instead of the protocol's; of surface-and-creases
+    /// and scene-faces they are multiplied by the scale of the scene
     #[arg(long, value_name = "D,D,...", value_delimiter = ',', value_parser = positive)]
     thresholds: Option<Vec<f64>>,
     /// How predictions are paired with the truth (neat-abc)
@@ -137,7 +139,7 @@ impl EvalArgs {
     pub fn run(self) -> Result<(), CliError> {
         let protocols = self.protocols();
         self.check(&protocols)?;
-        let (inputs, options) = (self.read()?, self.options());
+        let (inputs, options) = (self.read(&protocols)?, self.options());
         let mut reports = protocols
             .iter()
             .map(|protocol| Ok(EvaluationReport::new(protocol.evaluate(&inputs, &options)?)))
@@ -201,8 +203,9 @@ impl EvalArgs {
             Protocol::EdgeGaussians,
         ];
         let surfaces = [Protocol::NeatDtu, Protocol::NeatBlendedMvs];
-        let without_thresholds =
-            |p: &Protocol| surfaces.contains(p) || matches!(p, Protocol::Hss | Protocol::Wed);
+        let without_thresholds = |p: &Protocol| {
+            surfaces.contains(p) || matches!(p, Protocol::Hss | Protocol::Wed | Protocol::CadFaces)
+        };
         for (option, given, is_used) in [
             ("--gt", self.gt.is_some(), compares(TruthKind::Edges)),
             (
@@ -249,7 +252,7 @@ impl EvalArgs {
         Ok(())
     }
 
-    fn read(&self) -> Result<EvaluationInput, EvalError> {
+    fn read(&self, protocols: &[Protocol]) -> Result<EvaluationInput, EvalError> {
         let mut surface = ScannedSurface::default();
         if let Some(points) = &self.points {
             surface.points = read_points(points)?;
@@ -261,21 +264,33 @@ impl EvalArgs {
             surface.ground_plane = Some(GroundPlane::read(plane)?);
         }
         let truth = self.gt.as_deref().map(foreign::read_truth).transpose()?;
-        let scene = self.truth.as_deref().map(|dir| self.read_scene(dir));
+        let any = |wanted: &[Protocol]| protocols.iter().any(|p| wanted.contains(p));
+        let needs_cameras = any(&[Protocol::SceneFaces]);
+        let scene = (self.truth.as_deref()).map(|dir| self.read_scene(dir, needs_cameras));
+        let true_faces = match &self.gt {
+            Some(path) if any(&[Protocol::CadFaces]) => TrueFace::read(path)?,
+            _ => Vec::new(),
+        };
+        let faces = match any(&[Protocol::CadFaces, Protocol::SceneFaces]) {
+            true => FoundFace::read(&self.pred)?,
+            false => Vec::new(),
+        };
         Ok(EvaluationInput {
             predicted: foreign::read(&self.pred)?,
+            faces,
             before: self.before.as_deref().map(foreign::read).transpose()?,
             truth: truth.unwrap_or_default(),
+            true_faces,
             surface,
             scene: scene.transpose()?.unwrap_or_default(),
         })
     }
 
     /// The truth of a rendered scene. If it does not say which views see an edge, the cameras of
-    /// the scene do, where there are any.
-    fn read_scene(&self, dir: &Path) -> Result<SceneTruth, EvalError> {
+    /// the scene do, where there are any; what they see of the surface they alone know.
+    fn read_scene(&self, dir: &Path, needs_cameras: bool) -> Result<SceneTruth, EvalError> {
         let mut truth = SceneTruth::read(dir)?;
-        if truth.edge_views.is_some() {
+        if truth.edge_views.is_some() && !needs_cameras {
             return Ok(truth);
         }
         let cache = self.cache.open();

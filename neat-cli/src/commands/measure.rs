@@ -15,18 +15,19 @@ const DIGITS: i32 = 6;
 /// No number needs more digits after its point.
 const MOST_DECIMALS: i32 = 12;
 
-/// Read lengths, distances, angles and radii off a wireframe, with 95 % intervals
+/// Read lengths, distances, angles, radii and areas off a wireframe, with 95 % intervals
 ///
-/// Without a selection the lengths of all edges and the radii of all arcs. Junctions, edges and
-/// arcs have the numbers of wireframe.json and of the report, from 0. Lengths are in the unit of your files, or in that of
-/// --scale. Intervals are from the covariances of junctions and arcs: an error that all views share is
+/// Without a selection the lengths of all edges, the radii of all arcs and the areas of all faces.
+/// Junctions, edges and arcs have the numbers of wireframe.json and of the report, from 0; faces
+/// are counted through all shells. Lengths are in the unit of your files, or in that of --scale,
+/// and areas in its square. Intervals are from the covariances of junctions and arcs: an error that all views share is
 /// not in them, nor what your unit itself may be off.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   neat measure RUN
   neat measure RUN --edge 12 --between 3-17 --scale 0-4=3.20m±0.01
-  neat measure RUN --angle 4,9 --radius 0 --spacing 0,1
+  neat measure RUN --angle 4,9 --radius 0 --spacing 0,1 --area 2
   neat measure RUN --parallel --csv > gaps.csv
   neat measure RUN/wireframe.json --json")]
 pub struct MeasureArgs {
@@ -51,6 +52,9 @@ pub struct MeasureArgs {
     /// The distance of the centres of two arcs, such as holes
     #[arg(long, value_name = "A,B", value_parser = |text: &str| pair(text, ','))]
     spacing: Vec<[usize; 2]>,
+    /// The area of a face, less its holes
+    #[arg(long, value_name = "N")]
+    area: Vec<usize>,
     /// The gaps between parallel edges that lie beside each other, the longest edges first
     #[arg(long)]
     parallel: bool,
@@ -117,8 +121,9 @@ impl MeasureArgs {
         let gaps = self.gap.iter().map(|edges| Quantity::Gap { edges: *edges });
         let radii = self.radius.iter().map(|arc| Quantity::Radius { arc: *arc });
         let spacings = (self.spacing.iter()).map(|arcs| Quantity::Spacing { arcs: *arcs });
+        let areas = self.area.iter().map(|face| Quantity::Area { face: *face });
         let chosen = edges.chain(distances).chain(angles).chain(gaps);
-        let mut measured: Vec<Dimension> = (chosen.chain(radii).chain(spacings))
+        let mut measured: Vec<Dimension> = (chosen.chain(radii).chain(spacings).chain(areas))
             .map(|quantity| dimensions.measure(quantity))
             .collect::<Result<_, _>>()?;
         if self.parallel {
@@ -126,6 +131,7 @@ impl MeasureArgs {
         } else if measured.is_empty() {
             measured = dimensions.lengths();
             measured.extend(dimensions.radii());
+            measured.extend(dimensions.areas());
         }
         Ok(measured)
     }
@@ -140,13 +146,15 @@ fn named(quantity: &Quantity) -> (&'static str, Vec<usize>) {
         Quantity::Angle { edges } => ("angle", edges.to_vec()),
         Quantity::Radius { arc } => ("radius", vec![*arc]),
         Quantity::Spacing { arcs } => ("spacing", arcs.to_vec()),
+        Quantity::Area { face } => ("area", vec![*face]),
     }
 }
 
-fn unit<'a>(dimension: &Dimension, of_lengths: &'a str) -> &'a str {
+fn unit(dimension: &Dimension, of_lengths: &str) -> String {
     match dimension.quantity {
-        Quantity::Angle { .. } => "°",
-        _ => of_lengths,
+        Quantity::Angle { .. } => "°".to_owned(),
+        Quantity::Area { .. } if !of_lengths.is_empty() => format!("{of_lengths}²"),
+        _ => of_lengths.to_owned(),
     }
 }
 

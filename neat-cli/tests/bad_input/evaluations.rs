@@ -87,6 +87,12 @@ fn evaluations() {
                 names: &["surface-and-creases", "--truth"],
             },
             Case {
+                kind: "a true wireframe without faces",
+                spoil: |_| (),
+                command: "eval --pred scene/gt_wireframe.json --gt scene/gt_wireframe.json --protocol cad-faces",
+                names: &["cad-faces", "faces"],
+            },
+            Case {
                 kind: "a scene without truth",
                 spoil: |_| (),
                 command: "eval --pred scene/gt_wireframe.json --truth scene",

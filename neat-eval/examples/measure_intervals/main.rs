@@ -1,4 +1,5 @@
-//! How often the 95 % intervals of `neat measure` hold the true lengths of edges and radii of arcs.
+//! How often the 95 % intervals of `neat measure` hold the true lengths of edges, radii of arcs
+//! and areas of faces.
 //!
 //! ```text
 //! cargo run --release -p neat-eval --example measure_intervals -- [--out DIR] [--solids SEEDS] SCENE…
@@ -15,24 +16,28 @@
 //! with a free end, whose length ends where images stop telling, are counted apart.
 //!
 //! A true arc or circle is found by the nearest arc that runs along most of it within the
-//! tolerance, whatever its radius.
+//! tolerance, whatever its radius. A true face is found as by the protocol `cad-faces`; errors of
+//! areas are shares of them. Where a truth lists no faces, those of its solids are taken.
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
 
+mod areas;
 mod coverage;
 #[path = "../measure_assembler/prepared.rs"]
 mod prepared;
 mod radii;
 
+use areas::{Areas, faces_of_solids};
 use coverage::Coverage;
 use nalgebra::Vector3;
 use neat_core::synthetic::{Solid, SyntheticScene, generate};
 use neat_core::{CircularArc, Scene, Wireframe3d};
 use neat_detect::{DetectorConfig, detect_views};
-use neat_eval::{NeatAbc, SceneTruth, SurfaceAndCreases, foreign};
+use neat_eval::{NeatAbc, SceneTruth, SurfaceAndCreases, TrueFace, foreign};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::confidence::{ConfidenceConfig, assess, fill_arcs};
 use neat_wireframe::export::WireframeDocument;
+use neat_wireframe::faces::{MeasuredGraph, find_shells};
 use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
 use radii::Radii;
 use serde::Deserialize;
@@ -46,6 +51,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 struct Truth {
     wireframe: Wireframe3d,
     arcs: Vec<CircularArc>,
+    faces: Vec<TrueFace>,
     /// In the unit of the files.
     tolerance: f64,
 }
@@ -61,6 +67,7 @@ fn main() -> Result<()> {
         }
     }
     let (mut coverage, mut radii) = (Coverage::default(), Radii::default());
+    let mut areas = Areas::default();
     for dir in &scenes {
         let name = dir.file_name().unwrap_or_default().to_string_lossy();
         let scene = prepared(dir, out.as_ref().map(|out| out.join(&*name)).as_deref())?;
@@ -73,6 +80,7 @@ fn main() -> Result<()> {
         let document = documented(scene)?;
         coverage.add(&kind, &document, &truth.wireframe, truth.tolerance)?;
         radii.add(&kind, &document, &truth.arcs, truth.tolerance)?;
+        areas.add(&kind, &document, &truth.faces)?;
     }
     for (seed, solid) in (0..seeds).flat_map(|seed| Solid::ALL.map(|solid| (seed, solid))) {
         let config = SyntheticScene {
@@ -84,9 +92,11 @@ fn main() -> Result<()> {
         let mut data = generate(&config)?;
         detect_views(&mut data.scene, &DetectorConfig::default())?;
         let tolerance = NeatAbc::default().thresholds[0];
-        coverage.add("solids", &documented(data.scene)?, &data.truth, tolerance)?;
+        let document = documented(data.scene)?;
+        coverage.add("solids", &document, &data.truth, tolerance)?;
+        areas.add("solids", &document, &faces_of_solids(&data.truth, &[]))?;
     }
-    print!("{}{}", coverage.table(), radii.table());
+    print!("{}{}{}", coverage.table(), radii.table(), areas.table());
     Ok(())
 }
 
@@ -95,9 +105,15 @@ fn main() -> Result<()> {
 fn true_edges(dir: &Path) -> Result<Truth> {
     if !dir.join("truth").exists() {
         let path = dir.join("gt_wireframe.json");
+        let (wireframe, arcs) = (foreign::read_truth(&path)?.wireframe, true_arcs(&path)?);
+        let listed = TrueFace::read(&path)?;
         return Ok(Truth {
-            wireframe: foreign::read_truth(&path)?.wireframe,
-            arcs: true_arcs(&path)?,
+            faces: match listed.is_empty() {
+                true => faces_of_solids(&wireframe, &arcs),
+                false => listed,
+            },
+            wireframe,
+            arcs,
             tolerance: NeatAbc::default().thresholds[0],
         });
     }
@@ -113,6 +129,7 @@ fn true_edges(dir: &Path) -> Result<Truth> {
     Ok(Truth {
         wireframe,
         arcs: Vec::new(),
+        faces: Vec::new(),
         tolerance: scale * SurfaceAndCreases::default().thresholds[1],
     })
 }
@@ -170,5 +187,14 @@ fn documented(mut scene: Scene) -> Result<WireframeDocument> {
         &built.arc_covariances,
         &scene.original_from_world,
     );
+    let junctions = confidence.junctions.iter();
+    let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
+    let world = MeasuredGraph {
+        wireframe: &built.wireframe,
+        arcs: &built.arcs,
+        covariances: &covariances,
+    };
+    let shells = find_shells(&world, &views);
+    document.shells = shells.iter().map(|shell| shell.map(original)).collect();
     Ok(document)
 }

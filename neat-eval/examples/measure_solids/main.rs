@@ -1,5 +1,5 @@
-//! Which faces and solids are found in scenes of which a true wireframe is known: in that, and in
-//! the one that the assembler makes.
+//! Which faces and solids are found in scenes with a truth: in the true wireframe, and in the one
+//! that the assembler makes; of rendered photographs in the latter only.
 //!
 //! ```text
 //! cargo run --release -p neat-eval --example measure_solids -- [--out DIR] [--kept DIR] SCENE…
@@ -8,6 +8,7 @@
 //! `--out` keeps documents with their shells, `NAME/true.json` and `NAME/assembled.json`. With `--kept` wireframes and segments are those that `measure_assembler --out`
 //! has left there; a scene that it lacks is measured in the true wireframe only. A true wireframe
 //! gets no views: only its edges speak. Its curves that are no arcs of circles are left out.
+//! Faces are measured by the protocols `cad-faces` and `scene-faces`.
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
 
@@ -17,6 +18,7 @@ mod truth;
 
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{Camera, CircularArc, Scene, Wireframe3d};
+use neat_eval::{CadFaces, FoundFace, SceneFaces, SceneTruth};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::confidence::{ConfidenceConfig, assess, transformed_covariance};
 use neat_wireframe::export::{WireframeDocument, read_json, write_json};
@@ -30,9 +32,6 @@ use std::time::Instant;
 use truth::Truth;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
-
-/// Areas of the same face agree so well.
-const AREA: f64 = 0.05;
 
 /// A wireframe in the frame of the files, with what there is to find faces by.
 struct Input {
@@ -54,6 +53,12 @@ fn main() -> Result<()> {
     }
     for dir in &scenes {
         let name = dir.file_name().unwrap_or_default().to_string_lossy();
+        if dir.join("truth").exists() {
+            if let Some(input) = reconstructed(dir, &name, kept.as_deref())? {
+                println!("{name}: {}", scene_scores(&input, dir)?);
+            }
+            continue;
+        }
         let truth = Truth::read(dir)?;
         let of_truth = Input {
             wireframe: truth.wireframe.clone(),
@@ -181,32 +186,44 @@ fn scores(shells: &[Shell], input: &Input, truth: &Truth) -> String {
             }
         };
     }
-    if let Some([recall, precision]) = agreement(shells, input, truth) {
-        text += &format!(", {recall:.3} of true area found, {precision:.3} of found area true");
+    if let Ok(found) = CadFaces::default().evaluate(&faces_of(shells, input), &truth.faces) {
+        text += &format!(
+            ", {:.3} of true area found, {:.3} of found area true",
+            found.recall,
+            found.precision.unwrap_or(0.0)
+        );
     }
     text
 }
 
-/// Share of the area of true faces that are found with the same surface and area, and of found
-/// ones that are true; `None` without true faces.
-fn agreement(shells: &[Shell], input: &Input, truth: &Truth) -> Option<[f64; 2]> {
-    let (mut same, mut all) = (0.0, 0.0);
-    let mut left: Vec<bool> = vec![true; truth.faces.len()];
-    for shell in shells {
-        let geometry = ShellGeometry::new(shell, &input.wireframe, &input.arcs);
-        for face in &shell.faces {
-            let area = geometry.area(face);
-            all += area;
-            let agrees = |k: &usize| {
-                let truth = &truth.faces[*k];
-                left[*k] && truth.is_on(&face.surface) && (area / truth.area - 1.0).abs() < AREA
-            };
-            if let Some(found) = (0..truth.faces.len()).find(agrees) {
-                left[found] = false;
-                same += truth.faces[found].area;
-            }
-        }
+/// The faces of a rendered scene against its surface, as text.
+fn scene_scores(input: &Input, dir: &Path) -> Result<String> {
+    let start = Instant::now();
+    let shells = input.shells();
+    let seconds = start.elapsed().as_secs_f64();
+    let truth = SceneTruth {
+        cameras: input.views.iter().map(|view| view.camera).collect(),
+        ..SceneTruth::read(dir)?
+    };
+    let scores = SceneFaces::default().evaluate(&faces_of(&shells, input), &truth)?;
+    let mut text = format!(
+        "{} faces of area {:.2}, {:.2} of planar surface seen, {} closed shells, {seconds:.3} s",
+        scores.faces,
+        scores.found_area,
+        scores.planar_area,
+        shells.iter().filter(|shell| shell.closed).count()
+    );
+    for shares in &scores.thresholds {
+        text += &format!(
+            "; within {:.4}: precision {:.3}, recall {:.3}",
+            shares.threshold,
+            shares.precision.unwrap_or(0.0),
+            shares.recall.unwrap_or(0.0)
+        );
     }
-    let truth: f64 = truth.faces.iter().map(|face| face.area).sum();
-    (truth > 0.0).then(|| [same / truth, if all > 0.0 { same / all } else { 0.0 }])
+    Ok(text)
+}
+
+fn faces_of(shells: &[Shell], input: &Input) -> Vec<FoundFace> {
+    FoundFace::of_document(&input.document(shells.to_vec()))
 }

@@ -3,8 +3,7 @@
 use crate::Result;
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Wireframe3d};
-use neat_eval::foreign;
-use neat_wireframe::faces::Surface;
+use neat_eval::{TrueFace, foreign};
 use serde::Deserialize;
 use std::fs;
 use std::path::Path;
@@ -25,30 +24,10 @@ pub struct Truth {
     pub volume: Option<f64>,
 }
 
-/// A face of the CAD model.
-#[derive(Deserialize)]
-pub struct TrueFace {
-    #[serde(rename = "type")]
-    kind: String,
-    pub area: f64,
-    normal: Option<Vector3<f64>>,
-    offset: Option<f64>,
-    axis_point: Option<Vector3<f64>>,
-    axis: Option<Vector3<f64>>,
-    radius: Option<f64>,
-}
-
-#[derive(Deserialize)]
-struct Faces {
-    #[serde(default)]
-    faces: Vec<TrueFace>,
-}
-
 impl Truth {
     pub fn read(dir: &Path) -> Result<Self> {
         let path = dir.join("gt_wireframe.json");
         let truth = foreign::read_truth(&path)?;
-        let faces: Faces = serde_json::from_slice(&fs::read(&path)?)?;
         let mut curves: Vec<Vec<Vector3<f64>>> =
             truth.curves.into_iter().map(|curve| curve.points).collect();
         // The toy has them beside its wireframe.
@@ -69,41 +48,9 @@ impl Truth {
             wireframe: truth.wireframe,
             other_curves: curves.len() - arcs.len(),
             arcs,
-            faces: faces.faces,
+            faces: TrueFace::read(&path)?,
             volume: mesh.exists().then(|| mesh_volume(&mesh)).transpose()?,
         })
-    }
-}
-
-impl TrueFace {
-    /// Whether a surface is the same to a hundredth.
-    pub fn is_on(&self, surface: &Surface) -> bool {
-        let near = |a: f64, b: f64| (a - b).abs() < 0.01;
-        match (surface, self.kind.as_str()) {
-            (Surface::Plane { normal, offset }, "plane") => {
-                let truth = self.normal.zip(self.offset);
-                truth.is_some_and(|(n, d)| {
-                    near(n.dot(normal).abs(), 1.0) && near(n.dot(normal) * d, *offset)
-                })
-            }
-            (
-                Surface::Cylinder {
-                    point,
-                    axis,
-                    radius,
-                    ..
-                },
-                "cylinder",
-            ) => {
-                let truth = self.axis_point.zip(self.axis).zip(self.radius);
-                truth.is_some_and(|((p, a), r)| {
-                    near(a.dot(axis).abs(), 1.0)
-                        && near((point - p).cross(&a).norm(), 0.0)
-                        && near(r, *radius)
-                })
-            }
-            _ => false,
-        }
     }
 }
 

@@ -3,7 +3,6 @@
 
 use super::scene_truth::SceneTruth;
 use crate::triangle_mesh::Surface;
-use nalgebra::Vector3;
 use neat_core::{Camera, LineSegment3};
 use rayon::prelude::*;
 
@@ -22,7 +21,7 @@ pub(super) fn edge_views(truth: &SceneTruth, surface: &Surface, margin: f64) -> 
         let cameras = truth.cameras.iter();
         let sees = |camera: &&Camera| {
             let points = (0..POINTS).map(|i| segment.point_at((i as f64 + 0.5) / POINTS as f64));
-            let seen = points.filter(|point| is_seen(camera, point, surface, margin));
+            let seen = points.filter(|point| surface.shows(camera, point, margin));
             2 * seen.count() > POINTS
         };
         cameras.filter(sees).count()
@@ -30,24 +29,11 @@ pub(super) fn edge_views(truth: &SceneTruth, surface: &Surface, margin: f64) -> 
     Some(truth.wireframe.segments().par_iter().map(seen_by).collect())
 }
 
-fn is_seen(camera: &Camera, point: &Vector3<f64>, surface: &Surface, margin: f64) -> bool {
-    if !camera.sees(point) {
-        return false;
-    }
-    let way = point - camera.center_in_world;
-    let distance = way.norm();
-    if distance <= margin {
-        return true;
-    }
-    let before = camera.center_in_world + way * (1.0 - margin / distance);
-    !surface.hides(&camera.center_in_world, &before)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::triangle_mesh::tests::cube;
-    use nalgebra::Matrix3;
+    use nalgebra::{Matrix3, Vector3};
     use neat_core::{Intrinsics, Wireframe3d};
 
     /// Looks from (0.5, 0.5, 5) down on the cube.

@@ -55,12 +55,22 @@ impl Entities {
         [from, to]: [&String; 2],
         [start, end]: [&Vector3<f64>; 2],
     ) -> Option<String> {
+        self.named_edge("", [from, to], [start, end])
+    }
+
+    /// The same with a name.
+    pub fn named_edge(
+        &mut self,
+        name: &str,
+        [from, to]: [&String; 2],
+        [start, end]: [&Vector3<f64>; 2],
+    ) -> Option<String> {
         let direction = direction(start, end)?;
         let direction = self.add(&format!("DIRECTION('',{})", triple(&direction)));
         let vector = self.add(&format!("VECTOR('',{direction},1.0)"));
         let origin = self.point(start);
         let line = self.add(&format!("LINE('',{origin},{vector})"));
-        Some(self.add(&format!("EDGE_CURVE('',{from},{to},{line},.T.)")))
+        Some(self.add(&format!("EDGE_CURVE('{name}',{from},{to},{line},.T.)")))
     }
 
     /// The edge along an arc between two vertices.

@@ -88,7 +88,11 @@ impl<'a> ShellWriter<'a> {
             let names = [&corners[0].name, &corners[1].name];
             let edge = match &curve.arc {
                 Some(arc) => Some(step.arc_edge(names, arc)),
-                None => step.straight_edge(names, [&corners[0].point, &corners[1].point]),
+                None => {
+                    let inferred = matches!(index, CurveIndex::Smooth(_));
+                    let name = if inferred { "inferred" } else { "" };
+                    step.named_edge(name, names, [&corners[0].point, &corners[1].point])
+                }
             };
             if let Some(edge) = edge {
                 edges.insert(*index, (edge, corners));

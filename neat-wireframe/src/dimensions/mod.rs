@@ -1,10 +1,11 @@
 //! Dimensions of a wireframe, each with its standard deviation: lengths of edges, distances
-//! of junctions and of parallel edges, angles, radii of arcs and the spacing of their centres.
+//! of junctions and of parallel edges, angles, radii of arcs and the spacing of their centres, and
+//! areas of faces.
 //!
 //! A dimension is a function of a few places, such as positions of junctions, and of those that
 //! set the scale. Its variance is linear propagation of their covariances as `wireframe.json` has
-//! them. Places count as independent of each other, but one that a dimension uses twice,
-//! such as an end of the edge that sets the scale, counts as one.
+//! them. Places count as independent of each other, but for the centre and the radius of one arc, and
+//! one that a dimension uses twice, such as an end of the edge that sets the scale, counts as one.
 //!
 //! ```
 //! use neat_wireframe::dimensions::{Dimensions, Quantity};
@@ -24,6 +25,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod area;
 mod geometry;
 mod parallel;
 mod scale;
@@ -31,9 +33,10 @@ mod scale;
 pub use scale::{Scale, ScaleError};
 
 use crate::export::WireframeDocument;
+use crate::faces::Face;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Half the width of a 95 % interval of one normal number, in standard deviations …
 const INTERVAL: f64 = 1.959_964;
@@ -79,6 +82,11 @@ pub enum Quantity {
         /// The arcs.
         arcs: [usize; 2],
     },
+    /// Of a face, less its holes.
+    Area {
+        /// The face, counted through all shells.
+        face: usize,
+    },
 }
 
 /// What a quantity depends on.
@@ -96,7 +104,7 @@ pub struct Dimension {
     /// What it is.
     #[serde(flatten)]
     pub quantity: Quantity,
-    /// In degrees for angles, else in the unit of [`Dimensions::unit`].
+    /// In degrees for angles, else in the unit of [`Dimensions::unit`], areas in its square.
     pub value: f64,
     /// Its standard deviation, in the same unit; `None` where a junction is not determined.
     pub sigma: Option<f64>,
@@ -112,7 +120,7 @@ pub enum DimensionError {
     /// A number beyond the last.
     #[error("there is no {what} {index}: the wireframe has {count}, counted from 0")]
     Missing {
-        /// "junction", "edge" or "arc".
+        /// "junction", "edge", "arc" or "face".
         what: &'static str,
         /// The number asked for.
         index: usize,
@@ -195,6 +203,14 @@ impl<'a> Dimensions<'a> {
             .collect()
     }
 
+    /// The areas of all faces, in their order.
+    pub fn areas(&self) -> Vec<Dimension> {
+        let count = face_count(self.document);
+        (0..count)
+            .filter_map(|face| self.measure(Quantity::Area { face }).ok())
+            .collect()
+    }
+
     /// The gaps between edges that may be parallel, lie beside each other for most of the
     /// shorter one and apart for sure; those of the longest edges first, `most` at most.
     pub fn parallels(&self, most: usize) -> Vec<Dimension> {
@@ -215,11 +231,17 @@ impl<'a> Dimensions<'a> {
         let mut places = own.clone();
         let reference = by_scale.iter().flat_map(|scale| scale.junctions);
         places.extend(reference.map(Place::Junction));
+        let face = self.face_of(&quantity);
+        // How often a length is in it.
+        let power = if face.is_some() { 2 } else { 1 };
         let value = |points: &[Vector3<f64>]| {
             let (own, reference) = points.split_at(own.len());
-            let value = geometry::value(&quantity, own);
+            let value = match face {
+                Some(face) => area::value(self.document, face, own),
+                None => geometry::value(&quantity, own),
+            };
             match (by_scale, reference) {
-                (Some(scale), [a, b]) => value * scale.length / (b - a).norm(),
+                (Some(scale), [a, b]) => value * (scale.length / (b - a).norm()).powi(power),
                 _ => value,
             }
         };
@@ -236,7 +258,7 @@ impl<'a> Dimensions<'a> {
             },
             _ => linear(),
         };
-        let relative = by_scale.map_or(0.0, |scale| scale.sigma / scale.length);
+        let relative = by_scale.map_or(0.0, |scale| f64::from(power) * scale.sigma / scale.length);
         let sigma = variance.map(|variance| (variance + (measured * relative).powi(2)).sqrt());
         Ok(Dimension {
             quantity,
@@ -261,6 +283,7 @@ impl<'a> Dimensions<'a> {
     ) -> Option<f64> {
         let step = STEP * self.extent;
         let mut sum = Matrix3::zeros();
+        let mut slopes_of_centers = BTreeMap::new();
         for place in places.iter().copied().collect::<BTreeSet<Place>>() {
             // It moves wherever it stands.
             let moved = |by: Vector3<f64>| {
@@ -272,9 +295,32 @@ impl<'a> Dimensions<'a> {
                 .map(|axis| (moved(axis * step) - moved(-axis * step)) / (2.0 * step));
             let slopes = Matrix3::from_columns(&slopes);
             sum += slopes * self.covariance(place)? * slopes.transpose();
+            // Centres come before radii.
+            match place {
+                Place::Center(arc) => {
+                    slopes_of_centers.insert(arc, slopes);
+                }
+                Place::Radius(arc) => {
+                    if let Some(of_center) = slopes_of_centers.get(&arc) {
+                        let with_radius = self.covariance_of_center_and_radius(arc)?;
+                        let both = of_center * with_radius * slopes.column(0).transpose();
+                        sum += both + both.transpose();
+                    }
+                }
+                Place::Junction(_) => {}
+            }
         }
         let finite = sum.iter().all(|x| x.is_finite());
         finite.then(|| sum.symmetric_eigenvalues().max().max(0.0))
+    }
+
+    /// The face of which a quantity is the area, counted through all shells.
+    fn face_of(&self, quantity: &Quantity) -> Option<&Face> {
+        let Quantity::Area { face } = quantity else {
+            return None;
+        };
+        let mut faces = self.document.shells.iter().flat_map(|shell| &shell.faces);
+        faces.nth(*face)
     }
 
     fn point(&self, place: Place) -> Vector3<f64> {
@@ -298,7 +344,13 @@ impl<'a> Dimensions<'a> {
         Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
     }
 
-    /// In the order that [`geometry::value`] expects.
+    /// Of each coordinate of the centre with the radius.
+    fn covariance_of_center_and_radius(&self, arc: usize) -> Option<Vector3<f64>> {
+        let [_, _, _, x, _, _, y, _, z, _] = (*self.document.arc_covariances.get(arc)?)?;
+        Some(Vector3::new(x, y, z))
+    }
+
+    /// In the order that [`geometry::value`] and [`area::value`] expect.
     fn places_of(&self, quantity: &Quantity) -> Vec<Place> {
         let ends = |edges: &[usize]| {
             let ends = edges.iter().flat_map(|edge| self.document.edges[*edge]);
@@ -310,6 +362,10 @@ impl<'a> Dimensions<'a> {
             Quantity::Gap { edges } | Quantity::Angle { edges } => ends(edges),
             Quantity::Radius { arc } => vec![Place::Radius(*arc)],
             Quantity::Spacing { arcs } => arcs.map(Place::Center).to_vec(),
+            Quantity::Area { .. } => match self.face_of(quantity) {
+                Some(face) => area::places(self.document, face),
+                None => Vec::new(),
+            },
         }
     }
 
@@ -325,6 +381,7 @@ impl<'a> Dimensions<'a> {
             }
             Quantity::Radius { arc } => ("arc", vec![*arc], document.arcs.len()),
             Quantity::Spacing { arcs } => ("arc", arcs.to_vec(), document.arcs.len()),
+            Quantity::Area { face } => ("face", vec![*face], face_count(document)),
         };
         if let Some(&index) = named.iter().find(|index| **index >= count) {
             return Err(DimensionError::Missing { what, index, count });
@@ -347,7 +404,11 @@ impl<'a> Dimensions<'a> {
     }
 }
 
-/// Lengths are not negative, and angles end at 0 and 90°. There a small angle is no normal
+fn face_count(document: &WireframeDocument) -> usize {
+    document.shells.iter().map(|shell| shell.faces.len()).sum()
+}
+
+/// Lengths and areas are not negative, and angles end at 0 and 90°. There a small angle is no normal
 /// number: it is the length of two, and grows by noise alone.
 fn interval(quantity: &Quantity, value: f64, sigma: f64) -> [f64; 2] {
     let around = [value - INTERVAL * sigma, value + INTERVAL * sigma];

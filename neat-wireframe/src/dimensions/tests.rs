@@ -1,4 +1,5 @@
 use super::*;
+use crate::faces::{CurveIndex, MeasuredGraph, Shell, Step, Surface, find_shells};
 use crate::test_scenes::{Noise, cube};
 use neat_core::CircularArc;
 
@@ -283,4 +284,207 @@ fn holes_have_radii_and_spacings() {
     document.arc_covariances.clear();
     let unknown = Dimensions::new(&document, None).unwrap();
     assert_eq!(unknown.radii()[0].interval, None);
+}
+
+/// The cube with its faces.
+fn cube_with_faces(sigma: f64) -> (WireframeDocument, Vec<Matrix3<f64>>) {
+    let (mut document, roots) = unsure_cube(sigma);
+    let wireframe = document.wireframe();
+    let graph = MeasuredGraph {
+        wireframe: &wireframe,
+        arcs: &[],
+        covariances: &[],
+    };
+    document.shells = find_shells(&graph, &[]);
+    (document, roots)
+}
+
+#[test]
+fn a_cube_has_six_areas_that_scatter_as_is_said() {
+    let (document, roots) = cube_with_faces(2e-3);
+    for scale in [None, Some("0-1=5m±0.02".parse::<Scale>().unwrap())] {
+        let said = Dimensions::new(&document, scale).unwrap().areas();
+        assert_eq!(said.len(), 6);
+        let mut noise = Noise(29);
+        let mut squares = [0.0; 6];
+        const TRIALS: usize = 3000;
+        for _ in 0..TRIALS {
+            let mut moved = document.clone();
+            for (junction, root) in moved.junctions.iter_mut().zip(&roots) {
+                *junction += root * Vector3::from_fn(|_, _| normal(&mut noise));
+            }
+            let scale = scale.map(|scale| Scale {
+                length: scale.length + scale.sigma * normal(&mut noise),
+                ..scale
+            });
+            let seen = Dimensions::new(&moved, scale).unwrap().areas();
+            for (sum, (seen, said)) in squares.iter_mut().zip(seen.iter().zip(&said)) {
+                *sum += (seen.value - said.value).powi(2);
+            }
+        }
+        for (sum, area) in squares.iter().zip(&said) {
+            let (scatter, sigma) = ((sum / TRIALS as f64).sqrt(), area.sigma.unwrap());
+            assert!(
+                (scatter - sigma).abs() < 0.06 * sigma,
+                "scatters by {scatter}, said {sigma}"
+            );
+        }
+    }
+    let exact = cube_with_faces(0.0).0;
+    let side = (exact.junctions[exact.edges[0][0]] - exact.junctions[exact.edges[0][1]]).norm();
+    let dimensions = Dimensions::new(&exact, None).unwrap();
+    assert!((dimensions.areas().iter()).all(|area| (area.value - side * side).abs() < 1e-9));
+    let missing = dimensions.measure(Quantity::Area { face: 6 }).unwrap_err();
+    assert!(missing.to_string().contains("no face 6"));
+}
+
+fn plane_face(loops: Vec<Vec<Step>>) -> Shell {
+    let surface = Surface::Plane {
+        normal: Vector3::z(),
+        offset: 0.0,
+    };
+    Shell {
+        closed: false,
+        faces: vec![Face { surface, loops }],
+    }
+}
+
+fn step(curve: CurveIndex) -> Step {
+    Step {
+        curve,
+        reversed: false,
+    }
+}
+
+/// Three sides of a rectangle of 2 by 1 with a flat arc over it, which is known to a hundredth at
+/// its ends and in its middle; with the root of the covariance of its centre's x and y and its
+/// radius.
+fn arched() -> (WireframeDocument, Matrix3<f64>) {
+    let rise = 0.1_f64;
+    let radius = (1.0 + rise * rise) / (2.0 * rise);
+    let center = Vector3::new(1.0, 1.0 + rise - radius, 0.0);
+    let half = (1.0 / radius).asin();
+    let middle = std::f64::consts::FRAC_PI_2;
+    // Of centre x, centre y and radius by three points along their normals.
+    let rows = [middle - half, middle, middle + half].map(|angle| {
+        let (sine, cosine) = angle.sin_cos();
+        [cosine, sine, 1.0]
+    });
+    let by_points = Matrix3::from_fn(|row, column| rows[row][column]);
+    let root = by_points.try_inverse().unwrap() * 0.01;
+    let c = root * root.transpose();
+    let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
+    let edges = [[0, 1], [1, 2], [3, 0]];
+    let curves = [CurveIndex::Edge(0), CurveIndex::Edge(1)]
+        .into_iter()
+        .chain([CurveIndex::Arc(0), CurveIndex::Edge(2)]);
+    let document = WireframeDocument {
+        junctions: corners.map(|[x, y]| Vector3::new(x, y, 0.0)).to_vec(),
+        edges: edges.to_vec(),
+        arcs: vec![CircularArc {
+            center,
+            axes: [Vector3::x(), Vector3::y()],
+            radius,
+            angles: [middle - half, middle + half],
+        }],
+        junction_covariances: vec![Some([1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6]); 4],
+        arc_covariances: vec![Some([
+            c[(0, 0)],
+            c[(0, 1)],
+            0.0,
+            c[(0, 2)],
+            c[(1, 1)],
+            0.0,
+            c[(1, 2)],
+            0.0,
+            0.0,
+            c[(2, 2)],
+        ])],
+        shells: vec![plane_face(vec![curves.map(step).collect()])],
+        ..WireframeDocument::default()
+    };
+    (document, root)
+}
+
+#[test]
+fn an_arc_is_as_sure_as_its_points_however_unsure_its_centre_is() {
+    let (document, root) = arched();
+    document.check(std::path::Path::new("arched")).unwrap();
+    let said = Dimensions::new(&document, None).unwrap().areas()[0].clone();
+    let (radius, half) = (document.arcs[0].radius, 0.5 * document.arcs[0].sweep());
+    let segment = radius * radius * (half - half.sin() * half.cos());
+    assert!((said.value - 2.0 - segment).abs() < 1e-9);
+    let sigma = said.sigma.unwrap();
+    // With a radius that were unsure alone, it would be by as much again for each unit of chord.
+    let of_radius = document.arc_covariances[0].unwrap()[9].sqrt();
+    assert!(sigma < 0.02 && of_radius > 0.5, "{sigma} {of_radius}");
+    let mut noise = Noise(7);
+    let mut sum = 0.0;
+    const TRIALS: usize = 4000;
+    for _ in 0..TRIALS {
+        let mut moved = document.clone();
+        for junction in &mut moved.junctions {
+            *junction += 1e-3 * Vector3::from_fn(|_, _| normal(&mut noise));
+        }
+        // A fiftieth of it: a curve is as straight as that.
+        let by = root * Vector3::from_fn(|_, _| normal(&mut noise)) * 0.02;
+        moved.arcs[0].center += Vector3::new(by.x, by.y, 0.0);
+        moved.arcs[0].radius += by.z;
+        let seen = Dimensions::new(&moved, None).unwrap().areas()[0].clone();
+        sum += (seen.value - said.value).powi(2);
+    }
+    let mut surer = document;
+    let small = surer.arc_covariances[0].unwrap().map(|x| x * 0.02 * 0.02);
+    surer.arc_covariances = vec![Some(small)];
+    let said = Dimensions::new(&surer, None).unwrap().areas()[0].clone();
+    let (scatter, sigma) = ((sum / TRIALS as f64).sqrt(), said.sigma.unwrap());
+    assert!((scatter - sigma).abs() < 0.06 * sigma, "{scatter} {sigma}");
+}
+
+#[test]
+fn holes_are_no_area_and_cylinders_have_one() {
+    let (mut document, _) = arched();
+    let circle = |z: f64| CircularArc {
+        center: Vector3::new(1.0, 0.5, z),
+        axes: [Vector3::x(), Vector3::y()],
+        radius: 0.25,
+        angles: [0.0, std::f64::consts::TAU],
+    };
+    document.arcs.extend([circle(0.0), circle(2.0)]);
+    let radius_only = |sigma: f64| {
+        let mut of_arc = [0.0; 10];
+        of_arc[9] = sigma * sigma;
+        Some(of_arc)
+    };
+    document
+        .arc_covariances
+        .extend([radius_only(0.01), radius_only(0.02)]);
+    let whole = Dimensions::new(&document, None).unwrap().areas()[0].value;
+    let hole = Step {
+        curve: CurveIndex::Arc(1),
+        reversed: true,
+    };
+    document.shells[0].faces[0].loops.push(vec![hole]);
+    document.shells[0].faces.push(Face {
+        surface: Surface::Cylinder {
+            point: Vector3::new(1.0, 0.5, 0.0),
+            axis: Vector3::z(),
+            radius: 0.25,
+            convex: false,
+        },
+        loops: vec![
+            vec![step(CurveIndex::Arc(1))],
+            vec![step(CurveIndex::Arc(2))],
+        ],
+    });
+    let areas = Dimensions::new(&document, None).unwrap().areas();
+    let pi = std::f64::consts::PI;
+    assert!((whole - areas[0].value - pi * 0.0625).abs() < 1e-9);
+    assert!((areas[1].value - pi).abs() < 1e-9);
+    // The mean of both radii, by the way around for each of two units.
+    let expected = 2.0 * pi * 2.0 * 0.5 * 0.01_f64.hypot(0.02);
+    assert!((areas[1].sigma.unwrap() - expected).abs() < 1e-6);
+    document.arc_covariances.clear();
+    let unknown = Dimensions::new(&document, None).unwrap().areas();
+    assert!(unknown.iter().all(|area| area.interval.is_none()));
 }

@@ -53,7 +53,7 @@ fn planar_face(curves: &Curves, loops: Vec<Vec<Step>>, frame: &PlaneFrame) -> Op
     })
 }
 
-/// Cylinders between two whole circles, or two arcs whose ends edges join.
+/// Cylinders between two whole circles, or two arcs whose ends edges or inferred lines join.
 fn cylinders(curves: &Curves) -> Vec<Face> {
     let (arcs, edges): (Vec<&Curve>, Vec<&Curve>) =
         (curves.all.iter()).partition(|curve| curve.arc.is_some());
@@ -72,7 +72,7 @@ fn cylinders(curves: &Curves) -> Vec<Face> {
 
 /// The cylinder on which both arcs are rims, with its normal away from the axis, which points
 /// from the first rim to the second.
-fn common_cylinder(curves: &Curves, rims: [&Curve; 2]) -> Option<Surface> {
+pub(super) fn common_cylinder(curves: &Curves, rims: [&Curve; 2]) -> Option<Surface> {
     let [a, b] = [rims[0].arc?, rims[1].arc?];
     let tolerance = AGREEMENT * curves.arc_sigma();
     let between = b.center - a.center;

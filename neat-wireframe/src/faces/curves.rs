@@ -47,7 +47,7 @@ pub(super) struct Curve {
 
 /// The curves of a wireframe, with its size and noise.
 pub(super) struct Curves {
-    /// Those that may bound faces.
+    /// Those that may bound faces, ascending.
     pub all: Vec<Curve>,
     /// Arcs that may not, as an end is no junction.
     pub loose: Vec<Vec<Vector3<f64>>>,
@@ -110,10 +110,27 @@ impl Curves {
         Self { all, loose, extent }
     }
 
+    /// The same with lines that are inferred from them, ascending.
+    pub fn with_inferred(mut self, lines: Vec<Curve>) -> Self {
+        self.all.extend(lines);
+        self
+    }
+
+    /// Those that images show.
+    pub fn observed(&self) -> impl Iterator<Item = &Curve> {
+        let observed = |curve: &&Curve| !matches!(curve.index, CurveIndex::Smooth(_));
+        self.all.iter().filter(observed)
+    }
+
     /// The place of a curve in [`Curves::all`].
     pub fn find(&self, index: CurveIndex) -> Option<&Curve> {
         let found = self.all.binary_search_by_key(&index, |curve| curve.index);
         found.ok().map(|found| &self.all[found])
+    }
+
+    /// Covariance of a point of an arc.
+    pub fn arc_covariance(&self) -> Matrix3<f64> {
+        Matrix3::identity() * self.arc_sigma().powi(2)
     }
 
     /// Standard deviation of a point of an arc.
@@ -123,7 +140,7 @@ impl Curves {
 }
 
 /// The junctions nearest to the ends of an arc; `None` without junctions.
-pub(super) fn nearest_junctions(
+pub(crate) fn nearest_junctions(
     arc: &CircularArc,
     junctions: &[Vector3<f64>],
 ) -> Option<[usize; 2]> {

@@ -61,7 +61,7 @@ pub struct Step {
     pub reversed: bool,
 }
 
-/// An edge or an arc of the wireframe, by its index.
+/// What bounds a face: an edge or an arc of the wireframe, by its index, or an inferred line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CurveIndex {
@@ -69,6 +69,9 @@ pub enum CurveIndex {
     Edge(usize),
     /// An arc, which may be a whole circle.
     Arc(usize),
+    /// No edge, but a straight line between two junctions, the lower first, where two faces meet
+    /// without a crease: inferred, as no image shows it.
+    Smooth([usize; 2]),
 }
 
 impl Shell {
@@ -83,13 +86,20 @@ impl Shell {
 }
 
 impl Shell {
-    /// The same shell where edges have new indices, or none; `None` if no face is left. Without one
-    /// of its faces it is a sheet.
-    pub fn with_edges(&self, new_index: impl Fn(usize) -> Option<usize>) -> Option<Self> {
+    /// The same shell where edges and junctions have new indices in the same order, or none;
+    /// `None` if no face is left. Without one of its faces it is a sheet.
+    pub fn with_indices(
+        &self,
+        new_edge: impl Fn(usize) -> Option<usize>,
+        new_junction: impl Fn(usize) -> Option<usize>,
+    ) -> Option<Self> {
         let step = |step: &Step| {
             let curve = match step.curve {
-                CurveIndex::Edge(edge) => CurveIndex::Edge(new_index(edge)?),
+                CurveIndex::Edge(edge) => CurveIndex::Edge(new_edge(edge)?),
                 arc @ CurveIndex::Arc(_) => arc,
+                CurveIndex::Smooth([a, b]) => {
+                    CurveIndex::Smooth([new_junction(a)?, new_junction(b)?])
+                }
             };
             Some(Step { curve, ..*step })
         };
@@ -111,11 +121,12 @@ impl Shell {
 impl Face {
     /// Whether its surface is one, and its loops are closed chains of curves that exist: any
     /// number on a plane; on a cylinder two arcs, which are loops of their own or joined by two
-    /// edges.
+    /// edges or inferred lines.
     pub(crate) fn is_valid(&self, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> bool {
         let exists = |step: &Step| match step.curve {
             CurveIndex::Edge(edge) => edge < wireframe.edges.len(),
             CurveIndex::Arc(arc) => arc < arcs.len(),
+            CurveIndex::Smooth([a, b]) => a < b && b < wireframe.junctions.len(),
         };
         let unit = |v: &Vector3<f64>| (v.norm() - 1.0).abs() < 1e-6;
         let is_arc = |step: &Step| matches!(step.curve, CurveIndex::Arc(_));
@@ -226,6 +237,7 @@ fn is_closed(steps: &[Step], wireframe: &Wireframe3d, arcs: &[CircularArc]) -> b
         let [start, end] = match step.curve {
             CurveIndex::Edge(edge) => wireframe.edges[edge],
             CurveIndex::Arc(arc) => nearest_junctions(&arcs[arc], &wireframe.junctions)?,
+            CurveIndex::Smooth(ends) => ends,
         };
         Some(if step.reversed {
             [end, start]
@@ -236,7 +248,7 @@ fn is_closed(steps: &[Step], wireframe: &Wireframe3d, arcs: &[CircularArc]) -> b
     match steps {
         [] => false,
         [step] => match step.curve {
-            CurveIndex::Edge(_) => false,
+            CurveIndex::Edge(_) | CurveIndex::Smooth(_) => false,
             CurveIndex::Arc(arc) => arcs[arc].is_closed(),
         },
         [.., last] => {

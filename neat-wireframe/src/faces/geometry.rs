@@ -64,6 +64,10 @@ impl ShellGeometry {
                                 .flatten(),
                             arc: Some(arcs[arc]),
                         },
+                        CurveIndex::Smooth(ends) => ShellCurve {
+                            ends: Some(ends),
+                            arc: None,
+                        },
                     };
                     curves.insert(step.curve, curve);
                 }

@@ -2,7 +2,8 @@
 //! shells where they close.
 //!
 //! Curves that lie in one plane within their covariances divide it into cells, and two coaxial
-//! circles are the rims of a cylinder: each is a face that may be there (`candidates.rs`). Images
+//! circles are the rims of a cylinder: each is a face that may be there (`candidates.rs`). Where a
+//! cylinder goes on without a crease, the line between them is inferred (`tangency.rs`). Images
 //! speak against a face through which they show what lies behind it (`visibility.rs`); among the
 //! others those are chosen that give the most edges two faces (`selection.rs`). What hangs
 //! together is a shell; it bounds a solid if each of its curves has a face on both sides
@@ -42,6 +43,7 @@ mod polygon;
 mod region;
 mod selection;
 mod shells;
+mod tangency;
 mod triangulation;
 mod visibility;
 
@@ -49,6 +51,7 @@ mod visibility;
 mod tests;
 
 pub use curves::MeasuredGraph;
+pub(crate) use curves::nearest_junctions;
 pub use face::{CurveIndex, Face, Shell, Step, Surface};
 pub(crate) use triangulation::triangles;
 
@@ -68,7 +71,9 @@ use visibility::Sightings;
 ///
 /// The result does not depend on the number of threads.
 pub fn find_shells(graph: &MeasuredGraph, views: &[ViewObservation]) -> Vec<Shell> {
-    let curves = Curves::new(graph);
+    let observed = Curves::new(graph);
+    let smooth = tangency::smooth_lines(&observed);
+    let curves = observed.with_inferred(smooth);
     let faces = candidates::candidates(&curves);
     let _span = tracing::debug_span!("find_shells", faces = faces.len()).entered();
     let sightings = Sightings::new(&curves, views);

@@ -3,7 +3,8 @@
 //!
 //! The energy is a sum over faces and curves, in nats. A face costs what images say against it
 //! ([`super::visibility`]). A curve that lacks a face costs [`MISSING_FACE`], twice if it has none;
-//! a curve between two faces of one plane is no crease and costs [`FLAT`]. No curve has three
+//! a curve between two faces of one plane is no crease and costs [`FLAT`]. An inferred line that has
+//! no face is none, and costs nothing. No curve has three
 //! faces, and no two faces lie on each other. The minimum is found by branch and bound.
 
 use super::curves::Curves;
@@ -46,7 +47,8 @@ pub(super) fn select(curves: &Curves, faces: &[Face], against: &[f64]) -> Vec<us
     }
     let mut beside: Vec<Vec<(usize, Pair)>> = vec![Vec::new(); faces.len()];
     let mut contended: Vec<Vec<usize>> = possible.iter().map(|face| vec![*face]).collect();
-    for at in at_curve.values() {
+    for (curve, at) in &at_curve {
+        let is_inferred = matches!(curve, CurveIndex::Smooth(_));
         for (k, (one, step)) in at.iter().enumerate() {
             for (other, other_step) in &at[k + 1..] {
                 let pair = pair(curves, [&faces[*one], &faces[*other]], [step, other_step]);
@@ -54,7 +56,7 @@ pub(super) fn select(curves: &Curves, faces: &[Face], against: &[f64]) -> Vec<us
                     beside[*one].push((*other, pair));
                     beside[*other].push((*one, pair));
                 }
-                if at.len() > 2 || pair != Pair::Crease {
+                if at.len() > 2 || pair != Pair::Crease || is_inferred {
                     contended.push(vec![*one, *other]);
                 }
             }
@@ -191,8 +193,15 @@ impl<'a> Search<'a> {
         let beside = self.beside[face]
             .iter()
             .filter(|(other, _)| self.taken.contains(other));
-        beside
+        let flat: Option<f64> = beside
             .map(|(_, pair)| (*pair != Pair::Folded).then_some(FLAT))
-            .sum()
+            .sum();
+        // A line is inferred for the first face, which wins nothing by it and lacks the other.
+        let is_first = |step: &&Step| {
+            matches!(step.curve, CurveIndex::Smooth(_))
+                && self.count.get(&step.curve).is_none_or(|count| *count == 0)
+        };
+        let inferred = self.faces[face].steps().filter(is_first).count();
+        flat.map(|flat| flat + 2.0 * MISSING_FACE * inferred as f64)
     }
 }

@@ -142,7 +142,7 @@ fn leave_out_where_curves_are(shell: &mut Shell, curves: &Curves) -> bool {
         .map(|step| step.curve)
         .collect();
     let (bounding, others): (Vec<&Curve>, Vec<&Curve>) =
-        (curves.all.iter()).partition(|curve| own.contains(&curve.index));
+        (curves.observed()).partition(|curve| own.contains(&curve.index));
     let bounds = Bounds::of(bounding.iter().flat_map(|curve| &curve.points));
     let margin = MARGIN * bounds.extent();
     let around = bounds.widened(margin);

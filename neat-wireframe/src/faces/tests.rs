@@ -371,3 +371,69 @@ fn triangles_of_a_solid_are_watertight() {
         assert!((volume / exact - 1.0).abs() < 2e-3, "{volume} {exact}");
     }
 }
+
+/// A prism of height 0.8 over the unit square with one corner cut by an arc around this point of
+/// the diagonal; no edge runs up where the arc begins and ends.
+fn filleted(center: f64) -> Model {
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.7], [0.7, 1.0], [0.0, 1.0]];
+    let start = (0.7 - center).atan2(1.0 - center);
+    let radius = (1.0 - center).hypot(0.7 - center);
+    let mut model = Model::default().prism(&corners, [0.0, 0.8]);
+    let is_straight = |[a, b]: &[usize; 2]| {
+        let [low, high] = [a.min(b), a.max(b)];
+        ![[2, 3], [7, 8], [2, 7], [3, 8]].contains(&[*low, *high])
+    };
+    model.wireframe.edges.retain(is_straight);
+    let angles = [start, PI / 2.0 - start];
+    model.circle([center, center, 0.0], radius, angles).circle(
+        [center, center, 0.8],
+        radius,
+        angles,
+    )
+}
+
+fn inferred(shells: &[Shell]) -> usize {
+    let faces = shells.iter().flat_map(|shell| &shell.faces);
+    let steps = faces.flat_map(Face::steps);
+    steps
+        .filter(|step| matches!(step.curve, CurveIndex::Smooth(_)))
+        .count()
+}
+
+#[test]
+fn fillets_and_slots_close_by_inferred_lines() {
+    let corner = (1.0 - PI / 4.0) * 0.09;
+    assert_solid(filleted(0.7), 7, 0.8 * (1.0 - corner));
+    // Each of the two lines bounds two faces.
+    assert_eq!(inferred(&filleted(0.7).turned().shells()), 4);
+    let slot = [[0.3, 0.4], [0.6, 0.4], [0.6, 0.6], [0.3, 0.6]];
+    let mut model = Model::default()
+        .prism(&SQUARE, [0.0, 0.8])
+        .prism(&slot, [0.0, 0.8]);
+    // Of the slot its long sides are left, at both ends of the block.
+    let [low, high] = [8, 12].map(|k| [[k, k + 1], [k + 2, k + 3]]);
+    let is_side = |edge: &[usize; 2]| edge[0] < 8 || low.contains(edge) || high.contains(edge);
+    model.wireframe.edges.retain(is_side);
+    for z in [0.0, 0.8] {
+        let [left, right] = [[0.3, 0.5, z], [0.6, 0.5, z]];
+        model =
+            model
+                .circle(left, 0.1, [PI / 2.0, 1.5 * PI])
+                .circle(right, 0.1, [-PI / 2.0, PI / 2.0]);
+    }
+    let hole = 0.3 * 0.2 + PI * 0.01;
+    assert_solid(model, 10, 0.8 * (1.0 - hole));
+}
+
+#[test]
+fn nothing_is_inferred_where_an_arc_ends_at_a_corner_or_alone() {
+    // The arc meets the sides at 27°: there must be an edge, and it is missing.
+    let cornered = filleted(0.4).turned().shells();
+    assert!(!cornered.is_empty() && cornered.iter().all(|shell| !shell.closed));
+    assert_eq!(inferred(&cornered), 0);
+    // Two arcs that go on straight, and nothing that the lines between them bound.
+    let mut bare = filleted(0.7);
+    let at_arc = |edge: &[usize; 2]| edge.iter().any(|end| [2, 3, 7, 8].contains(end));
+    bare.wireframe.edges.retain(at_arc);
+    assert_eq!(inferred(&bare.turned().shells()), 0);
+}

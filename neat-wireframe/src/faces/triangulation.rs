@@ -69,6 +69,7 @@ fn indices_along(
         let mut along = match step.curve {
             CurveIndex::Edge(edge) => edges[edge].to_vec(),
             CurveIndex::Arc(arc) => chains[arc].clone(),
+            CurveIndex::Smooth(ends) => ends.to_vec(),
         };
         if step.reversed {
             along.reverse();
@@ -78,7 +79,7 @@ fn indices_along(
     let count = steps.len();
     let mut indices = along(&steps[place]);
     let [before, after] = [count - 1, 1].map(|k| &steps[(place + k) % count]);
-    let is_edge = |step: &Step| matches!(step.curve, CurveIndex::Edge(_));
+    let is_edge = |step: &Step| !matches!(step.curve, CurveIndex::Arc(_));
     let last = indices.len() - 1;
     if is_edge(before) {
         indices[0] = along(before)[1];

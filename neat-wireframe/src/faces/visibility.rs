@@ -55,7 +55,7 @@ pub(super) struct Sightings {
 
 impl Sightings {
     pub fn new(curves: &Curves, views: &[ViewObservation]) -> Self {
-        let chains: Vec<&[Vector3<f64>]> = (curves.all.iter().map(|curve| &curve.points[..]))
+        let chains: Vec<&[Vector3<f64>]> = (curves.observed().map(|curve| &curve.points[..]))
             .chain(curves.loose.iter().map(|points| &points[..]))
             .collect();
         let usable = views

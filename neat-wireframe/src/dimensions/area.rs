@@ -1,0 +1,161 @@
+//! The area of a face as a function of the places that it hangs on: the ends of its edges, and
+//! centres, radii and ends of its arcs.
+//!
+//! A plane's is the integral of x × dx / 2 around it, along its normal; that the normal is off
+//! changes it in second order only. A cylinder's is the mean of its rims' lengths times the
+//! distance between them.
+
+use super::Place;
+use crate::export::WireframeDocument;
+use crate::faces::{CurveIndex, Face, Step, Surface, nearest_junctions};
+use nalgebra::Vector3;
+use std::f64::consts::{PI, TAU};
+
+/// The places of one step after the other: both ends of an edge; of an arc its centre, its radius,
+/// and, if it is no circle, its ends.
+pub(super) fn places(document: &WireframeDocument, face: &Face) -> Vec<Place> {
+    let of_step = |steps: &[Step], step: &Step| match step.curve {
+        CurveIndex::Edge(edge) => document.edges[edge].map(Place::Junction).to_vec(),
+        CurveIndex::Smooth(ends) => ends.map(Place::Junction).to_vec(),
+        CurveIndex::Arc(arc) => {
+            let ends = nearest_junctions(&document.arcs[arc], &document.junctions);
+            let ends = ends.filter(|_| steps.len() > 1).into_iter().flatten();
+            let circle = [Place::Center(arc), Place::Radius(arc)];
+            circle
+                .into_iter()
+                .chain(ends.map(Place::Junction))
+                .collect()
+        }
+    };
+    let loops = face.loops.iter();
+    loops
+        .flat_map(|steps| steps.iter().flat_map(move |step| of_step(steps, step)))
+        .collect()
+}
+
+/// A step with its places where they lie.
+enum Piece {
+    Edge([Vector3<f64>; 2]),
+    Arc {
+        center: Vector3<f64>,
+        radius: f64,
+        normal: Vector3<f64>,
+        /// From the start to the end, in radians.
+        sweep: f64,
+        /// Its own ends, and the junctions there; `None` of a whole circle.
+        ends: Option<[[Vector3<f64>; 2]; 2]>,
+    },
+}
+
+/// The area if the places lie at these points, in the order of [`places`].
+pub(super) fn value(document: &WireframeDocument, face: &Face, points: &[Vector3<f64>]) -> f64 {
+    let mut left = points;
+    let mut take = || {
+        let (first, others) = left.split_first().expect("area::value: too few points");
+        left = others;
+        *first
+    };
+    let mut pieces: Vec<(bool, Piece)> = Vec::new();
+    for steps in &face.loops {
+        for step in steps {
+            let piece = match step.curve {
+                CurveIndex::Edge(_) | CurveIndex::Smooth(_) => Piece::Edge([take(), take()]),
+                CurveIndex::Arc(arc) => {
+                    let (center, radius) = (take(), take().x);
+                    let ends = (steps.len() > 1).then(|| [take(), take()]);
+                    arc_piece(document, arc, center, radius, ends)
+                }
+            };
+            pieces.push((step.reversed, piece));
+        }
+    }
+    match face.surface {
+        Surface::Plane { normal, .. } => {
+            let origin = points[0];
+            let sum: Vector3<f64> = (pieces.iter())
+                .map(|(reversed, piece)| {
+                    let vector = piece.area_vector(&origin);
+                    if *reversed { -vector } else { vector }
+                })
+                .sum();
+            normal.dot(&sum).abs()
+        }
+        Surface::Cylinder { axis, .. } => cylinder(&axis, &pieces),
+    }
+}
+
+fn arc_piece(
+    document: &WireframeDocument,
+    index: usize,
+    center: Vector3<f64>,
+    radius: f64,
+    ends: Option<[Vector3<f64>; 2]>,
+) -> Piece {
+    let mut arc = document.arcs[index];
+    (arc.center, arc.radius) = (center, radius);
+    let [start, end] = arc.angles;
+    if let Some([from, to]) = &ends {
+        // The angle next to the one of the arc.
+        let near = |point: &Vector3<f64>, angle: f64| {
+            angle + (arc.angle_of(point) - angle + PI).rem_euclid(TAU) - PI
+        };
+        arc.angles = [near(from, start), near(to, end)];
+    }
+    let sweep = arc.angles[1] - arc.angles[0];
+    let own = arc.angles.map(|angle| arc.point_at(angle));
+    Piece::Arc {
+        center,
+        radius,
+        normal: arc.normal(),
+        sweep,
+        ends: ends.map(|[from, to]| [[from, own[0]], [own[1], to]]),
+    }
+}
+
+impl Piece {
+    /// Half the integral of x × dx along it, with x from the origin.
+    fn area_vector(&self, origin: &Vector3<f64>) -> Vector3<f64> {
+        let straight = |[a, b]: &[Vector3<f64>; 2]| 0.5 * (a - origin).cross(&(b - origin));
+        match self {
+            Self::Edge(ends) => straight(ends),
+            Self::Arc {
+                center,
+                radius,
+                normal,
+                sweep,
+                ends,
+            } => {
+                let sector = 0.5 * normal * radius.powi(2) * *sweep;
+                let Some([from, to]) = ends else {
+                    return sector;
+                };
+                // Junctions lie beside the circle: straight to it, along it, and back.
+                let along = 0.5 * (center - origin).cross(&(to[0] - from[1]));
+                straight(from) + along + sector + straight(to)
+            }
+        }
+    }
+}
+
+fn cylinder(axis: &Vector3<f64>, pieces: &[(bool, Piece)]) -> f64 {
+    let (mut rims, mut centers, mut heights) = (Vec::new(), Vec::new(), Vec::new());
+    for (_, piece) in pieces {
+        match piece {
+            Piece::Edge([a, b]) => heights.push(axis.dot(&(b - a)).abs()),
+            Piece::Arc {
+                center,
+                radius,
+                sweep,
+                ..
+            } => {
+                rims.push(radius * sweep);
+                centers.push(axis.dot(center));
+            }
+        }
+    }
+    if heights.is_empty() {
+        heights.extend(centers.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
+    }
+    let mean = |numbers: &[f64]| numbers.iter().sum::<f64>() / numbers.len() as f64;
+    mean(&rims) * mean(&heights)
+}
