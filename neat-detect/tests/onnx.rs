@@ -156,6 +156,7 @@ fn a_model_that_is_not_mlsd_is_refused_by_name() {
 
 /// With the weights in the file `$NEAT_MLSD`.
 #[test]
+#[expect(clippy::print_stderr, reason = "a skipped test must be seen")]
 fn mlsd_sees_the_borders_of_a_square() {
     let Some(path) = std::env::var_os("NEAT_MLSD") else {
         eprintln!("skipped: NEAT_MLSD names no weights (scripts/fetch_mlsd.sh fetches them)");

@@ -225,6 +225,38 @@ mod tests {
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 6);
     }
 
+    /// With the weights in the file `$NEAT_MLSD`.
+    #[cfg(feature = "onnx")]
+    #[test]
+    #[expect(clippy::print_stderr, reason = "a skipped test must be seen")]
+    fn what_mlsd_advised_is_kept_apart() {
+        if std::env::var_os("NEAT_MLSD").is_none() {
+            eprintln!("skipped: NEAT_MLSD names no weights (scripts/fetch_mlsd.sh fetches them)");
+            return;
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let cache = FileCache::new(dir.path());
+        let advised = DetectorConfig {
+            detector: neat_detect::LineDetector::Mlsd,
+            ..DetectorConfig::default()
+        };
+        for (config, files) in [(DetectorConfig::default(), 3), (advised, 6)] {
+            let mut scene = scene();
+            detect_wireframes(
+                &mut scene,
+                Path::new("scene"),
+                &config,
+                0.05,
+                with(Some(&cache)),
+                &mut |_: Event<'_, ()>| {},
+            )
+            .unwrap();
+            let found = scene.views.iter().map(|view| view.wireframe.edges.len());
+            assert!(found.min() > Some(3));
+            assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), files);
+        }
+    }
+
     #[test]
     fn a_cache_that_cannot_be_written_is_a_warning() {
         let dir = tempfile::tempdir().unwrap();
