@@ -50,7 +50,8 @@ pub fn detect_wireframes<R>(
     let views = scene.views.len();
     let mut done = 0;
     let sizes = scene.views.iter().map(|view| view.image.dimensions());
-    let bytes_each = memory_limit.bytes_each(sizes, BYTES_PER_PIXEL, DETECTING, dir)?;
+    let bytes_each =
+        memory_limit.bytes_each(sizes, BYTES_PER_PIXEL, DETECTING, dir)? + detector.model_bytes();
     // Some at a time, so that progress can be told in between.
     for chunk in scene.views.chunks_mut(4 * rayon::current_num_threads()) {
         if resources.is_cancelled() {

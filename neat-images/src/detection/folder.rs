@@ -92,6 +92,7 @@ pub fn detect_folder<R>(
         &options.images,
     )?;
     let detector = Detector::open(options)?;
+    let bytes_each = bytes_each + detector.model_bytes();
     let overlays = options.out.join("overlays");
     file::create_dir(if options.overlays {
         &overlays
@@ -159,6 +160,13 @@ impl<'a> Detector<'a> {
                 Self::Onnx(Box::new(detector))
             }
         })
+    }
+
+    fn model_bytes(&self) -> u64 {
+        match self {
+            Self::Configured(detector) => detector.model_bytes(),
+            _ => 0,
+        }
     }
 
     fn wireframe(
