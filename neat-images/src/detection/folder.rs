@@ -139,7 +139,7 @@ fn detect_one(
 
 /// A [`SegmentSource`] that is ready.
 enum Detector<'a> {
-    Configured(ConfiguredDetector<'a>),
+    Configured(Box<ConfiguredDetector<'a>>),
     SegmentFiles(&'a Path),
     EdgeMaps(&'a Path),
     #[cfg(feature = "onnx")]
@@ -150,7 +150,7 @@ impl<'a> Detector<'a> {
     fn open(options: &'a DetectOptions) -> Result<Self, SceneError> {
         Ok(match &options.source {
             SegmentSource::Configured => {
-                Self::Configured(ConfiguredDetector::open(&options.config)?)
+                Self::Configured(Box::new(ConfiguredDetector::open(&options.config)?))
             }
             SegmentSource::SegmentFiles(dir) => Self::SegmentFiles(dir),
             SegmentSource::EdgeMaps(dir) => Self::EdgeMaps(dir),
