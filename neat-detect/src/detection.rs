@@ -69,13 +69,14 @@ pub fn detect(image: &RgbImage, config: &DetectorConfig) -> Wireframe2d {
 /// use image::{Rgb, RgbImage};
 /// use nalgebra::Vector2;
 /// use neat_core::LineSegment2;
-/// use neat_detect::{DetectorConfig, detect, detect_with_hints};
+/// use neat_detect::{DetectorConfig, detect_with_hints};
 ///
 /// let image = RgbImage::from_fn(64, 64, |x, _| Rgb([if x < 30 { 20 } else { 200 }; 3]));
 /// let vertical = |x| LineSegment2::new(Vector2::new(x, 5.0), Vector2::new(x, 55.0));
-/// let config = DetectorConfig::default();
-/// let hinted = detect_with_hints(&image, &[vertical(31.0), vertical(50.0)], &config);
-/// assert_eq!(hinted, detect(&image, &config));
+/// let hints = [vertical(31.0), vertical(50.0)];
+/// let wireframe = detect_with_hints(&image, &hints, &DetectorConfig::default());
+/// assert_eq!(wireframe.edges.len(), 1);
+/// assert!((wireframe.vertices[0].x - 29.5).abs() < 0.05);
 /// ```
 pub fn detect_with_hints(
     image: &RgbImage,
