@@ -5,9 +5,10 @@
 //   scripts/make_page.sh PAGE
 //   node scripts/check_page.mjs PAGE NEAT [--scene FOLDER] [--picture FILE]
 //
-// NEAT is the command. Of FOLDER, another scene, the times of both are told. The page is served
-// until its synthetic scene is done, and then no more: what follows must work without the
-// network. Any error or warning on the console, any request to somewhere else, and a number that
+// NEAT is the command. Of FOLDER, another scene, the times of both are told, and where it holds
+// truth/ their F1 of creases. All is done twice: with a plain server, and with one whose headers
+// let the page have threads. The page is served until its synthetic scene is done, and then no
+// more: what follows must work without the network. Any error or warning on the console, any request to somewhere else, and a number that
 // differs by more than 1e-9 is a failure. Needs Node 18 and Chromium (or CHROMIUM=path), nothing
 // else.
 
@@ -22,6 +23,8 @@ import { Browser, findBrowser } from "./browser.mjs";
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm" };
 const DESKTOP = { width: 1280, height: 900 };
 const MINUTES = 60_000;
+/** With these a page may have threads. */
+const ISOLATION = { "cross-origin-opener-policy": "same-origin", "cross-origin-embedder-policy": "require-corp" };
 /** As `neat-web synthesise` makes it. */
 const BUNDLED = ["--views", "48", "--image-size", "400"];
 /** What only runs of the command say. */
@@ -30,7 +33,8 @@ const OF_RUNS = ["backend", "distill", "preset", "seed", "steps"];
 const options = process.argv.slice(2);
 const option = (name) => (options.includes(name) ? options.splice(options.indexOf(name), 2)[1] : null);
 const picture = option("--picture");
-const another = option("--scene");
+const given = option("--scene");
+const another = given && resolve(given);
 if (options.length !== 2) {
   console.error("usage: check_page.mjs PAGE NEAT [--scene FOLDER] [--picture FILE]");
   process.exit(2);
@@ -41,12 +45,12 @@ const downloads = join(work, "downloads");
 const command = (...args) => execFileSync(neat, args, { stdio: ["ignore", "ignore", "pipe"] });
 
 /** Serves the page on a port of this machine. */
-function serve() {
+function serve(headers) {
   const server = createServer((request, answer) => {
     const name = request.url === "/" ? "/index.html" : new URL(request.url, "http://page").pathname;
     const path = join(page, name);
     if (!existsSync(path)) return answer.writeHead(404).end();
-    answer.writeHead(200, { "content-type": TYPES[extname(path)] ?? "text/plain" }).end(readFileSync(path));
+    answer.writeHead(200, { "content-type": TYPES[extname(path)] ?? "text/plain", ...headers }).end(readFileSync(path));
   });
   return new Promise((done) => server.listen(0, "127.0.0.1", () => done(server)));
 }
@@ -87,7 +91,13 @@ const isShown = (id) => `!document.getElementById("${id}").hidden`;
 /** Waits for the result of a scene; its sentence if it is refused. */
 async function finished(browser) {
   await browser.until(`${isShown("result")} || ${isShown("problem")}`, "nothing comes out", 10 * MINUTES);
-  return browser.evaluate(`${isShown("problem")} ? document.getElementById("problem").textContent : null`);
+  const problem = await browser.evaluate(`${isShown("problem")} ? document.getElementById("problem").textContent : null`);
+  // What is on the page moves until the report is there: clicks would miss.
+  if (problem === null) {
+    const isOpen = `document.getElementById("report").contentWindow?.neat?.viewer`;
+    await browser.until(`Boolean(${isOpen})`, "the report does not open", MINUTES);
+  }
+  return problem;
 }
 
 /** Chooses a format and downloads it. */
@@ -121,7 +131,6 @@ async function drop(browser, folder) {
 
 /** A segment of the report in the frame, clicked: what the inspector says of it. */
 async function pickSegment(browser) {
-  await browser.until(`document.getElementById("report").contentWindow.neat?.viewer`, "the report does not open");
   await browser.evaluate(`document.getElementById("report").scrollIntoView({ block: "center" })`);
   await browser.settle();
   const [index, x, y] = await browser.evaluate(`(() => {
@@ -176,15 +185,27 @@ async function checkDropped(browser, scene, truth) {
   compare(scene, told, truth, JSON.parse(await download(browser, "json", "wireframe.json")));
 }
 
+/** F1 of creases at each threshold, where the scene holds its truth. */
+function scores(scene, wireframe) {
+  if (!existsSync(join(scene, "truth"))) return "no truth";
+  const report = JSON.parse(execFileSync(neat, ["eval", "--pred", wireframe, "--truth", scene, "--format", "json"]));
+  const { thresholds } = [report].flat()[0].scores;
+  const f1 = (p, r) => (p + r > 0 ? 2 * p * r / (p + r) : 0);
+  return "F1 " + thresholds.map((row) =>
+    `${f1(row.length_on_crease ?? 0, row.completeness ?? 0).toFixed(3)} at ${row.threshold}`).join(", ");
+}
+
 /** Photographs have segments at the limits of what is one: the last digit of a sine decides. */
-async function measure(browser, scene) {
-  const truth = expected(scene, join(work, "measured"));
+async function measure(browser, scene, truth) {
   await drop(browser, scene);
   assert.equal(await finished(browser), null);
   const told = await stage(browser);
-  const { edges } = JSON.parse(await download(browser, "json", "wireframe.json"));
-  console.log(`${scene}: ${told}, ${edges.length} edges; the command in ${truth.seconds.toFixed(1)} s, `
-    + `${truth.document.edges.length} edges`);
+  const wireframe = join(work, "of-page.json");
+  writeFileSync(wireframe, await download(browser, "json", "wireframe.json"));
+  const { edges } = JSON.parse(readFileSync(wireframe));
+  console.log(`${scene}: ${told}, ${edges.length} edges, ${scores(scene, wireframe)}`);
+  console.log(`  the command in ${truth.seconds.toFixed(1)} s, ${truth.document.edges.length} edges, `
+    + scores(scene, join(work, "measured", "wireframe.json")));
 }
 
 async function checkPhone(browser) {
@@ -196,7 +217,7 @@ async function checkPhone(browser) {
 
 async function checkRefused(browser) {
   const empty = join(work, "no-scene");
-  mkdirSync(empty);
+  mkdirSync(empty, { recursive: true });
   writeFileSync(join(empty, "readme.txt"), "nothing");
   await drop(browser, empty);
   assert.match(await finished(browser), /no-scene/);
@@ -204,18 +225,16 @@ async function checkRefused(browser) {
   console.log("ok: a folder that is no scene is refused in words");
 }
 
-async function main(browser) {
-  const scene = join(work, "dropped");
-  command("synth", "--out", join(work, "synthetic"), ...BUNDLED);
-  command("convert", join(work, "synthetic"), "--to", "colmap", "--out", scene, "--quiet");
-  rmSync(join(scene, "hawp"), { recursive: true });
-  const truth = expected(scene, join(work, "run"));
-
-  const server = await serve();
+/** All that a person does, with a page that has threads or not. */
+async function check(browser, isolated, scene, truth, measured) {
+  const server = await serve(isolated ? ISOLATION : {});
   const { port } = server.address();
   await browser.send("Browser.setDownloadBehavior", { behavior: "allow", downloadPath: downloads }, null);
   await browser.setDevice(DESKTOP);
   await browser.open(`http://127.0.0.1:${port}/`);
+  const threads = await browser.evaluate("crossOriginIsolated ? navigator.hardwareConcurrency : 1");
+  assert.equal(await browser.evaluate("crossOriginIsolated"), isolated);
+  console.log(`threads: ${threads}`);
   await browser.until(`document.querySelectorAll("#format option").length > 5`, "the program does not start");
   await checkStopped(browser);
   await checkSynthetic(browser, truth);
@@ -224,7 +243,7 @@ async function main(browser) {
     server.closeAllConnections();
   });
   await checkDropped(browser, scene, truth);
-  if (another) await measure(browser, resolve(another));
+  if (another) await measure(browser, another, measured);
   await checkRefused(browser);
   assert.deepEqual(browser.problems, [], "the console must stay empty");
   const own = ["data:", "blob:", `http://127.0.0.1:${port}/`];
@@ -233,16 +252,31 @@ async function main(browser) {
   console.log("ok: nothing from elsewhere, and nothing on the console");
 }
 
+async function main(chromium) {
+  const scene = join(work, "dropped");
+  command("synth", "--out", join(work, "synthetic"), ...BUNDLED);
+  command("convert", join(work, "synthetic"), "--to", "colmap", "--out", scene, "--quiet");
+  rmSync(join(scene, "hawp"), { recursive: true });
+  const truth = expected(scene, join(work, "run"));
+  const measured = another && expected(another, join(work, "measured"));
+  for (const isolated of [false, true]) {
+    const browser = await Browser.start(chromium);
+    try {
+      await check(browser, isolated, scene, truth, measured);
+    } finally {
+      await browser.stop();
+    }
+  }
+}
+
 const found = findBrowser();
 if (!found) {
   console.error("error: there is no Chromium; set CHROMIUM to its path");
   process.exit(2);
 }
 mkdirSync(downloads);
-const browser = await Browser.start(found);
 try {
-  await main(browser);
+  await main(found);
 } finally {
-  await browser.stop();
   rmSync(work, { recursive: true, force: true });
 }

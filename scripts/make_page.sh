@@ -3,8 +3,8 @@
 #
 #   scripts/make_page.sh OUT
 #
-# Needs the Rust target wasm32-wasip1, Node 18, curl and the network: the file system in memory
-# is @bjorn3/browser_wasi_shim, a release that has to be what it was when its sum was written
+# Needs the Rust targets wasm32-wasip1 and wasm32-wasip1-threads, Node 18, curl and the network:
+# the file system in memory is @bjorn3/browser_wasi_shim, a release that has to be what it was when its sum was written
 # here. With $NEAT_WASI_SHIM=FILE it is not downloaded.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -31,10 +31,13 @@ if [ -z "$shim" ]; then
 fi
 sha256sum --check --quiet <<<"$SHIM_SHA256  $shim" || fail "$shim is not what it was"
 
-# SIMD of 128 bits is in every browser since 2023.
-CARGO_TARGET_WASM32_WASIP1_RUSTFLAGS="-C target-feature=+simd128" \
-    cargo build --locked --release -p neat-web --target wasm32-wasip1
+# SIMD of 128 bits is in every browser since 2023. Shared memory has a limit from the start: all
+# that 32 bits can name.
+export CARGO_TARGET_WASM32_WASIP1_RUSTFLAGS="-C target-feature=+simd128"
+export CARGO_TARGET_WASM32_WASIP1_THREADS_RUSTFLAGS="-C target-feature=+simd128 -C link-arg=--max-memory=4294967296"
+cargo build --locked --release -p neat-web --target wasm32-wasip1 --target wasm32-wasip1-threads
 cp "${CARGO_TARGET_DIR:-target}/wasm32-wasip1/release/neat-web.wasm" "$out/neat.wasm"
+cp "${CARGO_TARGET_DIR:-target}/wasm32-wasip1-threads/release/neat-web.wasm" "$out/neat-threads.wasm"
 
 cp neat-web/page/*.js neat-web/page/*.css LICENSE-APACHE LICENSE-MIT "$out/"
 tar -xzf "$shim" -C "$work"
@@ -45,6 +48,8 @@ cp "$work"/package/dist/*.js "$work"/package/LICENSE-* "$out/wasi/"
 # The program knows which script and which style its reports have.
 node --no-warnings scripts/page_policy.mjs "$out/neat.wasm" neat-web/page/index.html >"$out/index.html"
 
-bytes=$(wc -c <"$out/neat.wasm")
-zipped=$(gzip -9 --stdout "$out/neat.wasm" | wc -c)
-echo "$out: neat.wasm has $bytes bytes, $zipped with gzip"
+for file in neat.wasm neat-threads.wasm; do
+    bytes=$(wc -c <"$out/$file")
+    zipped=$(gzip -9 --stdout "$out/$file" | wc -c)
+    echo "$out/$file: $bytes bytes, $zipped with gzip"
+done

@@ -3,9 +3,9 @@
 use crate::duration;
 use crate::error::CliError;
 use crate::memory::MemoryArgs;
-use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use neat_pipeline::config::{Config, Preset, apply_overrides};
+use clap::{Args, ValueEnum};
+use neat_pipeline::config::{Config, LineDetector, Preset, apply_overrides};
 use neat_pipeline::run_dir::parse_config;
 use neat_tensor::Backend;
 use std::path::PathBuf;
@@ -23,6 +23,10 @@ pub struct MethodArgs {
     /// Change one value of the configuration, such as train.rays=512; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// What finds the 2D segments of scenes that come without, the same as --set
+    /// detect.detector=NAME
+    #[arg(long, value_name = "NAME")]
+    detector: Option<Detector>,
     /// Number of training steps, the same as --set train.steps=N
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub steps: Option<u64>,
@@ -46,6 +50,7 @@ impl MethodArgs {
     /// `base` with everything that was set.
     pub fn apply(&self, base: &Config) -> Result<Config, CliError> {
         let mut config = apply_overrides(base, &self.set)?;
+        config.detect.detector = self.detector.map_or(config.detect.detector, Into::into);
         if let Some(steps) = self.steps {
             let set = self.set.iter().any(|set| set.starts_with("train.steps="));
             if set && config.train.steps != steps {
@@ -92,6 +97,25 @@ pub struct BackendArg {
 /// Takes the name of a preset.
 pub fn preset_parser() -> impl TypedValueParser<Value = Preset> {
     PossibleValuesParser::new(Preset::ALL.map(Preset::name)).try_map(|name| name.parse::<Preset>())
+}
+
+/// What finds 2D segments.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Detector {
+    /// The built-in detector
+    Own,
+    /// The built-in detector, advised by M-LSD; in programs built with --features onnx, with the
+    /// weights that scripts/fetch_mlsd.sh fetches
+    Mlsd,
+}
+
+impl From<Detector> for LineDetector {
+    fn from(detector: Detector) -> Self {
+        match detector {
+            Detector::Own => Self::Own,
+            Detector::Mlsd => Self::Mlsd,
+        }
+    }
 }
 
 /// Takes the name of a backend.

@@ -62,9 +62,8 @@ impl FileCache {
         Self { dir: dir.into() }
     }
 
-    /// The cache that all programs of neat share: in `$NEAT_CACHE`, else below the user's
-    /// folder for caches, without what killed writers left there; `None` if the system has
-    /// no such folder.
+    /// The cache that all programs of neat share, in [`dir_of_user`], without what killed
+    /// writers left there; `None` if the system has no such folder.
     pub fn of_user() -> Option<Self> {
         let cache = Self::new(dir_of_user()?);
         cache.remove_abandoned();
@@ -118,7 +117,9 @@ impl FileCache {
     }
 }
 
-fn dir_of_user() -> Option<PathBuf> {
+/// The folder for what neat keeps for a user: `$NEAT_CACHE`, else `neat` in the user's folder
+/// for caches; `None` if the system has no such folder.
+pub fn dir_of_user() -> Option<PathBuf> {
     let path = |name: &str| env::var_os(name).filter(|value| !value.is_empty());
     if let Some(dir) = path("NEAT_CACHE") {
         return Some(dir.into());

@@ -8,6 +8,18 @@ const REFERENCE_SIDE: f64 = 512.0;
 /// The smallest number of pixels in a reference pixel.
 const SMALLEST_SCALE: f64 = 0.5;
 
+/// What finds line segments in an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LineDetector {
+    /// The built-in detector alone.
+    #[default]
+    Own,
+    /// The built-in detector, advised by M-LSD ([`crate::detect_with_hints`]), in programs with
+    /// the feature `onnx`.
+    Mlsd,
+}
+
 /// Settings of [`crate::detect`] and of [`crate::wireframe_from_segments`]: those that a
 /// scene can ask for. All others are constants with their reasons, in the files of the
 /// steps.
@@ -27,6 +39,8 @@ const SMALLEST_SCALE: f64 = 0.5;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DetectorConfig {
+    /// What finds the segments.
+    pub detector: LineDetector,
     /// The smallest colour change that is an edge, in grey levels of 255 per
     /// pixel of the smoothed image. Raised by itself where an image is noisier.
     /// Less for faint edges.
@@ -47,6 +61,7 @@ pub struct DetectorConfig {
 impl Default for DetectorConfig {
     fn default() -> Self {
         Self {
+            detector: LineDetector::Own,
             min_gradient: 1.0,
             texture_factor: 2.0,
             min_length: 6.0,
@@ -58,24 +73,35 @@ impl Default for DetectorConfig {
 
 /// Why a configuration cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
-#[error("detector: {field} is {value}; choose a value from {min} to {max}")]
-pub struct DetectorConfigError {
-    /// The field of [`DetectorConfig`].
-    pub field: &'static str,
-    /// Its value.
-    pub value: f64,
-    /// Smallest possible value.
-    pub min: f64,
-    /// Largest possible value.
-    pub max: f64,
+pub enum DetectorConfigError {
+    /// A number is out of its range.
+    #[error("detector: {field} is {value}; choose a value from {min} to {max}")]
+    OutOfRange {
+        /// The field of [`DetectorConfig`].
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// Smallest possible value.
+        min: f64,
+        /// Largest possible value.
+        max: f64,
+    },
+    /// The program has no inference runtime.
+    #[error(
+        "detector: this program was built without M-LSD; build it with --features onnx, or choose detector = own"
+    )]
+    NotBuilt,
 }
 
 impl DetectorConfig {
-    /// Checks every field against its range. [`crate::detect`] takes it for granted.
+    /// Checks every field. [`crate::detect`] takes it for granted.
     ///
     /// # Errors
-    /// The first field outside its range, or not a number.
+    /// The first field outside its range, or not a number; a detector that is not built in.
     pub fn validate(&self) -> Result<(), DetectorConfigError> {
+        if self.detector == LineDetector::Mlsd && !cfg!(feature = "onnx") {
+            return Err(DetectorConfigError::NotBuilt);
+        }
         let side = f64::from(self.max_search_side);
         let ranges = [
             ("min_gradient", self.min_gradient, 0.1, 255.0),
@@ -86,7 +112,7 @@ impl DetectorConfig {
         ];
         let wrong = (ranges.into_iter()).find(|(_, value, min, max)| !(min..=max).contains(&value));
         wrong.map_or(Ok(()), |(field, value, min, max)| {
-            Err(DetectorConfigError {
+            Err(DetectorConfigError::OutOfRange {
                 field,
                 value,
                 min,

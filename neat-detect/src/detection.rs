@@ -58,6 +58,31 @@ const SEARCH_WIDTH: f64 = 3.0;
 /// }
 /// ```
 pub fn detect(image: &RgbImage, config: &DetectorConfig) -> Wireframe2d {
+    detect_with_hints(image, &[], config)
+}
+
+/// As [`detect`], but fitting begins with `hints`: segments of another detector, in pixels of
+/// `image`, that need not be exact. What they point to comes out whole where the built-in search
+/// finds pieces, or nothing; where the image shows no edge they are lost.
+///
+/// ```
+/// use image::{Rgb, RgbImage};
+/// use nalgebra::Vector2;
+/// use neat_core::LineSegment2;
+/// use neat_detect::{DetectorConfig, detect_with_hints};
+///
+/// let image = RgbImage::from_fn(64, 64, |x, _| Rgb([if x < 30 { 20 } else { 200 }; 3]));
+/// let vertical = |x| LineSegment2::new(Vector2::new(x, 5.0), Vector2::new(x, 55.0));
+/// let hints = [vertical(31.0), vertical(50.0)];
+/// let wireframe = detect_with_hints(&image, &hints, &DetectorConfig::default());
+/// assert_eq!(wireframe.edges.len(), 1);
+/// assert!((wireframe.vertices[0].x - 29.5).abs() < 0.05);
+/// ```
+pub fn detect_with_hints(
+    image: &RgbImage,
+    hints: &[LineSegment2],
+    config: &DetectorConfig,
+) -> Wireframe2d {
     let (width, height) = image.dimensions();
     if width < MIN_SIDE || height < MIN_SIDE {
         return Wireframe2d::empty(width, height);
@@ -81,7 +106,8 @@ pub fn detect(image: &RgbImage, config: &DetectorConfig) -> Wireframe2d {
         segment_search::search(&prepared.smoothed, prepared.min_gradient)
     };
     let search_width = SEARCH_WIDTH.max(1.5 * f64::from(reduction));
-    graph_of(&prepared, &segments, search_width, config)
+    let hints = all_clipped(hints, width, height);
+    graph_of(&prepared, [&hints, &segments], search_width, config)
 }
 
 /// The wireframe of segments that another detector found in `image`: they are
@@ -110,15 +136,16 @@ pub fn wireframe_from_segments(
         return Wireframe2d::empty(width, height);
     }
     let _span = debug_span!("wireframe_from_segments", width, height).entered();
-    let inside: Vec<LineSegment2> = (segments.iter())
+    let prepared = PreparedImage::new(image, config);
+    let inside = all_clipped(segments, width, height);
+    graph_of(&prepared, [&inside, &[]], SEARCH_WIDTH, config)
+}
+
+/// The parts of segments within an image of this size.
+fn all_clipped(segments: &[LineSegment2], width: u32, height: u32) -> Vec<LineSegment2> {
+    (segments.iter())
         .filter_map(|segment| clipped(segment, Vector2::new(width, height)))
-        .collect();
-    graph_of(
-        &PreparedImage::new(image, config),
-        &inside,
-        SEARCH_WIDTH,
-        config,
-    )
+        .collect()
 }
 
 /// The part of a segment within the pixel centres of an image of this size.
@@ -185,10 +212,11 @@ fn reduced(image: &RgbImage, factor: u32) -> RgbImage {
     })
 }
 
-/// Fits segments to the image, merges them and joins them to a graph.
+/// Fits segments to the image, the first ones before the others, merges them and joins them to
+/// a graph.
 fn graph_of(
     image: &PreparedImage,
-    segments: &[LineSegment2],
+    segments: [&[LineSegment2]; 2],
     search_width: f64,
     config: &DetectorConfig,
 ) -> Wireframe2d {
@@ -207,7 +235,7 @@ fn graph_of(
     });
     let straight: Vec<LineSegment2> = lines.iter().map(|line| line.segment).collect();
     debug!(
-        found = segments.len(),
+        found = segments.map(<[_]>::len).iter().sum::<usize>(),
         straight = lines.len(),
         "segments are fitted"
     );
@@ -272,17 +300,20 @@ fn wireframe(
     wireframe
 }
 
-/// Fits segments, longest first, without those that lie on an earlier one.
+/// Fits segments, those of each part longest first, without those that lie on an earlier one.
 fn fit_all(
-    segments: &[LineSegment2],
+    parts: [&[LineSegment2]; 2],
     fitter: &LineFitter,
     search_width: f64,
 ) -> Vec<FittedSegment> {
-    let mut longest_first: Vec<&LineSegment2> = segments.iter().collect();
-    longest_first.sort_by(|a, b| b.length().total_cmp(&a.length()));
+    let longest_first = parts.map(|part| {
+        let mut part: Vec<&LineSegment2> = part.iter().collect();
+        part.sort_by(|a, b| b.length().total_cmp(&a.length()));
+        part
+    });
     let mut claimed = ClaimedPixels::new(fitter.image.size());
     let mut fitted: Vec<FittedSegment> = Vec::new();
-    for segment in longest_first {
+    for segment in longest_first.into_iter().flatten() {
         if !claimed.contain(segment)
             && let Some(found) = fitter.fit(segment, search_width)
         {

@@ -3,7 +3,8 @@
 //! [`detect`] finds line segments (LSD), fits each to the gradient maxima along it
 //! to a few hundredths of a pixel, merges what belongs to one edge, and joins ends
 //! to shared junctions. [`wireframe_from_segments`] does the same with the segments
-//! of another detector, which [`segment_file`] and [`edge_map`] read.
+//! of another detector, which [`segment_file`] and [`edge_map`] read;
+//! [`detect_with_hints`] looks where another one points to, and elsewhere.
 //!
 //! The stages, in order, each in a file of its name: `noise`, `smoothed_image`,
 //! `segment_search`, `line_fitting` (with `edge_profile` and `robust_line`),
@@ -33,6 +34,8 @@ mod edgels;
 mod junction_graph;
 mod line_fitting;
 mod merging;
+#[cfg(feature = "onnx")]
+pub mod mlsd;
 mod noise;
 #[cfg(feature = "onnx")]
 pub mod onnx;
@@ -42,8 +45,8 @@ mod segment_search;
 mod smoothed_image;
 mod views;
 
-pub use config::{DetectorConfig, DetectorConfigError};
-pub use detection::{detect, wireframe_from_segments};
+pub use config::{DetectorConfig, DetectorConfigError, LineDetector};
+pub use detection::{detect, detect_with_hints, wireframe_from_segments};
 pub use edgels::edgel_map;
 pub use views::{detect_views, edgel_maps};
 

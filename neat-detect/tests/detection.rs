@@ -223,7 +223,19 @@ fn configurations_read_back_and_refuse_unknown_keys() {
         min_gradient: f64::NAN,
         ..config
     };
-    assert_eq!(wrong.validate().unwrap_err().field, "min_gradient");
+    let message = wrong.validate().unwrap_err().to_string();
+    assert!(message.contains("min_gradient"), "{message}");
+}
+
+#[cfg(not(feature = "onnx"))]
+#[test]
+fn mlsd_is_refused_by_programs_that_cannot_run_it() {
+    let config = DetectorConfig {
+        detector: neat_detect::LineDetector::Mlsd,
+        ..DetectorConfig::default()
+    };
+    let message = config.validate().unwrap_err().to_string();
+    assert!(message.contains("--features onnx"), "{message}");
 }
 
 /// The toy object, or `None`, said aloud, where it is not at hand.

@@ -1,9 +1,12 @@
-//! A learned detector: a model small enough to be written by hand.
+//! Learned detectors: models small enough to be written by hand, and M-LSD where its weights are.
 #![cfg(feature = "onnx")]
 
 use image::{Rgb, RgbImage};
+use nalgebra::Vector2;
+use neat_core::LineSegment2;
+use neat_detect::mlsd::Mlsd;
 use neat_detect::onnx::OnnxDetector;
-use neat_detect::{DetectorConfig, wireframe_from_segments};
+use neat_detect::{DetectorConfig, detect_with_hints, wireframe_from_segments};
 use std::path::Path;
 
 /// A protobuf field with bytes: a message, a string, packed numbers.
@@ -56,21 +59,49 @@ fn identity(input: &str, output: &str) -> Vec<u8> {
     [names, bytes(4, b"Identity")].concat()
 }
 
+/// A model that gives these outputs, each a name, a shape and numbers, whatever its input
+/// `image` of this shape is.
+fn model_of(input: &[u8], outputs: &[(&str, &[u8], &[f32])]) -> Vec<u8> {
+    let mut graph = [
+        bytes(2, b"constants"),
+        bytes(11, &value_info("image", input)),
+    ]
+    .concat();
+    for (name, shape, values) in outputs {
+        let constant = format!("constant {name}");
+        graph.extend(bytes(1, &identity(&constant, name)));
+        graph.extend(bytes(5, &initializer(&constant, shape, values)));
+        graph.extend(bytes(12, &value_info(name, shape)));
+    }
+    let opset = number(2, 13);
+    [number(1, 8), bytes(7, &graph), bytes(8, &opset)].concat()
+}
+
 /// A model for images of 32×32 that always finds the same two segments.
 fn model(scores: &[f32]) -> Vec<u8> {
     let found = [15.0, 3.0, 15.5, 28.0, 3.0, 8.0, 12.0, 8.0];
-    let graph = [
-        bytes(1, &identity("found", "lines")),
-        bytes(1, &identity("sure", "scores")),
-        bytes(2, b"two segments"),
-        bytes(5, &initializer("found", &[2, 4], &found)),
-        bytes(5, &initializer("sure", &[scores.len() as u8], scores)),
-        bytes(11, &value_info("image", &[1, 3, 32, 32])),
-        bytes(12, &value_info("lines", &[2, 4])),
-        bytes(12, &value_info("scores", &[scores.len() as u8])),
-    ];
-    let opset = number(2, 13);
-    [number(1, 8), bytes(7, &graph.concat()), bytes(8, &opset)].concat()
+    let count = [scores.len() as u8];
+    let outputs: [(&str, &[u8], &[f32]); 2] =
+        [("lines", &[2, 4], &found), ("scores", &count, scores)];
+    model_of(&[1, 3, 32, 32], &outputs)
+}
+
+/// As M-LSD for images of 32×32: sure of a line with its middle in cell (3, 8), less of one in
+/// cell (9, 8).
+fn small_mlsd() -> Vec<u8> {
+    let (mut scores, mut offsets) = (vec![0.0; 256], vec![0.0; 4 * 256]);
+    scores[8 * 16 + 3] = 0.9;
+    scores[8 * 16 + 9] = 0.05;
+    for cell in [8 * 16 + 3, 8 * 16 + 9] {
+        offsets[4 * cell..4 * cell + 4].copy_from_slice(&[0.5, -5.0, -0.5, 6.0]);
+    }
+    model_of(
+        &[1, 32, 32, 4],
+        &[
+            ("scores", &[1, 16, 16, 1], &scores),
+            ("offsets", &[1, 16, 16, 4], &offsets),
+        ],
+    )
 }
 
 #[test]
@@ -101,4 +132,62 @@ fn what_breaks_the_contract_is_said() {
         message.contains("a.onnx") && message.contains("scores"),
         "{message}"
     );
+}
+
+#[test]
+fn lines_of_mlsd_come_in_pixels_of_the_image() {
+    let mlsd = Mlsd::from_bytes(small_mlsd(), Path::new("small.onnx")).unwrap();
+    let lines = mlsd.lines(&RgbImage::new(64, 96)).unwrap();
+    // Two input pixels a cell; two and three image pixels an input pixel.
+    let [x1, y1, x2, y2] = [14.0, 18.0, 10.0, 84.0];
+    let expected = LineSegment2::new(Vector2::new(x1, y1), Vector2::new(x2, y2));
+    assert_eq!(lines, [expected], "the other line is not sure enough");
+}
+
+#[test]
+fn a_model_that_is_not_mlsd_is_refused_by_name() {
+    let error = Mlsd::from_bytes(model(&[0.9, 0.8]), Path::new("lines.onnx")).err();
+    let message = error.unwrap().to_string();
+    assert!(
+        message.contains("lines.onnx") && message.contains("M-LSD"),
+        "{message}"
+    );
+}
+
+/// With the weights in the file `$NEAT_MLSD`.
+#[test]
+#[expect(clippy::print_stderr, reason = "a skipped test must be seen")]
+fn mlsd_sees_the_borders_of_a_square() {
+    let Some(path) = std::env::var_os("NEAT_MLSD") else {
+        eprintln!("skipped: NEAT_MLSD names no weights (scripts/fetch_mlsd.sh fetches them)");
+        return;
+    };
+    let inside = |v: u32, [first, end]: [u32; 2]| (first..end).contains(&v);
+    let image = RgbImage::from_fn(640, 480, |x, y| {
+        Rgb([if inside(x, [160, 480]) && inside(y, [120, 360]) {
+            200
+        } else {
+            40
+        }; 3])
+    });
+    let lines = Mlsd::load(Path::new(&path)).unwrap().lines(&image).unwrap();
+    let corners = [
+        [159.5, 119.5],
+        [479.5, 119.5],
+        [479.5, 359.5],
+        [159.5, 359.5],
+    ];
+    let corners = corners.map(|[x, y]| Vector2::new(x, y));
+    for k in 0..4 {
+        let side = LineSegment2::new(corners[k], corners[(k + 1) % 4]);
+        let along = |line: &&LineSegment2| {
+            line.ends()
+                .iter()
+                .all(|end| side.distance_to_line(end) < 4.0)
+        };
+        let seen: f64 = lines.iter().filter(along).map(LineSegment2::length).sum();
+        assert!(seen > 0.8 * side.length(), "side {k}: {lines:?}");
+    }
+    let wireframe = detect_with_hints(&image, &lines, &DetectorConfig::default());
+    assert_eq!((wireframe.vertices.len(), wireframe.edges.len()), (4, 4));
 }

@@ -1,5 +1,6 @@
 //! 2D wireframes for scenes that come without: detected, and kept for next time.
 
+mod configured_detector;
 mod folder;
 
 pub use folder::{DetectOptions, Detected, SegmentSource, detect_folder};
@@ -7,10 +8,11 @@ pub use folder::{DetectOptions, Detected, SegmentSource, detect_folder};
 use crate::error::ImagesError;
 use crate::event::{Event, OnEvent, Stage, Warning, WarningKind};
 use crate::resources::Resources;
+use configured_detector::ConfiguredDetector;
 use image::RgbImage;
 use neat_core::file_cache::{CacheKey, FileCache};
 use neat_core::{Scene, SceneError, View, Wireframe2d, hawp_json};
-use neat_detect::{DetectorConfig, detect};
+use neat_detect::DetectorConfig;
 use std::path::Path;
 
 /// Files and detectors have pixel centres at integers.
@@ -30,7 +32,7 @@ const DETECTOR_VERSION: u32 = 1;
 /// and this configuration is not detected again.
 ///
 /// # Errors
-/// If the configuration is out of range, or no view has a segment;
+/// If the configuration is out of range, its detector has no weights, or no view has a segment;
 /// [`ImagesError::InterruptedIn`] once that is wanted.
 pub fn detect_wireframes<R>(
     scene: &mut Scene,
@@ -41,13 +43,15 @@ pub fn detect_wireframes<R>(
     on_event: OnEvent<'_, R>,
 ) -> Result<(), ImagesError> {
     config.validate()?;
+    let detector = ConfiguredDetector::open(config)?;
     let memory_limit = resources.memory_limit;
     let warn = |text: String| Event::Warning(Warning::new(WarningKind::Detection, text));
     let mut cache_works = true;
     let views = scene.views.len();
     let mut done = 0;
     let sizes = scene.views.iter().map(|view| view.image.dimensions());
-    let bytes_each = memory_limit.bytes_each(sizes, BYTES_PER_PIXEL, DETECTING, dir)?;
+    let bytes_each =
+        memory_limit.bytes_each(sizes, BYTES_PER_PIXEL, DETECTING, dir)? + detector.model_bytes();
     // Some at a time, so that progress can be told in between.
     for chunk in scene.views.chunks_mut(4 * rayon::current_num_threads()) {
         if resources.is_cancelled() {
@@ -55,7 +59,7 @@ pub fn detect_wireframes<R>(
         }
         let cache = resources.cache;
         let found =
-            memory_limit.try_map(chunk, bytes_each, |view| detect_in(view, config, cache))?;
+            memory_limit.try_map(chunk, bytes_each, |view| detect_in(view, &detector, cache))?;
         for (view, (mut wireframe, warning)) in chunk.iter_mut().zip(found) {
             for vertex in &mut wireframe.vertices {
                 *vertex = vertex.add_scalar(scene.pixel_center);
@@ -95,17 +99,17 @@ pub fn detect_wireframes<R>(
 /// it could not be stored.
 ///
 /// # Errors
-/// If the image lies in a file that cannot be read.
+/// If the image lies in a file that cannot be read, or a model cannot be run.
 fn detect_in(
     view: &View,
-    config: &DetectorConfig,
+    detector: &ConfiguredDetector<'_>,
     cache: Option<&FileCache>,
 ) -> Result<(Wireframe2d, Option<String>), SceneError> {
     let image = view.image.read()?;
     let Some(cache) = cache else {
-        return Ok((detect(&image, config), None));
+        return Ok((detector.wireframe(&image)?, None));
     };
-    let key = key(&image, config);
+    let key = key(&image, detector);
     let name = Path::new("2D wireframe");
     let stored = cache
         .get(&key)
@@ -113,7 +117,7 @@ fn detect_in(
     if let Some(wireframe) = stored {
         return Ok((wireframe, None));
     }
-    let wireframe = detect(&image, config);
+    let wireframe = detector.wireframe(&image)?;
     let stored = cache.put(
         &key,
         &hawp_json::to_bytes(&wireframe, DETECTED_WITH_PIXEL_CENTER),
@@ -124,14 +128,16 @@ fn detect_in(
     Ok((wireframe, warning))
 }
 
-fn key(image: &RgbImage, config: &DetectorConfig) -> CacheKey {
+fn key(image: &RgbImage, detector: &ConfiguredDetector<'_>) -> CacheKey {
     let (width, height) = image.dimensions();
-    let settings = toml::to_string(config).expect("detection::key: settings can be written");
+    let settings =
+        toml::to_string(detector.config).expect("detection::key: settings can be written");
     let inputs = [
         &width.to_le_bytes(),
         &height.to_le_bytes(),
         image.as_raw().as_slice(),
         settings.as_bytes(),
+        detector.identity(),
     ];
     CacheKey::new("wireframe2d", DETECTOR_VERSION, &inputs)
 }
@@ -218,6 +224,38 @@ mod tests {
         )
         .unwrap();
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 6);
+    }
+
+    /// With the weights in the file `$NEAT_MLSD`.
+    #[cfg(feature = "onnx")]
+    #[test]
+    #[expect(clippy::print_stderr, reason = "a skipped test must be seen")]
+    fn what_mlsd_advised_is_kept_apart() {
+        if std::env::var_os("NEAT_MLSD").is_none() {
+            eprintln!("skipped: NEAT_MLSD names no weights (scripts/fetch_mlsd.sh fetches them)");
+            return;
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let cache = FileCache::new(dir.path());
+        let advised = DetectorConfig {
+            detector: neat_detect::LineDetector::Mlsd,
+            ..DetectorConfig::default()
+        };
+        for (config, files) in [(DetectorConfig::default(), 3), (advised, 6)] {
+            let mut scene = scene();
+            detect_wireframes(
+                &mut scene,
+                Path::new("scene"),
+                &config,
+                0.05,
+                with(Some(&cache)),
+                &mut |_: Event<'_, ()>| {},
+            )
+            .unwrap();
+            let found = scene.views.iter().map(|view| view.wireframe.edges.len());
+            assert!(found.min() > Some(3));
+            assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), files);
+        }
     }
 
     #[test]

@@ -16,6 +16,7 @@ mod differences;
 mod overrides;
 mod preset;
 
+pub use neat_detect::LineDetector;
 pub use neat_images::config::{Background, Choice, DataConfig};
 pub use overrides::{OverrideError, apply_overrides};
 pub use preset::{Preset, UnknownPreset};

@@ -2,6 +2,7 @@
 // as they are; `done` ends a command, with `failure` where it failed.
 
 import { ConsoleStdout, Directory, File, Inode, OpenFile, PreopenDirectory, WASI, wasi } from "./wasi/index.js";
+import { runInThreads, threadCount } from "./threads.js";
 
 /** A file of the user, which is read each time the program opens it: memory holds one at a time. */
 class LocalFile extends Inode {
@@ -20,8 +21,10 @@ class LocalFile extends Inode {
   }
 }
 
-const program = fetch(new URL("neat.wasm", import.meta.url)).then((answer) => {
-  if (!answer.ok) throw new Error(`neat.wasm: ${answer.status} ${answer.statusText}`);
+const threads = threadCount();
+const file = threads > 1 ? "neat-threads.wasm" : "neat.wasm";
+const program = fetch(new URL(file, import.meta.url)).then((answer) => {
+  if (!answer.ok) throw new Error(`${file}: ${answer.status} ${answer.statusText}`);
   return answer.arrayBuffer();
 }).then((bytes) => WebAssembly.compile(bytes));
 // Each command awaits it, and is told.
@@ -52,6 +55,12 @@ function written(path) {
   return found.data;
 }
 
+/** Runs a program to its end: its exit code, and how many bytes of memory it had. */
+async function runAlone(module, system) {
+  const instance = await WebAssembly.instantiate(module, { wasi_snapshot_preview1: system.wasiImport });
+  return { code: system.start(instance), bytes: instance.exports.memory.buffer.byteLength };
+}
+
 /** Runs the program to its end: its `failure`, if it failed, and how many bytes of memory it had. */
 async function run(...parameters) {
   const errors = [];
@@ -63,11 +72,11 @@ async function run(...parameters) {
   });
   const stderr = ConsoleStdout.lineBuffered((line) => errors.push(line));
   const descriptors = [stdin, stdout, stderr, new PreopenDirectory("/", root)];
-  const system = new WASI(["neat-web", ...parameters], [], descriptors, { debug: false });
-  const instance = await WebAssembly.instantiate(await program, { wasi_snapshot_preview1: system.wasiImport });
-  const { memory } = instance.exports;
+  const environment = [`RAYON_NUM_THREADS=${threads}`];
+  const system = new WASI(["neat-web", ...parameters], environment, descriptors, { debug: false });
   try {
-    if (system.start(instance) === 0) return { bytes: memory.buffer.byteLength };
+    const end = await (threads > 1 ? runInThreads : runAlone)(await program, system);
+    if (end.code === 0) return end;
   } catch (error) {
     // A program that ends itself has said why.
     if (errors.length === 0) errors.push(String(error));

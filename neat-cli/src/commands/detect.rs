@@ -1,5 +1,6 @@
 //! `neat detect`.
 
+use crate::arguments::Detector;
 use crate::error::CliError;
 use crate::memory::MemoryArgs;
 use crate::output;
@@ -33,6 +34,9 @@ pub struct DetectArgs {
     /// Folder for the results; files of the same names are replaced
     #[arg(long, value_name = "OUT")]
     out: PathBuf,
+    /// What finds the segments, the same as --set detector=NAME
+    #[arg(long, value_name = "NAME", group = "source")]
+    detector: Option<Detector>,
     /// Take the segments of another detector (LSD, DeepLSD, ScaleLSD, LIMAP) from files in this
     /// folder
     #[arg(long, value_name = "DIR", group = "source")]
@@ -60,7 +64,8 @@ impl DetectArgs {
             // As in a run's configuration, or without its section.
             .map(|set| format!("detect.{}", set.strip_prefix("detect.").unwrap_or(set)))
             .collect();
-        let config = apply_overrides(&Preset::default().config(), &settings)?.detect;
+        let mut config = apply_overrides(&Preset::default().config(), &settings)?.detect;
+        config.detector = self.detector.map_or(config.detector, Into::into);
         #[cfg(feature = "onnx")]
         let learned = self.model.map(SegmentSource::Onnx);
         #[cfg(not(feature = "onnx"))]
@@ -68,7 +73,7 @@ impl DetectArgs {
         let source = learned
             .or(self.segments.map(SegmentSource::SegmentFiles))
             .or(self.edges.map(SegmentSource::EdgeMaps))
-            .unwrap_or(SegmentSource::BuiltIn);
+            .unwrap_or(SegmentSource::Configured);
         let options = DetectOptions {
             images: self.images,
             out: self.out,

@@ -1,5 +1,6 @@
 //! 2D wireframes of a folder of images, as files.
 
+use super::configured_detector::ConfiguredDetector;
 use super::{BYTES_PER_PIXEL, DETECTED_WITH_PIXEL_CENTER, DETECTING};
 use crate::error::ImagesError;
 use crate::event::{Event, OnEvent, Stage, timed};
@@ -7,7 +8,7 @@ use crate::overlay::draw_detection;
 use image::RgbImage;
 use neat_core::layout::{image_size, list_images, read_image};
 use neat_core::{MemoryLimit, SceneError, Wireframe2d, file, hawp_json};
-use neat_detect::{DetectorConfig, detect, edge_map, segment_file, wireframe_from_segments};
+use neat_detect::{DetectorConfig, edge_map, segment_file, wireframe_from_segments};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -15,8 +16,8 @@ use std::path::{Path, PathBuf};
 /// joining as our own.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SegmentSource {
-    /// The built-in detector.
-    BuiltIn,
+    /// The detector that the settings name.
+    Configured,
     /// A file of segments for each image, `NAME.npz`, `.npy`, `.txt` or `.csv`, in
     /// this folder.
     SegmentFiles(PathBuf),
@@ -91,6 +92,7 @@ pub fn detect_folder<R>(
         &options.images,
     )?;
     let detector = Detector::open(options)?;
+    let bytes_each = bytes_each + detector.model_bytes();
     let overlays = options.out.join("overlays");
     file::create_dir(if options.overlays {
         &overlays
@@ -137,7 +139,7 @@ fn detect_one(
 
 /// A [`SegmentSource`] that is ready.
 enum Detector<'a> {
-    BuiltIn,
+    Configured(Box<ConfiguredDetector<'a>>),
     SegmentFiles(&'a Path),
     EdgeMaps(&'a Path),
     #[cfg(feature = "onnx")]
@@ -147,7 +149,9 @@ enum Detector<'a> {
 impl<'a> Detector<'a> {
     fn open(options: &'a DetectOptions) -> Result<Self, SceneError> {
         Ok(match &options.source {
-            SegmentSource::BuiltIn => Self::BuiltIn,
+            SegmentSource::Configured => {
+                Self::Configured(Box::new(ConfiguredDetector::open(&options.config)?))
+            }
             SegmentSource::SegmentFiles(dir) => Self::SegmentFiles(dir),
             SegmentSource::EdgeMaps(dir) => Self::EdgeMaps(dir),
             #[cfg(feature = "onnx")]
@@ -158,6 +162,13 @@ impl<'a> Detector<'a> {
         })
     }
 
+    fn model_bytes(&self) -> u64 {
+        match self {
+            Self::Configured(detector) => detector.model_bytes(),
+            _ => 0,
+        }
+    }
+
     fn wireframe(
         &self,
         name: &str,
@@ -165,7 +176,7 @@ impl<'a> Detector<'a> {
         config: &DetectorConfig,
     ) -> Result<Wireframe2d, SceneError> {
         let segments = match self {
-            Self::BuiltIn => return Ok(detect(image, config)),
+            Self::Configured(detector) => return detector.wireframe(image),
             Self::SegmentFiles(dir) => segment_file::read(&file_of(dir, name))?,
             Self::EdgeMaps(dir) => {
                 edge_map::segments(&edge_map::read(&dir.join(format!("{name}.png")))?)
@@ -238,7 +249,7 @@ mod tests {
             edges.save(path("edges", "png")).unwrap();
         }
         for source in [
-            SegmentSource::BuiltIn,
+            SegmentSource::Configured,
             SegmentSource::SegmentFiles(dir.path().join("segments")),
             SegmentSource::EdgeMaps(dir.path().join("edges")),
         ] {
@@ -266,7 +277,7 @@ mod tests {
             let error = detect_folder(options, &mut |_: Event<'_, ()>| {}).unwrap_err();
             error.to_string()
         };
-        let built_in = options(dir.path(), SegmentSource::BuiltIn);
+        let built_in = options(dir.path(), SegmentSource::Configured);
         assert!(message(&built_in).contains("images"));
         fs::create_dir(dir.path().join("images")).unwrap();
         assert!(message(&built_in).contains("PNG"));

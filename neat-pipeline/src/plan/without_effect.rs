@@ -109,6 +109,7 @@ fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)>
                 "detect.min_length",
                 "detect.min_score",
                 "detect.max_search_side",
+                "detect.detector",
             ];
             idle.extend(of_segments.map(|key| (key, reason)));
         } else {
