@@ -126,8 +126,7 @@ impl Neighborhoods {
         let finite: Vec<usize> = (0..points.len()).filter(is_finite).collect();
         let in_tree: Vec<[f64; 3]> = finite.iter().map(|&i| points[i]).collect();
         Self {
-            tree: Tree::new_from_slice(&in_tree)
-                .expect("dbscan_means: more than u32::MAX points"),
+            tree: Tree::new_from_slice(&in_tree).expect("dbscan_means: more than u32::MAX points"),
             points,
             finite,
             squared_eps: eps * eps,

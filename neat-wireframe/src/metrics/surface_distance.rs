@@ -31,10 +31,8 @@ impl PointCloud {
             return Ok(Self { tree: None });
         }
         let coordinates: Vec<[f64; 3]> = points.iter().map(|p| [p.x, p.y, p.z]).collect();
-        let tree = Tree::new_from_slice(&coordinates).map_err(|_| {
-            MetricsError::TooManyPoints {
-                points: points.len(),
-            }
+        let tree = Tree::new_from_slice(&coordinates).map_err(|_| MetricsError::TooManyPoints {
+            points: points.len(),
         })?;
         Ok(Self { tree: Some(tree) })
     }
