@@ -52,41 +52,6 @@ done
 "$neat" completions powershell >"$folder/completions/_neat.ps1"
 "$neat" man "$folder/man/man1" >/dev/null
 
-time=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || echo 315532800)}
-python3 - "$folder" "$out" "$time" <<'PY'
-import gzip
-import hashlib
-import sys
-import tarfile
-import time
-import zipfile
-from pathlib import Path
-
-folder, out, when = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
-files = sorted(path for path in folder.rglob("*") if path.is_file())
-mode = lambda path: 0o755 if path.parent in (folder, folder / "lib") and not path.suffix[1:] in (
-    "md", "lib") and not path.name.startswith("LICENSE") else 0o644
-
-if (folder / "neat.exe").is_file():
-    archive = out / f"{folder.name}.zip"
-    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as pack:
-        for path in files:
-            inside = path.relative_to(folder.parent).as_posix()
-            info = zipfile.ZipInfo(inside, time.gmtime(when)[:6])
-            info.compress_type = zipfile.ZIP_DEFLATED
-            info.external_attr = mode(path) << 16
-            pack.writestr(info, path.read_bytes())
-else:
-    archive = out / f"{folder.name}.tar.gz"
-    with archive.open("wb") as raw, gzip.GzipFile("", "wb", 9, raw, when) as packed:
-        with tarfile.open(fileobj=packed, mode="w", format=tarfile.USTAR_FORMAT) as pack:
-            for path in files:
-                info = tarfile.TarInfo(path.relative_to(folder.parent).as_posix())
-                info.size, info.mtime, info.mode = path.stat().st_size, when, mode(path)
-                with path.open("rb") as content:
-                    pack.addfile(info, content)
-digest = hashlib.sha256(archive.read_bytes()).hexdigest()
-# As sha256sum writes it, whatever the system's ends of lines.
-(out / f"{archive.name}.sha256").write_bytes(f"{digest}  {archive.name}\n".encode())
-print(archive)
-PY
+format=tar.gz
+[ ! -f "$folder/neat.exe" ] || format=zip
+python3 scripts/archive.py "$folder" "$out" --format "$format"

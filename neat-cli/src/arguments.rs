@@ -3,9 +3,9 @@
 use crate::duration;
 use crate::error::CliError;
 use crate::memory::MemoryArgs;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use neat_pipeline::config::{Config, LineDetector, Preset, apply_overrides};
+use neat_pipeline::config::{Choice, Config, FieldUse, LineDetector, Preset, apply_overrides};
 use neat_pipeline::run_dir::parse_config;
 use neat_tensor::Backend;
 use std::path::PathBuf;
@@ -50,18 +50,27 @@ impl MethodArgs {
     /// `base` with everything that was set.
     pub fn apply(&self, base: &Config) -> Result<Config, CliError> {
         let mut config = apply_overrides(base, &self.set)?;
-        config.detect.detector = self.detector.map_or(config.detect.detector, Into::into);
+        if let Some(detector) = self.detector {
+            config.detect.detector = detector.into();
+            self.check(&config, &detector.option())?;
+        }
         if let Some(steps) = self.steps {
-            let set = self.set.iter().any(|set| set.starts_with("train.steps="));
-            if set && config.train.steps != steps {
-                let other = config.train.steps;
-                let text =
-                    format!("--steps {steps} and --set train.steps={other}: give one of them");
-                return Err(CliError::Usage(text));
-            }
             config.train.steps = steps;
+            self.check(&config, &format!("--steps {steps}"))?;
         }
         Ok(config)
+    }
+
+    /// `config` with a field, as `--train` says.
+    pub fn with_field(&self, mut config: Config) -> Result<Config, CliError> {
+        config.distill.field = Choice::Given(FieldUse::Trained);
+        self.check(&config, "--train")?;
+        Ok(config)
+    }
+
+    /// Refuses a `--set` that `option`, which changed `config`, contradicts.
+    pub fn check(&self, config: &Config, option: &str) -> Result<(), CliError> {
+        check_overrides(config, &self.set, option)
     }
 
     /// What the configuration starts from, in words.
@@ -71,6 +80,25 @@ impl MethodArgs {
             None => self.preset.unwrap_or_default().to_string(),
         }
     }
+}
+
+/// Refuses one of `overrides` that `option`, which changed `config` after them, contradicts: what
+/// stands changes nothing when it is said again.
+pub fn check_overrides(
+    config: &Config,
+    overrides: &[String],
+    option: &str,
+) -> Result<(), CliError> {
+    if apply_overrides(config, overrides)? == *config {
+        return Ok(());
+    }
+    for set in overrides.iter().rev() {
+        if apply_overrides(config, std::slice::from_ref(set))? != *config {
+            let text = format!("{option} and --set {set}: give one of them");
+            return Err(CliError::Usage(text));
+        }
+    }
+    Ok(())
 }
 
 /// What computes, and for how long.
@@ -107,6 +135,15 @@ pub enum Detector {
     /// The built-in detector, advised by M-LSD; in programs built with --features onnx, with the
     /// weights that scripts/fetch_mlsd.sh fetches
     Mlsd,
+}
+
+impl Detector {
+    /// The option that asks for it.
+    pub fn option(self) -> String {
+        let value = self.to_possible_value();
+        let name = value.as_ref().map_or("", PossibleValue::get_name);
+        format!("--detector {name}")
+    }
 }
 
 impl From<Detector> for LineDetector {

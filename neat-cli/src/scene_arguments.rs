@@ -1,11 +1,12 @@
 //! How a scene is read.
 
-use crate::arguments::positive;
+use crate::arguments::{MethodArgs, positive};
+use crate::error::CliError;
 use clap::Args;
 use neat_core::file_cache::FileCache;
 use neat_core::layout::{CameraAxes, PoseConvention, PoseDirection};
 use neat_core::{LoadOptions, MemoryLimit, SphereChoice};
-use neat_pipeline::config::{DataConfig, Preset};
+use neat_pipeline::config::{Config, DataConfig, Preset};
 use neat_pipeline::scene::load_options;
 use std::fmt;
 
@@ -62,8 +63,15 @@ impl SceneArgs {
         }
     }
 
+    /// `config`, which `method` made, with everything that was given.
+    pub fn configure(&self, mut config: Config, method: &MethodArgs) -> Result<Config, CliError> {
+        config.data = self.apply(config.data);
+        method.check(&config, self.to_string().trim_start())?;
+        Ok(config)
+    }
+
     /// `data` with everything that was given.
-    pub fn apply(&self, mut data: DataConfig) -> DataConfig {
+    fn apply(&self, mut data: DataConfig) -> DataConfig {
         if let Some(sphere) = self.scene_sphere {
             data.scene_sphere = sphere;
         }

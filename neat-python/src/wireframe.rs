@@ -165,6 +165,15 @@ impl Wireframe {
         Ok(dict)
     }
 
+    /// Faces between edges and arcs, closed shells first, as the lists and dicts of wireframe.json:
+    /// `closed`, whether it bounds a solid, and `faces`. A face has a `plane` (`normal`, `offset`) or a
+    /// `cylinder` (`point`, `axis`, `radius`, `convex`), and `loops` of steps: an `edge` or `arc` by
+    /// its index, or a `smooth` line by its two junctions, and whether it is `reversed`.
+    #[getter]
+    fn shells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        from_json(py, &serde_json::json!(self.document.shells))
+    }
+
     /// All facts about the edges, by name: each (E,).
     #[getter]
     fn edge_fields<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

@@ -30,6 +30,7 @@ def test_arrays_are_those_of_the_file(run):
         else:
             assert np.array_equal(covariance, covariance.T)
             assert np.array_equal(covariance[np.triu_indices(3)], stored)
+    assert wireframe.shells == document["shells"] and any(shell["closed"] for shell in wireframe.shells)
     assert wireframe.views == document["views"] and wireframe.metadata == document["metadata"]
     (view, ends, residual), *_ = wireframe.support[0]
     stored = document["edge_support"][0][0]
@@ -55,6 +56,19 @@ def test_arcs_are_those_of_the_file(tmp_path):
     assert {name: array.shape for name, array in none.items()} == {
         "centers": (0, 3), "axes": (0, 2, 3), "radii": (0,), "angles": (0, 2),
         "covariances": (0, 4, 4)}
+
+
+def test_shells_are_those_of_the_file(tmp_path):
+    # A disc: its rim is a circle.
+    rim = {"center": [0, 0, 1], "axes": [[1, 0, 0], [0, 1, 0]], "radius": 0.5,
+           "angles": [0, 2 * np.pi]}
+    face = {"plane": {"normal": [0, 0, 1], "offset": 1},
+            "loops": [[{"arc": 0, "reversed": False}]]}
+    shells = [{"closed": False, "faces": [face]}]
+    path = tmp_path / "wireframe.json"
+    path.write_text(json.dumps({"junctions": [], "edges": [], "arcs": [rim], "shells": shells}))
+    assert neat3d.Wireframe.read(path).shells == shells
+    assert neat3d.Wireframe([[0, 0, 0], [1, 0, 0]], [[0, 1]]).shells == []
 
 
 @pytest.mark.parametrize("format", neat3d.FORMATS)

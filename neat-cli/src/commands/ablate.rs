@@ -69,8 +69,8 @@ impl AblateArgs {
             surface: self.points.as_deref().map(read_points).transpose()?,
             threshold: self.threshold,
         };
-        let mut config = self.method.config()?;
-        config.data = self.scene_args.apply(config.data);
+        let config = self.method.config()?;
+        let config = self.scene_args.configure(config, &self.method)?;
         let options = RunOptions {
             scene: self.scene,
             out: self.out,

@@ -66,8 +66,8 @@ struct Line3dArgs {
 
 impl Line3dArgs {
     fn run(self, quiet: bool) -> Result<(), CliError> {
-        let mut config = self.method.config()?;
-        config.data = self.scene_args.apply(config.data);
+        let config = self.method.config()?;
+        let config = self.scene_args.configure(config, &self.method)?;
         let line3d_config = Line3dConfig {
             min_views: usize::try_from(self.min_views).unwrap_or(usize::MAX),
             clustering_scale: self.clustering_scale,

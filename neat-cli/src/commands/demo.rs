@@ -9,7 +9,6 @@ use crate::progress::Progress;
 use crate::{interrupt, output};
 use clap::Args;
 use neat_lab::demo::demo;
-use neat_pipeline::config::{Choice, FieldUse};
 use neat_pipeline::reconstruct::RunOptions;
 use std::path::PathBuf;
 
@@ -47,7 +46,7 @@ impl DemoArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         let mut config = self.method.config()?;
         if self.train {
-            config.distill.field = Choice::Given(FieldUse::Trained);
+            config = self.method.with_field(config)?;
         }
         let options = RunOptions {
             scene: self.out.clone(),

@@ -1,6 +1,6 @@
 //! `neat detect`.
 
-use crate::arguments::Detector;
+use crate::arguments::{Detector, check_overrides};
 use crate::error::CliError;
 use crate::memory::MemoryArgs;
 use crate::output;
@@ -64,8 +64,11 @@ impl DetectArgs {
             // As in a run's configuration, or without its section.
             .map(|set| format!("detect.{}", set.strip_prefix("detect.").unwrap_or(set)))
             .collect();
-        let mut config = apply_overrides(&Preset::default().config(), &settings)?.detect;
-        config.detector = self.detector.map_or(config.detector, Into::into);
+        let mut config = apply_overrides(&Preset::default().config(), &settings)?;
+        if let Some(detector) = self.detector {
+            config.detect.detector = detector.into();
+            check_overrides(&config, &settings, &detector.option())?;
+        }
         #[cfg(feature = "onnx")]
         let learned = self.model.map(SegmentSource::Onnx);
         #[cfg(not(feature = "onnx"))]
@@ -78,7 +81,7 @@ impl DetectArgs {
             images: self.images,
             out: self.out,
             source,
-            config,
+            config: config.detect,
             overlays: !self.no_overlays,
             memory_limit: self.memory.limit(),
         };

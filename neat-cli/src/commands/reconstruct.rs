@@ -4,7 +4,7 @@ use super::train::RunArgs;
 use crate::error::CliError;
 use crate::{interrupt, output};
 use clap::Args;
-use neat_pipeline::config::{Choice, FieldUse};
+use neat_pipeline::config::Config;
 use neat_pipeline::reconstruct::{Reconstruction, reconstruct};
 use neat_wireframe::metrics::ImageEvidence;
 
@@ -41,14 +41,19 @@ pub struct ReconstructArgs {
 impl ReconstructArgs {
     /// Finds mistakes in the configuration.
     pub fn check_configuration(&self) -> Result<(), CliError> {
-        self.run.check_configuration()
+        self.configured(self.run.configuration()?).map(|_| ())
+    }
+
+    fn configured(&self, config: Config) -> Result<Config, CliError> {
+        match self.train {
+            true => self.run.method.with_field(config),
+            false => Ok(config),
+        }
     }
 
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         let mut options = self.run.options()?;
-        if self.train {
-            options.config.distill.field = Choice::Given(FieldUse::Trained);
-        }
+        options.config = self.configured(options.config)?;
         let interrupted = interrupt::flag()?;
         let mut progress = self.run.progress(quiet);
         let reconstruction = reconstruct(&options, &interrupted, &mut |event| progress.show(event))

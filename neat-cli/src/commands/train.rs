@@ -7,6 +7,7 @@ use crate::progress::{Progress, ProgressFormat};
 use crate::scene_arguments::SceneArgs;
 use crate::{interrupt, output};
 use clap::Args;
+use neat_pipeline::config::Config;
 use neat_pipeline::reconstruct::{RunOptions, train};
 use neat_pipeline::run_dir::{Existing, RunDir};
 use std::path::PathBuf;
@@ -44,7 +45,7 @@ pub struct RunArgs {
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
     #[command(flatten)]
-    method: MethodArgs,
+    pub method: MethodArgs,
     /// Seed of all randomness [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -63,9 +64,10 @@ pub struct RunArgs {
 }
 
 impl RunArgs {
-    /// Finds mistakes in the configuration.
-    pub fn check_configuration(&self) -> Result<(), CliError> {
-        self.method.config().map(|_| ())
+    /// The configuration of a run that continues no other.
+    pub fn configuration(&self) -> Result<Config, CliError> {
+        let config = self.method.config()?;
+        self.scene_args.configure(config, &self.method)
     }
 
     /// Shows how far the run is.
@@ -80,7 +82,7 @@ impl RunArgs {
         } else {
             (None, existing(self.overwrite))
         };
-        let (mut config, preset, seed) = match earlier {
+        let (config, preset, seed) = match earlier {
             Some(run) => {
                 let manifest = run.manifest()?;
                 // What is not said again stays; what is said has to be the same.
@@ -93,7 +95,7 @@ impl RunArgs {
             }
             None => (self.method.config()?, self.method.name(), 0),
         };
-        config.data = self.scene_args.apply(config.data);
+        let config = self.scene_args.configure(config, &self.method)?;
         let seed = self.seed.unwrap_or(seed);
         Ok(RunOptions {
             scene: self.scene.clone(),

@@ -79,6 +79,38 @@ fn options_of_runs() {
                 &["--steps 50", "train.steps=100", "give one of them"],
             ),
             option(
+                "two detectors",
+                "train scene --out run --detector own --set detect.detector=mlsd",
+                &[
+                    "--detector own",
+                    "--set detect.detector=mlsd",
+                    "give one of them",
+                ],
+            ),
+            option(
+                "two detectors for a folder",
+                "detect scene/images --out run --detector mlsd --set detector=own",
+                &[
+                    "--detector mlsd",
+                    "--set detect.detector=own",
+                    "give one of them",
+                ],
+            ),
+            option(
+                "two numbers of views",
+                "train scene --out run --max-views 4 --set data.max_views=5",
+                &[
+                    "--max-views 4",
+                    "--set data.max_views=5",
+                    "give one of them",
+                ],
+            ),
+            option(
+                "a field, and none",
+                "reconstruct scene --out run --train --set distill.field=none",
+                &["--train", "--set distill.field=none", "give one of them"],
+            ),
+            option(
                 "a time that is none",
                 "train scene --out run --time-budget soon",
                 &["'soon'", "10m"],
