@@ -6,25 +6,26 @@
 //   node scripts/check_page.mjs PAGE NEAT [--scene FOLDER] [--picture FILE]
 //
 // NEAT is the command. Of FOLDER, another scene, the times of both are told, and where it holds
-// truth/ their F1 of creases. All is done twice: with a plain server, and with one whose headers
-// let the page have threads. The page is served until its synthetic scene is done, and then no
-// more: what follows must work without the network. Any error or warning on the console, any request to somewhere else, and a number that
-// differs by more than 1e-9 is a failure. Needs Node 18 and Chromium (or CHROMIUM=path), nothing
-// else.
+// truth/ their F1 of creases. All is done twice: with a plain server, and with
+// scripts/serve_page.py, whose headers let the page have threads. The page is served until its
+// synthetic scene is done, and then no more: what follows must work without the network. Any error
+// or warning on the console, any request to somewhere else, and a number that differs by more than
+// 1e-9 is a failure. Needs Node 18, Python 3.9 and Chromium (or CHROMIUM=path), nothing else.
 
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
+import { execFileSync, spawn } from "node:child_process";
+import { once } from "node:events";
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createServer } from "node:http";
 import { tmpdir } from "node:os";
 import { extname, join, resolve } from "node:path";
+import { fileURLToPath } from "node:url";
 import { Browser, findBrowser } from "./browser.mjs";
 
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm" };
 const DESKTOP = { width: 1280, height: 900 };
 const MINUTES = 60_000;
-/** With these a page may have threads. */
-const ISOLATION = { "cross-origin-opener-policy": "same-origin", "cross-origin-embedder-policy": "require-corp" };
+const ISOLATING_SERVER = fileURLToPath(new URL("serve_page.py", import.meta.url));
 /** As `neat-web synthesise` makes it. */
 const BUNDLED = ["--views", "48", "--image-size", "400"];
 /** What only runs of the command say. */
@@ -44,15 +45,34 @@ const work = mkdtempSync(join(tmpdir(), "check-page-"));
 const downloads = join(work, "downloads");
 const command = (...args) => execFileSync(neat, args, { stdio: ["ignore", "ignore", "pipe"] });
 
-/** Serves the page on a port of this machine. */
-function serve(headers) {
+/** Serves the page on a port of this machine: its address, and how to end that. */
+async function servePlainly() {
   const server = createServer((request, answer) => {
     const name = request.url === "/" ? "/index.html" : new URL(request.url, "http://page").pathname;
     const path = join(page, name);
     if (!existsSync(path)) return answer.writeHead(404).end();
-    answer.writeHead(200, { "content-type": TYPES[extname(path)] ?? "text/plain", ...headers }).end(readFileSync(path));
+    answer.writeHead(200, { "content-type": TYPES[extname(path)] ?? "text/plain" }).end(readFileSync(path));
   });
-  return new Promise((done) => server.listen(0, "127.0.0.1", () => done(server)));
+  await new Promise((done) => server.listen(0, "127.0.0.1", done));
+  const stop = () => new Promise((done) => {
+    server.close(done);
+    server.closeAllConnections();
+  });
+  return { address: `http://127.0.0.1:${server.address().port}/`, stop };
+}
+
+/** The same with the headers that isolate it. */
+async function serveIsolated() {
+  const server = spawn("python3", [ISOLATING_SERVER, page, "0"], { stdio: ["ignore", "pipe", "ignore"] });
+  process.once("exit", () => server.kill());
+  const end = once(server, "exit");
+  const address = await Promise.race([once(server.stdout, "data"), end.then(() => null)]);
+  assert.ok(address, "scripts/serve_page.py ends at once");
+  const stop = () => {
+    server.kill();
+    return end;
+  };
+  return { address: String(address[0]).trim(), stop };
 }
 
 /** The largest difference of two numbers at the same place, relative where they are above 1. */
@@ -227,26 +247,22 @@ async function checkRefused(browser) {
 
 /** All that a person does, with a page that has threads or not. */
 async function check(browser, isolated, scene, truth, measured) {
-  const server = await serve(isolated ? ISOLATION : {});
-  const { port } = server.address();
+  const server = await (isolated ? serveIsolated() : servePlainly());
   await browser.send("Browser.setDownloadBehavior", { behavior: "allow", downloadPath: downloads }, null);
   await browser.setDevice(DESKTOP);
-  await browser.open(`http://127.0.0.1:${port}/`);
+  await browser.open(server.address);
   const threads = await browser.evaluate("crossOriginIsolated ? navigator.hardwareConcurrency : 1");
   assert.equal(await browser.evaluate("crossOriginIsolated"), isolated);
   console.log(`threads: ${threads}`);
   await browser.until(`document.querySelectorAll("#format option").length > 5`, "the program does not start");
   await checkStopped(browser);
   await checkSynthetic(browser, truth);
-  await new Promise((done) => {
-    server.close(done);
-    server.closeAllConnections();
-  });
+  await server.stop();
   await checkDropped(browser, scene, truth);
   if (another) await measure(browser, another, measured);
   await checkRefused(browser);
   assert.deepEqual(browser.problems, [], "the console must stay empty");
-  const own = ["data:", "blob:", `http://127.0.0.1:${port}/`];
+  const own = ["data:", "blob:", server.address];
   const outside = browser.requests.filter((url) => !own.some((begin) => url.startsWith(begin)));
   assert.deepEqual(outside, [], "nothing may be fetched from elsewhere");
   console.log("ok: nothing from elsewhere, and nothing on the console");
