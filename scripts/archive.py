@@ -4,8 +4,8 @@
     scripts/archive.py FOLDER OUT --format FORMAT
 
 FORMAT is tar.gz or zip. Writes OUT/FOLDER.FORMAT and the same with .sha256 behind it, and prints
-the first. The same files make the same bytes: all are of one time, SOURCE_DATE_EPOCH or else that of the last
-commit, and of no owner. Needs Python 3.9 and nothing else.
+the first. The same files make the same bytes: all are of one time, SOURCE_DATE_EPOCH or else that
+of the last commit, and of no owner. Needs Python 3.9 and nothing else.
 """
 
 import argparse

@@ -66,7 +66,10 @@ impl SceneArgs {
     /// `config`, which `method` made, with everything that was given.
     pub fn configure(&self, mut config: Config, method: &MethodArgs) -> Result<Config, CliError> {
         config.data = self.apply(config.data);
-        method.check(&config, self.to_string().trim_start())?;
+        let options = self.to_string();
+        if !options.is_empty() {
+            method.check(&config, options.trim_start())?;
+        }
         Ok(config)
     }
 
