@@ -5,7 +5,9 @@ use crate::error::CliError;
 use crate::memory::MemoryArgs;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use neat_pipeline::config::{Choice, Config, FieldUse, LineDetector, Preset, apply_overrides};
+use neat_pipeline::config::{
+    Choice, Config, FieldUse, LineDetector, Preset, apply_overrides, contradicted,
+};
 use neat_pipeline::run_dir::parse_config;
 use neat_tensor::Backend;
 use std::path::PathBuf;
@@ -82,23 +84,16 @@ impl MethodArgs {
     }
 }
 
-/// Refuses one of `overrides` that `option`, which changed `config` after them, contradicts: what
-/// stands changes nothing when it is said again.
+/// Refuses one of `overrides` that `option`, which changed `config` after them, contradicts.
 pub fn check_overrides(
     config: &Config,
     overrides: &[String],
     option: &str,
 ) -> Result<(), CliError> {
-    if apply_overrides(config, overrides)? == *config {
-        return Ok(());
-    }
-    for set in overrides.iter().rev() {
-        if apply_overrides(config, std::slice::from_ref(set))? != *config {
-            let text = format!("{option} and --set {set}: give one of them");
-            return Err(CliError::Usage(text));
-        }
-    }
-    Ok(())
+    contradicted(config, overrides)?.map_or(Ok(()), |set| {
+        let text = format!("{option} and --set {set}: give one of them");
+        Err(CliError::Usage(text))
+    })
 }
 
 /// What computes, and for how long.

@@ -18,7 +18,7 @@ mod preset;
 
 pub use neat_detect::LineDetector;
 pub use neat_images::config::{Background, Choice, DataConfig};
-pub use overrides::{OverrideError, apply_overrides};
+pub use overrides::{OverrideError, apply_overrides, contradicted};
 pub use preset::{Preset, UnknownPreset};
 
 pub(crate) use differences::{Difference, differences};

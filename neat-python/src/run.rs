@@ -8,7 +8,7 @@ use crate::settings;
 use crate::wireframe::{Wireframe, from_json, warn};
 use neat_core::MemoryLimit;
 use neat_core::file_cache::FileCache;
-use neat_pipeline::config::{Choice, Config, FieldUse, Preset, apply_overrides};
+use neat_pipeline::config::{Choice, Config, FieldUse, Preset, apply_overrides, contradicted};
 use neat_pipeline::event::Event;
 use neat_pipeline::reconstruct::{RunOptions, open_run, reconstruct as reconstruct_in};
 use neat_pipeline::resources::{Resources, default_limit};
@@ -166,7 +166,7 @@ pub fn reconstruct(
     };
     let (mut config, preset, of_run) = method.of(&out, existing)?;
     if train {
-        config.distill.field = Choice::Given(FieldUse::Trained);
+        config = method.with_field(config)?;
     }
     let options = RunOptions {
         scene,
@@ -295,5 +295,16 @@ impl Method<'_> {
             }
             None => (config, name, 0),
         })
+    }
+
+    /// `config` with a field, as `train` says.
+    fn with_field(&self, mut config: Config) -> Result<Config, Failure> {
+        config.distill.field = Choice::Given(FieldUse::Trained);
+        match contradicted(&config, &self.settings)? {
+            Some(set) => Err(Failure::input(format!(
+                "train and the setting {set}: give one of them"
+            ))),
+            None => Ok(config),
+        }
     }
 }

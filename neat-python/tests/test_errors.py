@@ -53,6 +53,7 @@ def test_a_folder_that_holds_something(run, scene):
         (dict(time_budget=-1.0), "above 0"),
         (dict(backend="cuda"), "cuda"),
         (dict(settings="train.steps=5"), "give a dict"),
+        (dict(train=True, settings={"distill.field": "none"}), "distill.field=none.*give one of them"),
     ],
 )
 def test_arguments_that_make_no_sense(scene, options, message):

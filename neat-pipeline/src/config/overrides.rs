@@ -51,6 +51,26 @@ pub fn apply_overrides(config: &Config, overrides: &[String]) -> Result<Config, 
     apply_to(config, overrides)
 }
 
+/// One of `overrides` that `config`, which was changed after them, contradicts: what still stands
+/// changes nothing when it is applied again.
+///
+/// # Errors
+/// As [`apply_overrides`].
+pub fn contradicted<'a>(
+    config: &Config,
+    overrides: &'a [String],
+) -> Result<Option<&'a str>, OverrideError> {
+    if apply_overrides(config, overrides)? == *config {
+        return Ok(None);
+    }
+    for text in overrides.iter().rev() {
+        if apply_overrides(config, std::slice::from_ref(text))? != *config {
+            return Ok(Some(text));
+        }
+    }
+    Ok(None)
+}
+
 /// [`apply_overrides`] for any tree of structs.
 fn apply_to<T>(config: &T, overrides: &[String]) -> Result<T, OverrideError>
 where
