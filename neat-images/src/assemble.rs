@@ -4,13 +4,16 @@ use crate::distilled::{BackEndReport, Distilled};
 use nalgebra::Matrix4;
 use neat_core::{Camera, CircularArc, EdgelMap, Scene, SceneError, Wireframe3d};
 use neat_detect::{DetectorConfig, edgel_maps};
-use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble_with_progress};
+use neat_wireframe::assemble::{
+    AssembleConfig, Assembled, Photographs, Witnesses, assemble_with_progress,
+};
 use neat_wireframe::confidence::{ConfidenceConfig, assess};
 use neat_wireframe::faces::{MeasuredGraph, find_shells};
 use neat_wireframe::kinds::edge_kinds;
 use neat_wireframe::paper::NeatLine;
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SignedDistance, ViewObservation};
+use std::cell::OnceCell;
 use std::ops::ControlFlow;
 
 /// Who listens to the progress wants the distillation to end.
@@ -69,7 +72,25 @@ pub fn assemble_images(
         Ok(()) => ControlFlow::Continue(()),
         Err(Cancelled) => ControlFlow::Break(()),
     };
-    match assemble_with_progress(views, &edgels, lines, scene_radius, config, on_progress) {
+    let unreadable = OnceCell::new();
+    let image_of = |view: usize| {
+        let image = scene.views[view].image.read();
+        image.map_err(|error| unreadable.set(error)).ok()
+    };
+    let witnesses = Witnesses {
+        views,
+        edgels: &edgels,
+        photographs: Some(Photographs {
+            image_of: &image_of,
+            pixel_center: scene.pixel_center,
+        }),
+        field_lines: lines,
+    };
+    let built = assemble_with_progress(&witnesses, scene_radius, config, on_progress);
+    if let Some(error) = unreadable.into_inner() {
+        return Err(error.into());
+    }
+    match built {
         ControlFlow::Continue(built) => Ok(Draft::from(built)),
         ControlFlow::Break(()) => Err(Cancelled.into()),
     }

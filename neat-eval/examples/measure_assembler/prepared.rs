@@ -4,8 +4,11 @@ use crate::Result;
 use neat_core::{LoadOptions, Scene, hawp_json, load_scene};
 use neat_detect::{DetectorConfig, detect_views, edgel_maps};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble};
+use neat_wireframe::assemble::{
+    AssembleConfig, Assembled, Photographs, Witnesses, assemble_with_progress,
+};
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// As `neat reconstruct` has it.
@@ -48,5 +51,20 @@ pub fn prepared(dir: &Path, kept: Option<&Path>) -> Result<Scene> {
 pub fn assembled(scene: &Scene) -> Result<Assembled> {
     let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
     let edgels = edgel_maps(&scene.views, &DetectorConfig::default(), scene.pixel_center)?;
-    Ok(assemble(&views, &edgels, 1.0, &AssembleConfig::default()))
+    let image_of = |view: usize| scene.views[view].image.read().ok();
+    let witnesses = Witnesses {
+        views: &views,
+        edgels: &edgels,
+        photographs: Some(Photographs {
+            image_of: &image_of,
+            pixel_center: scene.pixel_center,
+        }),
+        ..Witnesses::default()
+    };
+    let config = AssembleConfig::default();
+    let go_on = &mut |_| ControlFlow::Continue(());
+    match assemble_with_progress(&witnesses, 1.0, &config, go_on) {
+        ControlFlow::Continue(assembled) => Ok(assembled),
+        ControlFlow::Break(()) => unreachable!("nobody breaks"),
+    }
 }

@@ -30,6 +30,8 @@ pub(super) struct Corners {
     pub junctions: Vec<Vector3<f64>>,
     /// The junctions at start and end of each line.
     pub ends: Vec<[usize; 2]>,
+    /// Which of the lines that were joined each is; none of those that were added.
+    pub sources: Vec<Option<usize>>,
     /// Where lines come near each other.
     pub meetings: Vec<Meeting>,
     /// Per line, how far off its ends may be.
@@ -54,6 +56,7 @@ impl Corners {
     /// they are not sought any more.
     pub(super) fn add(&mut self, edges: &[([usize; 2], f64)]) {
         self.ends.extend(edges.iter().map(|(pair, _)| *pair));
+        self.sources.extend(edges.iter().map(|_| None));
         self.windows.extend(edges.iter().map(|_| 0.0));
         self.pixels.extend(edges.iter().map(|(_, pixel)| *pixel));
     }
@@ -66,6 +69,7 @@ impl Corners {
             new_index[*old] = Some(new);
         }
         self.ends = kept.iter().map(|line| self.ends[*line]).collect();
+        self.sources = kept.iter().map(|line| self.sources[*line]).collect();
         self.windows = kept.iter().map(|line| self.windows[*line]).collect();
         self.pixels = kept.iter().map(|line| self.pixels[*line]).collect();
         self.meetings.retain_mut(|meeting| {
@@ -150,6 +154,7 @@ pub(super) fn find_corners(images: &Images, lines: &[ChosenLine]) -> Corners {
     let (junctions, ends) = joining.junctions();
     Corners {
         junctions,
+        sources: (0..ends.len()).map(Some).collect(),
         ends,
         meetings,
         windows,

@@ -3,7 +3,7 @@
 use super::corners::{Corners, beyond_end, nearest_points};
 use super::edge_samples::Images;
 use neat_core::Wireframe3d;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A junction lies on an edge within so many reaches: less than where ends meet, since a cut
 /// bends the edge. Twice as many cost a house and a façade 0.01 of F1 at 1 cm, half as many are
@@ -14,8 +14,12 @@ const MARGIN_IN_PIXELS: f64 = 3.0;
 /// … or as a share of the edge, if that is less.
 const MAX_MARGIN: f64 = 0.3;
 
-/// The graph of lines between corners, whose junctions may be more than the edges need.
-pub(super) fn cut_edges(images: &Images, mut corners: Corners) -> Wireframe3d {
+/// The graph of lines between corners, whose junctions may be more than the edges need, and for
+/// each edge the line that it is a piece of, see [`Corners::sources`].
+pub(super) fn cut_edges(
+    images: &Images,
+    mut corners: Corners,
+) -> (Wireframe3d, Vec<Option<usize>>) {
     let count = corners.ends.len();
     let mut degrees = vec![0; corners.junctions.len()];
     for junction in corners.ends.iter().flatten() {
@@ -65,8 +69,8 @@ pub(super) fn cut_edges(images: &Images, mut corners: Corners) -> Wireframe3d {
         }
     }
     cut_crossings(images, &mut corners, &mut cuts);
-    let mut edges = BTreeSet::new();
-    for (ends, cuts) in corners.ends.iter().zip(&mut cuts) {
+    let mut edges = BTreeMap::new();
+    for ((ends, source), cuts) in corners.ends.iter().zip(&corners.sources).zip(&mut cuts) {
         cuts.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let inner = cuts.iter().map(|(_, junction)| *junction);
         let along: Vec<usize> = std::iter::once(ends[0])
@@ -77,14 +81,13 @@ pub(super) fn cut_edges(images: &Images, mut corners: Corners) -> Wireframe3d {
             let [a, b] = [pair[0].min(pair[1]), pair[0].max(pair[1])];
             let apart = corners.junctions[a] != corners.junctions[b];
             if a != b && apart {
-                edges.insert([a, b]);
+                edges.entry([a, b]).or_insert(*source);
             }
         }
     }
-    Wireframe3d {
-        junctions: corners.junctions,
-        edges: edges.into_iter().collect(),
-    }
+    let (edges, sources) = edges.into_iter().unzip();
+    let junctions = corners.junctions;
+    (Wireframe3d { junctions, edges }, sources)
 }
 
 /// Cuts edges where they cross each other: there is a junction, though none of them ends.
@@ -161,6 +164,7 @@ mod tests {
             ];
             let lines = lines.map(|[a, b]| ChosenLine {
                 line: LineSegment3::new(a.into(), b.into()),
+                placed: false,
                 evidence: LineEvidence {
                     gain: 9.0,
                     showing: vec![Showing {
@@ -169,7 +173,7 @@ mod tests {
                     }],
                 },
             });
-            in_order(&cut_edges(&images, find_corners(&images, &lines)))
+            in_order(&cut_edges(&images, find_corners(&images, &lines)).0)
         };
         let crossing = graph(0.0);
         assert_eq!([crossing.junctions.len(), crossing.edges.len()], [5, 4]);

@@ -45,18 +45,34 @@ pub(super) fn fit_graph(
 }
 
 /// Moves the junctions of a wireframe, each of whose edges is seen where it is itself: not where
-/// the line is that it has been cut from.
-pub(super) fn fit_edges(images: &Images, wireframe: &mut Wireframe3d) {
+/// the line is that it has been cut from. Where that was placed by profiles it stays, though:
+/// `sources` are the lines of the edges, of `lines`.
+pub(super) fn fit_edges(
+    images: &Images,
+    lines: &[ChosenLine],
+    sources: &[Option<usize>],
+    wireframe: &mut Wireframe3d,
+) {
     let Wireframe3d { junctions, edges } = wireframe;
-    let lines: Vec<ChosenLine> = (edges.par_iter())
-        .map(|edge| {
+    let pieces: Vec<ChosenLine> = (edges.par_iter().zip(sources))
+        .map(|(edge, source)| {
+            if let Some(line) = source
+                .map(|source| &lines[source])
+                .filter(|line| line.placed)
+            {
+                return line.clone();
+            }
             let [start, end] = edge.map(|end| junctions[end]);
             let line = LineSegment3::new(start, end);
             let evidence = images.evidence(&line, None, f64::NEG_INFINITY);
-            ChosenLine { line, evidence }
+            ChosenLine {
+                line,
+                evidence,
+                placed: false,
+            }
         })
         .collect();
-    fit_graph(images, &lines, edges, junctions);
+    fit_graph(images, &pieces, edges, junctions);
 }
 
 fn observations(
@@ -65,17 +81,28 @@ fn observations(
     [start, end]: [Vector3<f64>; 2],
 ) -> Vec<EdgeObservation> {
     let edge = LineSegment3::new(start, end);
+    let piece = LineSegment3::new(
+        chosen.line.point_at(chosen.line.line_parameter(&start)),
+        chosen.line.point_at(chosen.line.line_parameter(&end)),
+    );
     (chosen.evidence.views())
         .filter_map(|view| {
             let camera = images.views[view].camera;
-            let edgels = images.edgels_beside(view, &edge, SEARCH * images.reach);
-            let projected = project_segment(&images.views[view], &edge)?;
+            let (detection, count) = if chosen.placed {
+                let count = images.samples(view, &piece, [0.0, 1.0], None)?.len();
+                (project_segment(&images.views[view], &piece)?, count)
+            } else {
+                let edgels = images.edgels_beside(view, &edge, SEARCH * images.reach);
+                let projected = project_segment(&images.views[view], &edge)?;
+                let detection = segment_through(&edgels, &projected, images.reach)?;
+                (detection, edgels.len())
+            };
             Some(EdgeObservation {
                 camera,
-                detection: segment_through(&edgels, &projected, images.reach)?,
+                detection,
                 ends: [start, end].map(|end| project_in_front(&camera, &end)),
                 // As in the fit of a line.
-                weight: (edgels.len() as f64).sqrt(),
+                weight: (count as f64).sqrt(),
             })
         })
         .collect()
@@ -142,7 +169,12 @@ mod tests {
             edges: edges.to_vec(),
         };
         wireframe.junctions[6] += Vector3::new(0.002, -0.001, 0.001);
-        fit_edges(&TestViews::of_cube(12).images(), &mut wireframe);
+        fit_edges(
+            &TestViews::of_cube(12).images(),
+            &[],
+            &[None; 12],
+            &mut wireframe,
+        );
         for (fitted, truth) in wireframe.junctions.iter().zip(&truth) {
             assert!((fitted - truth).norm() < 2e-4, "{fitted} {truth}");
         }

@@ -55,6 +55,8 @@ const SEGMENT_REACHES: f64 = 2.0;
 pub(super) struct ChosenLine {
     pub line: LineSegment3,
     pub evidence: LineEvidence,
+    /// Whether it lies where the light changes: edgels have nothing to add.
+    pub placed: bool,
 }
 
 /// A line that stands for an arc.
@@ -197,7 +199,7 @@ enum Kind {
 }
 
 fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
-    let ChosenLine { line, evidence } = found;
+    let ChosenLine { line, evidence, .. } = found;
     match curve_or_straight(images, found, noise) {
         Kind::Straight => images
             .tube(line, evidence)
@@ -208,7 +210,7 @@ fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
 
 /// Likewise, where nobody wants to know of outlines.
 fn curve_or_straight(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
-    let ChosenLine { line, evidence } = found;
+    let ChosenLine { line, evidence, .. } = found;
     let bend = images.bend(line, evidence);
     let bow = bend.bow.as_ref();
     if images.is_curved(line, &bend, noise) {
@@ -355,7 +357,11 @@ impl Chooser<'_> {
                 return None;
             }
         }
-        Some(ChosenLine { line, evidence })
+        Some(ChosenLine {
+            line,
+            evidence,
+            placed: false,
+        })
     }
 
     /// Takes the edgels beside a line, and the 2D segments where it is shown.

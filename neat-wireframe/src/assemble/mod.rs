@@ -3,12 +3,14 @@
 //!
 //! The 2D segments propose lines in space, matched across views by the epipolar geometry
 //! (Hofer, Maurer and Bischof, *Efficient 3D scene abstraction using line segments*,
-//! Line3D++, 2017), or by a field that says which of them show one edge. The images decide: the line that they speak for most is fitted to the
-//! edgels of all views at once, takes them, and the next one is chosen by those that are
-//! left. Lines that bend are chords of curves, of which arcs are followed, and those that move
-//! aside from view to view are outlines of round things. Ends that meet become corners, all corners are fitted to the edgels
-//! together, and edges are cut where others end on them or cross them; the pieces, each by
-//! what shows it, are fitted once more.
+//! Line3D++, 2017), or by a field that says which of them show one edge. The images decide:
+//! the line that they speak for most is fitted to the edgels of all views at once, takes them,
+//! and the next one is chosen by those that are left. Lines that bend are chords of curves, of
+//! which arcs are followed, and those that move aside from view to view are outlines of round
+//! things. Where photographs are at hand, lines are placed where the light changes, and edges
+//! that run beside them are added. Ends that meet become corners, all corners are fitted to the
+//! edgels together, and edges are cut where others end on them or cross them; the pieces, each
+//! by what shows it, are fitted once more.
 //!
 //! Edgels are so noisy as the scene's poses and images make them, which the first lines tell;
 //! how near to a line is near are multiples of that. Along edges, ends have windows in
@@ -45,6 +47,7 @@ mod line_selection;
 mod neighbours;
 mod outlines;
 mod pose_fitting;
+mod profiles;
 mod progress;
 mod projected_line;
 mod report;
@@ -60,6 +63,7 @@ mod test_views;
 
 pub use config::AssembleConfig;
 pub use line3d::{Line3dConfig, Line3dSegment, SegmentSupport, line3d, wireframe_of_segments};
+pub use profiles::Photographs;
 pub use progress::OnProgress;
 pub use report::{AssembleReport, Assembled};
 
@@ -80,6 +84,7 @@ use line_continuation::continue_lines;
 use line_selection::{Selection, select_lines, sure_lines};
 use neat_core::{CircularArc, EdgelMap, LineSegment2};
 use pose_fitting::fit_poses;
+use profiles::place_lines;
 use progress::part;
 use rayon::prelude::*;
 use slab_ends::close_slabs;
@@ -92,20 +97,33 @@ const MIN_VIEWS: usize = 2;
 
 /// Shares of the time after which lines are proposed, the sure ones known, all selected and arcs
 /// followed: about those of a house.
-const PROPOSED: f64 = 0.05;
-const SURE: f64 = 0.2;
-const SELECTED: f64 = 0.7;
-const FOLLOWED: f64 = 0.85;
-/// Likewise, of the time for the graph, after which lines are cut where arcs begin, and continued.
-const ENDED: f64 = 0.25;
-const CONTINUED: f64 = 0.75;
+const PROPOSED: f64 = 0.03;
+const SURE: f64 = 0.12;
+const SELECTED: f64 = 0.4;
+const FOLLOWED: f64 = 0.5;
+/// Likewise, of the time for the graph, after which lines are cut where arcs begin, continued, and
+/// placed by profiles.
+const ENDED: f64 = 0.05;
+const CONTINUED: f64 = 0.13;
+const PLACED: f64 = 0.95;
 
-/// Builds the wireframe.
+/// What is known of a structure. All but the views may be missing.
+#[derive(Clone, Copy, Default)]
+pub struct Witnesses<'a> {
+    /// Cameras and detected segments. Views without a valid camera do not count.
+    pub views: &'a [ViewObservation],
+    /// The edgels of each image, as `neat_detect::edgel_map` finds them. Without any, the
+    /// segments stand for them.
+    pub edgels: &'a [EdgelMap],
+    /// The images themselves, by which lines are placed. Without them edgels say where lines are.
+    pub photographs: Option<Photographs<'a>>,
+    /// The NEAT lines of each view: 2D segments are partners if these lie near each other, and
+    /// are not matched otherwise.
+    pub field_lines: Option<&'a [Vec<NeatLine>]>,
+}
+
+/// Builds the wireframe of views and [their edgels](Witnesses::edgels).
 ///
-/// - `observations`: cameras and detected segments. Views without a valid camera do not
-///   count.
-/// - `edgels`: those of each image, as `neat_detect::edgel_map` finds them. Without any, the
-///   segments stand for them.
 /// - `scene_radius`: radius of the ball around the world's origin in which the structure
 ///   lies.
 ///
@@ -113,30 +131,36 @@ const CONTINUED: f64 = 0.75;
 /// not a positive number, edgels or lines of another number of views. It does not depend on the
 /// number of threads.
 pub fn assemble(
-    observations: &[ViewObservation],
+    views: &[ViewObservation],
     edgels: &[EdgelMap],
     scene_radius: f64,
     config: &AssembleConfig,
 ) -> Assembled {
+    let witnesses = Witnesses {
+        views,
+        edgels,
+        ..Witnesses::default()
+    };
     let go_on = &mut |_| ControlFlow::Continue(());
-    match assemble_with_progress(observations, edgels, None, scene_radius, config, go_on) {
+    match assemble_with_progress(&witnesses, scene_radius, config, go_on) {
         ControlFlow::Continue(assembled) => assembled,
         ControlFlow::Break(()) => Assembled::default(),
     }
 }
 
-/// [`assemble`], which ends as soon as `progress` says so.
-///
-/// With `field_lines`, the NEAT lines of each view, 2D segments are partners if these lie
-/// near each other, and are not matched otherwise.
+/// [`assemble`] by all that is known, which ends as soon as `progress` says so.
 pub fn assemble_with_progress(
-    observations: &[ViewObservation],
-    edgels: &[EdgelMap],
-    field_lines: Option<&[Vec<NeatLine>]>,
+    witnesses: &Witnesses<'_>,
     scene_radius: f64,
     config: &AssembleConfig,
     progress: OnProgress<'_>,
 ) -> ControlFlow<(), Assembled> {
+    let Witnesses {
+        views: observations,
+        edgels,
+        photographs,
+        field_lines,
+    } = *witnesses;
     let usable = scene_radius.is_normal() && scene_radius > 0.0;
     let fits = |views: usize| views == observations.len();
     if !usable
@@ -189,7 +213,7 @@ pub fn assemble_with_progress(
     let covariance = |arc: &FoundArc| selection.images.covariance_of_arc(arc);
     let arc_covariances: Vec<_> = arcs.iter().map(covariance).collect();
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
-    let wireframe = graph_of(selection, config, &mut report, progress)?;
+    let wireframe = graph_of(selection, photographs, config, &mut report, progress)?;
     let wireframe = wireframe.map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
     report.edges = wireframe.edges.len();
@@ -258,6 +282,7 @@ fn proposals(
 /// From lines to a graph: merged, continued, joined at corners, completed, cut and fitted.
 fn graph_of(
     mut selection: Selection<'_>,
+    photographs: Option<Photographs<'_>>,
     config: &AssembleConfig,
     report: &mut AssembleReport,
     progress: OnProgress<'_>,
@@ -271,14 +296,19 @@ fn graph_of(
     lines = merge_pieces(&images, lines);
     progress(CONTINUED)?;
     report.merged_pieces = report.lines - lines.len();
+    if let Some(photographs) = photographs {
+        let progress = &mut part(progress, [CONTINUED, PLACED]);
+        place_lines(&images, photographs, &mut lines, progress)?;
+    }
+    progress(PLACED)?;
     let mut corners = find_corners(&images, &lines);
     report.ends = corners.junctions.len();
     fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
     move_free_ends(&images, &lines, &mut corners);
     report.completed_edges = complete_edges(&images, &mut corners, taken, least);
     report.completed_edges += close_slabs(&images, &mut corners, taken, least);
-    let mut wireframe = cut_edges(&images, corners);
-    fit_edges(&images, &mut wireframe);
+    let (mut wireframe, sources) = cut_edges(&images, corners);
+    fit_edges(&images, &lines, &sources, &mut wireframe);
     ControlFlow::Continue(in_order(&wireframe))
 }
 

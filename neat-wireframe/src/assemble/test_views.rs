@@ -53,6 +53,7 @@ pub(super) fn chosen(images: &Images, line: &LineSegment3) -> ChosenLine {
     ChosenLine {
         line: *line,
         evidence: images.evidence(line, None, 0.0),
+        placed: false,
     }
 }
 

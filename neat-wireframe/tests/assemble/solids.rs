@@ -6,7 +6,9 @@ use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
 use neat_core::{CircularArc, EdgelMap, LineSegment2, LineSegment3};
 use neat_detect::{DetectorConfig, edgel_map};
 use neat_wireframe::ViewObservation;
-use neat_wireframe::assemble::{AssembleConfig, Assembled, assemble, assemble_with_progress};
+use neat_wireframe::assemble::{
+    AssembleConfig, Assembled, Witnesses, assemble, assemble_with_progress,
+};
 use neat_wireframe::paper::NeatLine;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -141,7 +143,12 @@ fn partners_of_an_inexact_field_give_the_exact_box() {
     let config = AssembleConfig::default();
     let with = |lines: &[Vec<NeatLine>]| {
         let go_on = &mut |_| ControlFlow::Continue(());
-        match assemble_with_progress(&views, &[], Some(lines), radius, &config, go_on) {
+        let witnesses = Witnesses {
+            views: &views,
+            field_lines: Some(lines),
+            ..Witnesses::default()
+        };
+        match assemble_with_progress(&witnesses, radius, &config, go_on) {
             ControlFlow::Continue(assembled) => assembled,
             ControlFlow::Break(()) => unreachable!("nobody breaks"),
         }

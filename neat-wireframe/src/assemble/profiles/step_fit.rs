@@ -1,0 +1,186 @@
+//! Steps moved to where they explain the profiles of all views best.
+//!
+//! Heights are those that are best for the places (variable projection: Golub and Pereyra 1973,
+//! with the derivative of Kaufman 1975).
+
+use super::light::LightProfile;
+use super::step_model::{
+    MAX_STEPS, NOISE_SQUARES, Step, StepModel, loss, misfit, offset, step_derivative,
+};
+use crate::solve::{LeastSquares, Options, minimise};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector4};
+
+const OPTIONS: Options = Options {
+    max_iterations: 12,
+    max_attempts: 5,
+    initial_damping: 1e-2,
+    min_damping: 1e-9,
+    decrease: 0.2,
+    relative_tolerance: 1e-4,
+};
+/// Damps what no profile tells of.
+const RIDGE: f64 = 1e-9;
+
+/// The steps where the sum of the losses of profiles is least, near those given, and that sum.
+pub(super) fn fit_steps(
+    profiles: &[&LightProfile],
+    steps: Vec<Step>,
+    blur: f64,
+) -> (Vec<Step>, f64) {
+    let (steps, summary) = minimise(&StepProblem { profiles, blur }, steps, &OPTIONS);
+    (steps, summary.final_cost)
+}
+
+struct StepProblem<'a> {
+    profiles: &'a [&'a LightProfile],
+    blur: f64,
+}
+
+/// What a profile says about the offsets of steps, by its loss.
+struct OffsetEquations {
+    hessian: SMatrix<f64, MAX_STEPS, MAX_STEPS>,
+    gradient: SVector<f64, MAX_STEPS>,
+}
+
+impl OffsetEquations {
+    fn new(profile: &LightProfile, steps: &[Step], blur: f64) -> Self {
+        let model = StepModel::new(profile, steps, blur);
+        let derivatives: [[f64; _]; MAX_STEPS] = std::array::from_fn(|k| match steps.get(k) {
+            Some(step) => step_derivative(offset(profile, step), blur),
+            None => [0.0; _],
+        });
+        // What of a moving step the others do not make up for; by its height.
+        let changes = derivatives.map(|derivative| model.rest(&derivative).0);
+        let mut equations = Self {
+            hessian: SMatrix::zeros(),
+            gradient: SVector::zeros(),
+        };
+        let mut squares = 0.0;
+        for light in &profile.light {
+            let (rest, heights) = model.rest(light);
+            squares += model.product(&rest, &rest);
+            for i in 0..steps.len() {
+                for j in 0..steps.len() {
+                    let product = model.product(&changes[i], &changes[j]);
+                    equations.hessian[(i, j)] += heights[i] * heights[j] * product;
+                }
+                equations.gradient[i] -= heights[i] * model.product(&changes[i], &rest);
+            }
+        }
+        // Of the logarithm.
+        let weight = (NOISE_SQUARES + squares).recip();
+        equations.hessian *= weight;
+        equations.gradient *= weight;
+        equations
+    }
+}
+
+impl LeastSquares for StepProblem<'_> {
+    type State = Vec<Step>;
+    type Equations = (DMatrix<f64>, DVector<f64>);
+
+    fn cost(&self, steps: &Vec<Step>) -> f64 {
+        let of_profile = |profile: &&LightProfile| loss(misfit(profile, steps, self.blur));
+        self.profiles.iter().map(of_profile).sum()
+    }
+
+    fn linearise(&self, steps: &Vec<Step>) -> Option<Self::Equations> {
+        let size = 4 * steps.len();
+        let mut hessian = DMatrix::zeros(size, size);
+        let mut gradient = DVector::zeros(size);
+        for profile in self.profiles {
+            let by_offset = OffsetEquations::new(profile, steps, self.blur);
+            let [x, y] = [profile.by_shift.x, profile.by_shift.y];
+            let offset_by_step = Vector4::new(x, y, profile.along * x, profile.along * y);
+            let square = offset_by_step * offset_by_step.transpose();
+            for i in 0..steps.len() {
+                for j in 0..steps.len() {
+                    let mut block = hessian.fixed_view_mut::<4, 4>(4 * i, 4 * j);
+                    block += by_offset.hessian[(i, j)] * square;
+                }
+                let mut part = gradient.fixed_rows_mut::<4>(4 * i);
+                part += by_offset.gradient[i] * offset_by_step;
+            }
+        }
+        (size > 0).then_some((hessian, gradient))
+    }
+
+    fn step(
+        &self,
+        steps: &Vec<Step>,
+        (hessian, gradient): &Self::Equations,
+        damping: f64,
+    ) -> Option<Vec<Step>> {
+        let mut damped = hessian.clone();
+        for k in 0..damped.nrows() {
+            damped[(k, k)] += damping * damped[(k, k)] + RIDGE;
+        }
+        let change = damped.cholesky()?.solve(gradient);
+        let moved = |(k, step): (usize, &Step)| step - change.fixed_rows::<4>(4 * k);
+        Some(steps.iter().enumerate().map(moved).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::profiles::light::Response;
+    use crate::assemble::profiles::test_profiles::Steps;
+
+    const RESPONSE: Response = Response {
+        exponent: 2.4,
+        blur: 0.6,
+    };
+
+    fn seen(noise: f64) -> (Vec<Step>, Vec<LightProfile>) {
+        let steps = vec![
+            Step::new(0.001, -0.002, 0.004, 0.0),
+            Step::new(0.023, 0.004, 0.0, 0.003),
+        ];
+        let heights = [[150.0, 120.0, 60.0], [-70.0, 60.0, 20.0]];
+        let seen = Steps {
+            steps: steps.iter().copied().zip(heights).collect(),
+            response: RESPONSE,
+            noise,
+        };
+        (steps, seen.in_light(9))
+    }
+
+    #[test]
+    fn the_gradient_is_that_of_differences() {
+        let (truth, profiles) = seen(3.0);
+        let profiles: Vec<&LightProfile> = profiles.iter().collect();
+        let problem = StepProblem {
+            profiles: &profiles,
+            blur: RESPONSE.blur,
+        };
+        let aside = Step::new(0.002, 0.001, -0.001, 0.002);
+        let steps: Vec<Step> = truth.iter().map(|step| step + aside).collect();
+        let (_, gradient) = problem.linearise(&steps).unwrap();
+        let scale = gradient.amax();
+        for k in 0..8 {
+            let cost = |change: f64| {
+                let mut steps = steps.clone();
+                steps[k / 4][k % 4] += change;
+                problem.cost(&steps)
+            };
+            // The equations are those of half the cost.
+            let difference = 0.5 * (cost(1e-6) - cost(-1e-6)) / 2e-6;
+            let off = (gradient[k] - difference).abs();
+            assert!(off < 1e-3 * scale, "{k}: {} {difference}", gradient[k]);
+        }
+    }
+
+    #[test]
+    fn steps_come_to_where_they_are() {
+        let (truth, profiles) = seen(0.0);
+        let profiles: Vec<&LightProfile> = profiles.iter().collect();
+        let aside = Step::new(0.004, -0.003, 0.0, 0.0);
+        let start = truth.iter().map(|step| step + aside).collect();
+        let (found, cost) = fit_steps(&profiles, start, RESPONSE.blur);
+        for (found, truth) in found.iter().zip(&truth) {
+            assert!((found - truth).norm() < 2e-4, "{found} {truth}");
+        }
+        assert!(cost < 1e-3 * profiles.len() as f64, "{cost}");
+    }
+}
