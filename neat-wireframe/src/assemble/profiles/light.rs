@@ -6,7 +6,7 @@
 use super::profile::{PLACES, Profile};
 use nalgebra::Vector2;
 
-/// Darker values are noise and rounding, whose powers say nothing.
+/// Darker values are noise and rounding, by which light is known no better.
 const DARKEST: f64 = 6.0;
 
 /// What files make of light.
@@ -36,13 +36,14 @@ pub(super) struct LightProfile {
 impl LightProfile {
     /// Of a file in which light is the `exponent`th power of values.
     pub(super) fn new(profile: &Profile, exponent: f64) -> Self {
-        let value = |k: usize, c: usize| f64::from(profile.values[k][c]).max(DARKEST) / 255.0;
+        let value = |k: usize, c: usize, least| f64::from(profile.values[k][c]).max(least) / 255.0;
         let channel = |c: usize| {
-            let light: [f64; PLACES] = std::array::from_fn(|k| 255.0 * value(k, c).powf(exponent));
+            let light: [f64; PLACES] =
+                std::array::from_fn(|k| 255.0 * value(k, c, 0.0).powf(exponent));
             let mean = light.iter().sum::<f64>() / PLACES as f64;
             light.map(|light| light - mean)
         };
-        let by_light = |k: usize, c: usize| value(k, c).powf(1.0 - exponent) / exponent;
+        let by_light = |k, c| value(k, c, DARKEST).powf(1.0 - exponent) / exponent;
         Self {
             view: profile.view,
             along: profile.along,
