@@ -10,7 +10,7 @@
 // scripts/serve_page.py, whose headers let the page have threads. The page is served until its
 // synthetic scene is done, and then no more: what follows must work without the network. Any error
 // or warning on the console, any request to somewhere else, and a number that differs by more than
-// 1e-7 is a failure. Needs Node 18, Python 3.9 and Chromium (or CHROMIUM=path), nothing else.
+// 1e-9 is a failure. Needs Node 18, Python 3.9 and Chromium (or CHROMIUM=path), nothing else.
 
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
@@ -102,7 +102,7 @@ const stage = (browser) => browser.evaluate(`document.getElementById("stage").te
 /** Fails where a wireframe of the page is not that of the command. */
 function compare(what, told, truth, document) {
   const worst = difference(truth.document, document);
-  assert.ok(worst < 1e-7, `${what}: the page differs from the command by ${worst}`);
+  assert.ok(worst < 1e-9, `${what}: the page differs from the command by ${worst}`);
   console.log(`ok: ${what}: ${told}, the command in ${truth.seconds.toFixed(1)} s; ${worst.toExponential(1)} between them`);
 }
 
