@@ -11,6 +11,7 @@
 //! What it sees is true to a pixel or two of its input, so its lines are hints:
 //! [`crate::detect_with_hints`] fits them to the image.
 
+use crate::onnx::runnable;
 use image::RgbImage;
 use image::imageops::{FilterType, resize};
 use nalgebra::Vector2;
@@ -65,9 +66,7 @@ impl Mlsd {
             path: path.into(),
             reason,
         };
-        let model = Model::load(bytes).map_err(|error| {
-            malformed(format!("it is not an ONNX model that can be run ({error})"))
-        })?;
+        let model = runnable(bytes, path)?;
         let side = match (model.input_ids().len(), model.input_shape(0).as_deref()) {
             (
                 1,

@@ -55,9 +55,7 @@ impl OnnxDetector {
             path: path.into(),
             reason,
         };
-        let model = Model::load(bytes).map_err(|error| {
-            malformed(format!("it is not an ONNX model that can be run ({error})"))
-        })?;
+        let model = runnable(bytes, path)?;
         let [input] = *model.input_ids() else {
             let count = model.input_ids().len();
             return Err(malformed(format!(
@@ -186,4 +184,12 @@ fn planes(image: &RgbImage) -> NdTensor<f32, 4> {
         .map(|&value| f32::from(value) / 255.0)
         .collect();
     NdTensor::from_data([1, 3, height as usize, width as usize], values)
+}
+
+/// A model as `rten` runs it; `path` is for messages.
+pub(crate) fn runnable(bytes: Vec<u8>, path: &Path) -> Result<Model, SceneError> {
+    Model::load(bytes).map_err(|error| SceneError::Malformed {
+        path: path.into(),
+        reason: format!("it is not an ONNX model that can be run ({error})"),
+    })
 }

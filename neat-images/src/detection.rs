@@ -160,21 +160,25 @@ mod tests {
         scene
     }
 
-    fn with(cache: Option<&FileCache>) -> Resources<'_> {
-        Resources {
-            cache,
-            ..Resources::default()
-        }
+    fn detected(scene: &mut Scene, cache: Option<&FileCache>) -> Result<Vec<String>, ImagesError> {
+        detected_by(&DetectorConfig::default(), scene, cache)
     }
 
-    fn detected(scene: &mut Scene, cache: Option<&FileCache>) -> Result<Vec<String>, ImagesError> {
+    fn detected_by(
+        config: &DetectorConfig,
+        scene: &mut Scene,
+        cache: Option<&FileCache>,
+    ) -> Result<Vec<String>, ImagesError> {
         let mut warnings = Vec::new();
         detect_wireframes(
             scene,
             Path::new("scene"),
-            &DetectorConfig::default(),
+            config,
             0.05,
-            with(cache),
+            Resources {
+                cache,
+                ..Resources::default()
+            },
             &mut |event: Event<'_, ()>| {
                 if let Event::Warning(warning) = event {
                     warnings.push(warning.message);
@@ -214,15 +218,7 @@ mod tests {
             min_length: 20.0,
             ..DetectorConfig::default()
         };
-        detect_wireframes(
-            &mut other,
-            Path::new("scene"),
-            &config,
-            0.05,
-            with(Some(&cache)),
-            &mut |_: Event<'_, ()>| {},
-        )
-        .unwrap();
+        detected_by(&config, &mut other, Some(&cache)).unwrap();
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 6);
     }
 
@@ -243,15 +239,7 @@ mod tests {
         };
         for (config, files) in [(DetectorConfig::default(), 3), (advised, 6)] {
             let mut scene = scene();
-            detect_wireframes(
-                &mut scene,
-                Path::new("scene"),
-                &config,
-                0.05,
-                with(Some(&cache)),
-                &mut |_: Event<'_, ()>| {},
-            )
-            .unwrap();
+            detected_by(&config, &mut scene, Some(&cache)).unwrap();
             let found = scene.views.iter().map(|view| view.wireframe.edges.len());
             assert!(found.min() > Some(3));
             assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), files);

@@ -1,6 +1,6 @@
 //! Areas found beside true ones.
 
-use super::coverage::median;
+use super::judged::{Judged, Summary};
 use neat_core::{CircularArc, Wireframe3d};
 use neat_eval::{CadFaces, FoundFace, TrueFace};
 use neat_wireframe::dimensions::{DimensionError, Dimensions, Quantity};
@@ -11,14 +11,8 @@ use std::collections::BTreeMap;
 /// Areas of the same face agree so well: errors are capped by the first, not by the second.
 const SHARES: [f64; 2] = [0.02, 0.05];
 
-/// An area with its true one.
-struct Judged {
-    /// By the true area, as half the interval.
-    error: f64,
-    half_width: Option<f64>,
-}
-
-/// All true faces by kind of scene and tolerance: `None` where none was found.
+/// All true faces by kind of scene and tolerance, off by shares of the true area: `None` where
+/// none was found.
 #[derive(Default)]
 pub struct Areas {
     judged: BTreeMap<(String, usize), Vec<Option<Judged>>>,
@@ -61,25 +55,18 @@ impl Areas {
         if self.judged.is_empty() {
             return String::new();
         }
-        let mut text = String::from(
-            "\n| scenes | tolerance | true faces | found | not determined | held | median error | median half interval |\n\
-             | --- | --: | --: | --: | --: | --: | --: | --: |\n",
+        let [heads, line] = Summary::HEADS;
+        let mut text = format!(
+            "\n| scenes | tolerance | true faces | found | {heads}\n| --- | --: | --: | --: | {line}\n"
         );
         for ((kind, share), judged) in &self.judged {
-            let found: Vec<&Judged> = judged.iter().flatten().collect();
-            let sure: Vec<(f64, f64)> = (found.iter())
-                .filter_map(|j| Some((j.error, j.half_width?)))
-                .collect();
-            let held = sure.iter().filter(|(error, half)| error <= half).count();
+            let found = judged.iter().flatten();
             text += &format!(
-                "| {kind} | {} | {} | {} | {} | {:.3} | {:.6} | {:.6} |\n",
+                "| {kind} | {} | {} | {} | {}\n",
                 SHARES[*share],
                 judged.len(),
-                found.len(),
-                found.len() - sure.len(),
-                held as f64 / sure.len() as f64,
-                median(sure.iter().map(|(error, _)| *error)),
-                median(sure.iter().map(|(_, half)| *half)),
+                found.clone().count(),
+                Summary::of(found).cells(),
             );
         }
         text

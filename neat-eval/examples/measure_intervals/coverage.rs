@@ -1,5 +1,6 @@
 //! Lengths found beside true ones.
 
+use super::judged::{Judged, Summary};
 use nalgebra::Vector3;
 use neat_core::Wireframe3d;
 use neat_wireframe::dimensions::{DimensionError, Dimensions, Quantity};
@@ -8,13 +9,6 @@ use std::collections::BTreeMap;
 
 /// Of the tolerance.
 const SHARES: [f64; 3] = [0.5, 1.0, 2.0];
-
-/// A length with its true one.
-struct Judged {
-    error: f64,
-    /// Half the interval; `None` where it is not determined.
-    half_width: Option<f64>,
-}
 
 /// All lengths by kind of scene, whether an end is free, and share of the tolerance.
 #[derive(Default)]
@@ -48,24 +42,18 @@ impl Coverage {
 
     /// As Markdown.
     pub fn table(&self) -> String {
-        let mut text = String::from(
-            "| scenes | free end | tolerance | lengths | not determined | held | median error | median half interval |\n\
-             | --- | --- | --: | --: | --: | --: | --: | --: |\n",
+        let [heads, line] = Summary::HEADS;
+        let mut text = format!(
+            "| scenes | free end | tolerance | lengths | {heads}\n| --- | --- | --: | --: | {line}\n"
         );
         for ((kind, free, share), judged) in &self.judged {
-            let sure: Vec<(f64, f64)> = (judged.iter())
-                .filter_map(|j| Some((j.error, j.half_width?)))
-                .collect();
-            let held = sure.iter().filter(|(error, half)| error <= half).count();
+            let summary = Summary::of(judged.iter());
             text += &format!(
-                "| {kind} | {} | {} | {} | {} | {:.3} | {:.6} | {:.6} |\n",
+                "| {kind} | {} | {} | {} | {}\n",
                 if *free { "yes" } else { "no" },
                 SHARES[*share],
-                sure.len(),
-                judged.len() - sure.len(),
-                held as f64 / sure.len() as f64,
-                median(sure.iter().map(|(error, _)| *error)),
-                median(sure.iter().map(|(_, half)| *half)),
+                summary.determined,
+                summary.cells(),
             );
         }
         text
@@ -103,11 +91,4 @@ fn pairs(document: &WireframeDocument, truth: &Wireframe3d, tolerance: f64) -> V
         free
     });
     near.into_iter().map(|(_, pair)| pair).collect()
-}
-
-/// The upper one.
-pub fn median(numbers: impl Iterator<Item = f64>) -> f64 {
-    let mut numbers: Vec<f64> = numbers.collect();
-    numbers.sort_by(f64::total_cmp);
-    numbers.get(numbers.len() / 2).copied().unwrap_or(f64::NAN)
 }

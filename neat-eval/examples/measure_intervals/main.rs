@@ -23,6 +23,7 @@
 
 mod areas;
 mod coverage;
+mod judged;
 #[path = "../measure_assembler/prepared.rs"]
 mod prepared;
 mod radii;

@@ -1,5 +1,6 @@
 //! Radii found beside true ones.
 
+use super::judged::{Judged, Summary};
 use neat_core::CircularArc;
 use neat_wireframe::dimensions::{DimensionError, Dimensions, Quantity};
 use neat_wireframe::export::WireframeDocument;
@@ -13,11 +14,9 @@ const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 const RIGHT: f64 = 0.01;
 
 /// A radius with its true one.
-struct Judged {
-    error: f64,
+struct JudgedRadius {
+    judged: Judged,
     is_right: bool,
-    /// Half the interval; `None` where it is not determined.
-    half_width: Option<f64>,
 }
 
 /// Of the tolerance: the same curve is much nearer, its neighbour may be within.
@@ -26,7 +25,7 @@ const SHARES: [f64; 3] = [0.1, 0.5, 1.0];
 /// All true arcs by kind of scene and share of the tolerance: `None` where none was found.
 #[derive(Default)]
 pub struct Radii {
-    judged: BTreeMap<(String, usize), Vec<Option<Judged>>>,
+    judged: BTreeMap<(String, usize), Vec<Option<JudgedRadius>>>,
 }
 
 impl Radii {
@@ -49,10 +48,12 @@ impl Radii {
                 };
                 let radius = dimensions.measure(Quantity::Radius { arc })?;
                 let error = (radius.value - true_arc.radius).abs();
-                judged.push(Some(Judged {
-                    error,
+                judged.push(Some(JudgedRadius {
+                    judged: Judged {
+                        error,
+                        half_width: radius.interval.map(|[low, high]| 0.5 * (high - low)),
+                    },
                     is_right: error <= RIGHT * true_arc.radius,
-                    half_width: radius.interval.map(|[low, high]| 0.5 * (high - low)),
                 }));
             }
         }
@@ -64,26 +65,20 @@ impl Radii {
         if self.judged.is_empty() {
             return String::new();
         }
-        let mut text = String::from(
-            "\n| scenes | tolerance | true arcs | found | radius within 1 % | not determined | held | median error | median half interval |\n\
-             | --- | --: | --: | --: | --: | --: | --: | --: | --: |\n",
+        let [heads, line] = Summary::HEADS;
+        let mut text = format!(
+            "\n| scenes | tolerance | true arcs | found | radius within 1 % | {heads}\n\
+             | --- | --: | --: | --: | --: | {line}\n"
         );
         for ((kind, share), judged) in &self.judged {
-            let found: Vec<&Judged> = judged.iter().flatten().collect();
-            let sure: Vec<(f64, f64)> = (found.iter())
-                .filter_map(|j| Some((j.error, j.half_width?)))
-                .collect();
-            let held = sure.iter().filter(|(error, half)| error <= half).count();
+            let found = judged.iter().flatten();
             text += &format!(
-                "| {kind} | {} | {} | {} | {} | {} | {:.3} | {:.6} | {:.6} |\n",
+                "| {kind} | {} | {} | {} | {} | {}\n",
                 SHARES[*share],
                 judged.len(),
-                found.len(),
-                found.iter().filter(|judged| judged.is_right).count(),
-                found.len() - sure.len(),
-                held as f64 / sure.len() as f64,
-                super::coverage::median(sure.iter().map(|(error, _)| *error)),
-                super::coverage::median(sure.iter().map(|(_, half)| *half)),
+                found.clone().count(),
+                found.clone().filter(|radius| radius.is_right).count(),
+                Summary::of(found.map(|radius| &radius.judged)).cells(),
             );
         }
         text

@@ -4,7 +4,7 @@ use super::light::LightProfile;
 use super::profile::Across;
 use super::pursuit::{Columns, one_more, pixels};
 use super::step_fit::fit_steps;
-use super::step_model::{Step, loss, misfit, shift_at};
+use super::step_model::{MAX_STEPS, Step, loss, misfit, shift_at};
 use crate::statistics::upper_median;
 use neat_core::LineSegment3;
 
@@ -13,10 +13,6 @@ const MIN_PROFILES: usize = 8;
 /// A profile shows something where the line is if a step there lowers its misfit by that of
 /// noise.
 const LEAST_SHOWN: f64 = 1.0;
-/// So many steps at most: with one, two and four of them F1 at the least threshold is .419, .476
-/// and .491 for a house (.482), .170, .249 and .274 for a façade (.271), .785, .784 and .764 for a
-/// table (.784).
-const STEPS: usize = 3;
 /// One more step is sought as long as it lowers the loss of a profile by this, in the mean: it
 /// keeps what it explains from drawing the others aside, whatever it is.
 const LEAST_GAIN: f64 = 0.3;
@@ -80,7 +76,7 @@ fn all_steps(profiles: &[&LightProfile], blur: f64) -> Vec<Step> {
     let pixel = upper_median(&mut sizes);
     let columns = Columns::new(blur);
     let (mut steps, mut cost) = fit_steps(profiles, vec![Step::zeros()], blur);
-    while steps.len() < STEPS {
+    while steps.len() < MAX_STEPS {
         match one_more(profiles, &steps, pixel, &columns, blur) {
             Some((more, lower)) if cost - lower > LEAST_GAIN * profiles.len() as f64 => {
                 (steps, cost) = (more, lower);

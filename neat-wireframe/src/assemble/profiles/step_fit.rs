@@ -45,12 +45,11 @@ struct OffsetEquations {
 impl OffsetEquations {
     fn new(profile: &LightProfile, steps: &[Step], blur: f64) -> Self {
         let model = StepModel::new(profile, steps, blur);
-        let derivatives: [[f64; _]; MAX_STEPS] = std::array::from_fn(|k| match steps.get(k) {
-            Some(step) => step_derivative(offset(profile, step), blur),
+        // What of a moving step the others do not make up for; by its height.
+        let changes: [[f64; _]; MAX_STEPS] = std::array::from_fn(|k| match steps.get(k) {
+            Some(step) => model.rest(&step_derivative(offset(profile, step), blur)).0,
             None => [0.0; _],
         });
-        // What of a moving step the others do not make up for; by its height.
-        let changes = derivatives.map(|derivative| model.rest(&derivative).0);
         let mut equations = Self {
             hessian: SMatrix::zeros(),
             gradient: SVector::zeros(),
