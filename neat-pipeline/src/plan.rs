@@ -153,12 +153,21 @@ fn settle_field(
         let reason = "as objects on black have outlines and little texture".to_owned();
         decide("train.dense_points", &false, reason);
     }
+    if let Some(plan) = earlier {
+        // As below: the field was trained with it.
+        config.model.background = plan.config.model.background.clone();
+    } else if trains && is_black && config.model.background.shells > 0 {
+        config.model.background.shells = 0;
+        let reason = "as nothing lies behind objects on black".to_owned();
+        decide("model.background.shells", &0, reason);
+    }
+    let has_shells = config.model.background.shells > 0;
     if config.model.implicit.bounding_sphere_slope == 0.0 {
         let slope = &mut config.model.implicit.bounding_sphere_slope;
         match earlier {
             // The field was trained with it, whatever is said of the background now.
             Some(plan) => *slope = plan.config.model.implicit.bounding_sphere_slope,
-            None if trains && is_photo => {
+            None if trains && is_photo && !has_shells => {
                 *slope = SPHERE_SLOPE;
                 let reason = "as the sphere stands for all that is behind the scene".to_owned();
                 let setting = "model.implicit.bounding_sphere_slope";

@@ -22,6 +22,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod background;
 pub mod density;
 pub mod device_sampler;
 pub mod implicit_network;
@@ -30,6 +31,7 @@ pub mod ray_sampler;
 pub mod rendering_network;
 pub mod volume_rendering;
 
+pub use background::{BackgroundConfig, BackgroundNetwork};
 pub use density::{DensityConfig, LaplaceDensity};
 pub use implicit_network::{Distances, ImplicitNetwork, ImplicitNetworkConfig, ImplicitOutput};
 pub use ray_sampler::{DeviceSamples, RayBundle, RaySampler, RaySamplerConfig, RaySamples};

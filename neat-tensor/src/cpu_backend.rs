@@ -10,6 +10,7 @@ use crate::neat_backend::{
     AdamNumbers, DistanceNetwork, Field, FieldQuery, NeatBackend, SampleInputs,
 };
 use burn::tensor::{Device, Tensor, TensorData};
+use rayon::prelude::*;
 
 /// burn's CPU backends, in float32: whole networks as single operations, and one pass
 /// over memory for the optimiser.
@@ -113,12 +114,21 @@ impl NeatBackend for Cpu {
         let [beta1, beta2] = [numbers.beta1, numbers.beta2].map(|beta| beta as f32);
         let [rest1, rest2] = [numbers.beta1, numbers.beta2].map(|beta| (1.0 - beta) as f32);
         let (rate, epsilon) = (numbers.rate as f32, numbers.epsilon as f32);
-        let moments = first.iter_mut().zip(&mut second);
-        for ((value, g), (m, v)) in value.iter_mut().zip(host(gradient)).zip(moments) {
-            *m = g * rest1 + *m * beta1;
-            *v = g * g * rest2 + *v * beta2;
-            *value -= *m / (v.sqrt() + epsilon) * rate;
-        }
+        // Tables of grids have millions of numbers.
+        let moments = (first.par_chunks_mut(ADAM_CHUNK)).zip(second.par_chunks_mut(ADAM_CHUNK));
+        let gradient = host(gradient);
+        (value
+            .par_chunks_mut(ADAM_CHUNK)
+            .zip(gradient.par_chunks(ADAM_CHUNK))
+            .zip(moments))
+        .for_each(|((value, gradient), (first, second))| {
+            let moments = first.iter_mut().zip(second);
+            for ((value, g), (m, v)) in value.iter_mut().zip(gradient).zip(moments) {
+                *m = g * rest1 + *m * beta1;
+                *v = g * g * rest2 + *v * beta2;
+                *value -= *m / (v.sqrt() + epsilon) * rate;
+            }
+        });
         let tensor = |values| vector(values, &device);
         (tensor(value), [tensor(first), tensor(second)])
     }
@@ -136,6 +146,9 @@ impl DistanceNetwork<'_> {
         }
     }
 }
+
+/// Numbers that one task of Adam moves.
+const ADAM_CHUNK: usize = 1 << 15;
 
 fn vector(values: Vec<f32>, device: &Device) -> Tensor<1> {
     let len = values.len();

@@ -23,6 +23,8 @@ pub struct StepRows {
     pub segment: usize,
     /// Points of the eikonal term besides rendered samples.
     pub eikonal: usize,
+    /// Points of shells outside the scene ball.
+    pub background: usize,
 }
 
 impl std::ops::AddAssign for StepRows {
@@ -32,6 +34,7 @@ impl std::ops::AddAssign for StepRows {
         self.full += other.full;
         self.segment += other.segment;
         self.eikonal += other.eikonal;
+        self.background += other.background;
     }
 }
 
@@ -44,6 +47,7 @@ impl StepRows {
             full: self.full / steps,
             segment: self.segment / steps,
             eikonal: self.eikonal / steps,
+            background: self.background / steps,
         }
     }
 }
@@ -95,6 +99,11 @@ impl StepFlops {
         let distance = product(hidden + implicit.width) + interpolated;
         let features = product(implicit.width * implicit.features);
         let sweep = product(hidden) + 3.0 * interpolated;
+        let outside = &model.background;
+        let deep = outside.hidden_layers.saturating_sub(1) * outside.width * outside.width;
+        let first = (3 + outside.encoding.width()) * outside.width;
+        let light = product(first + deep + 4 * outside.width);
+        let light_interpolated = interpolation(outside.encoding.width());
         // First layers alone pass a gradient to part of their inputs: to gradients,
         // features and grids, which then pass it to their table.
         let perceptron = |rays: usize, grid: usize, width: usize, layers: usize, out: usize| {
@@ -135,11 +144,13 @@ impl StepFlops {
             forward: of(rows.samples, distance)
                 + of(rows.full, features + sweep + radiance.0)
                 + of(rows.segment, attraction.0)
-                + of(rows.eikonal, distance + sweep),
+                + of(rows.eikonal, distance + sweep)
+                + of(rows.background, light + light_interpolated),
             backward: of(rows.samples, 2.0 * distance - to_points)
                 + of(rows.full, 2.0 * features + 2.0 * sweep + radiance.1)
                 + of(rows.segment, attraction.1)
-                + of(rows.eikonal, 2.0 * sweep + 2.0 * distance - to_points),
+                + of(rows.eikonal, 2.0 * sweep + 2.0 * distance - to_points)
+                + of(rows.background, 2.0 * light + light_interpolated),
         }
     }
 }
@@ -156,7 +167,7 @@ mod tests {
             samples: 1,
             full: 1,
             segment: 1,
-            eikonal: 0,
+            ..StepRows::default()
         };
         let flops = StepFlops::count(&ModelConfig::default(), &rows);
         // About 1 MFLOP a distance, 9.5 MFLOP for everything else of a sample.

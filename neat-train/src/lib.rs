@@ -29,6 +29,7 @@ mod field;
 pub mod flops;
 pub mod losses;
 pub mod model;
+mod selection;
 mod step;
 pub mod step_log;
 mod surface_points;

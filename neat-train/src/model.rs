@@ -1,23 +1,21 @@
 //! All networks of NEAT together, and the rendering of rays with them.
 
+use crate::selection::{Selection, select};
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use neat_field::{AttractionNetwork, AttractionNetworkConfig};
 use neat_gjp::{JunctionPerceiver, PerceiverConfig};
 use neat_sdf::density::laplace_density;
-use neat_sdf::volume_rendering::{
-    integrate, integrate_selected, rendering_weights, rendering_weights_on_host,
-};
+use neat_sdf::volume_rendering::{integrate, integrate_selected, rendering_weights};
 use neat_sdf::{
-    DensityConfig, DeviceSamples, Distances, ImplicitNetwork, ImplicitNetworkConfig,
-    ImplicitOutput, LaplaceDensity, RayBundle, RaySamples, RenderingNetwork,
+    BackgroundConfig, BackgroundNetwork, DensityConfig, DeviceSamples, Distances, ImplicitNetwork,
+    ImplicitNetworkConfig, ImplicitOutput, LaplaceDensity, RayBundle, RaySamples, RenderingNetwork,
     RenderingNetworkConfig,
 };
 use neat_tensor::host::{constant_on, host_vec, index_tensor, point_tensor};
 use neat_tensor::random::{Purpose, stream};
-use neat_tensor::{Kernels, KnownRows, NetworkSizeError};
+use neat_tensor::{Kernels, NetworkSizeError};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// The networks; by default as published for ABC.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -33,6 +31,9 @@ pub struct ModelConfig {
     pub density: DensityConfig,
     /// Global junctions.
     pub perceiver: PerceiverConfig,
+    /// Outside of the scene ball.
+    #[serde(default)]
+    pub background: BackgroundConfig,
 }
 
 /// Signed distance, radiance, attraction field, density scale and junctions.
@@ -48,6 +49,8 @@ pub struct NeatModel {
     pub density: LaplaceDensity,
     /// Global junctions.
     pub perceiver: JunctionPerceiver,
+    /// Light from outside the scene ball, if any.
+    pub background_network: Option<BackgroundNetwork>,
 }
 
 impl NeatModel {
@@ -74,6 +77,7 @@ impl NeatModel {
             )?,
             density: config.density.init(device),
             perceiver: config.perceiver.init(&mut rng, device)?,
+            background_network: config.background.init(scene_radius, &mut rng, device)?,
         };
         Ok(model.with_kernels(Kernels::default()))
     }
@@ -83,6 +87,9 @@ impl NeatModel {
         self.rendering_network.mlp.kernels = kernels.clone();
         self.attraction_network.mlp.kernels = kernels.clone();
         self.perceiver.decoder.kernels = kernels.clone();
+        if let Some(background) = &mut self.background_network {
+            background.mlp.kernels = kernels.clone();
+        }
         self.implicit_network.mlp.kernels = kernels;
         self
     }
@@ -155,6 +162,8 @@ pub struct Rendering {
     pub counts: Option<Tensor<2>>,
     /// How many samples the segments were rendered from.
     pub segment_samples: usize,
+    /// How many points of shells outside the ball were evaluated.
+    pub background_points: usize,
 }
 
 impl NeatModel {
@@ -192,7 +201,9 @@ impl NeatModel {
             None => self
                 .implicit_network
                 .evaluate_rows(point_tensor(&points, device), 0, None),
-            Some(Selection { full, order, known }) => {
+            Some(Selection {
+                full, order, known, ..
+            }) => {
                 let ordered: Vec<[f32; 3]> = order.iter().map(|i| points[*i as usize]).collect();
                 let (sdf, output) = self.implicit_network.evaluate_rows(
                     point_tensor(&ordered, device),
@@ -215,7 +226,7 @@ impl NeatModel {
         let weights = rendering_weights(density, deltas);
 
         // From here on only full samples; they are in the order of their rays.
-        let full = selection.map(|selection| selection.full);
+        let (full, open) = selection.map(|s| (s.full, s.open)).unzip();
         let evaluated = full.as_ref().map_or(total, Vec::len);
         let index = |i: usize| full.as_ref().map_or(i, |full| full[i] as usize);
         let ray_columns = ray_columns(rays, &points, (0..evaluated).map(index), per_ray, device);
@@ -243,6 +254,7 @@ impl NeatModel {
             output,
             weights,
             segment_rows,
+            open,
         };
         Rendering {
             evaluated: full.clone(),
@@ -279,6 +291,7 @@ impl NeatModel {
             output,
             weights,
             segment_rows: request.segment_rays * per_ray,
+            open: None,
         };
         let rendering = self.integrals(request, evaluated, integral, device);
         Rendering {
@@ -300,15 +313,24 @@ impl NeatModel {
             output,
             weights,
             segment_rows,
+            open,
         } = evaluated;
         let gradients = output.gradient;
+        let opacity = weights.clone().sum_dim(1);
+        let mut background_points = 0;
         let color = request.color.then(|| {
             let color = self.rendering_network.forward(
                 ray_columns.clone(),
                 gradients.clone(),
                 output.features.clone(),
             );
-            integral(color, weights.clone(), request.rays.len())
+            let color = integral(color, weights.clone(), request.rays.len());
+            let Some(background) = &self.background_network else {
+                return color;
+            };
+            let open = open.unwrap_or_else(|| (0..request.rays.len()).collect());
+            background_points = open.len() * background.shells;
+            background.behind(color, opacity.clone(), request.rays, &open, device)
         });
         let segments = (request.segment_rays > 0).then(|| {
             if segment_rows == 0 {
@@ -329,7 +351,7 @@ impl NeatModel {
             integral(ends, weights.clone().detach(), request.segment_rays)
         });
         Rendering {
-            opacity: weights.clone().sum_dim(1),
+            opacity,
             weights,
             color,
             segments,
@@ -338,6 +360,7 @@ impl NeatModel {
             evaluated: None,
             counts: None,
             segment_samples: segment_rows,
+            background_points,
         }
     }
 }
@@ -351,49 +374,8 @@ struct Evaluated {
     weights: Tensor<2>,
     /// So many first samples belong to rays that carry a segment.
     segment_rows: usize,
-}
-
-/// Samples heavier than `min_weight`; never none (the heaviest stays), so that no
-/// tensor is empty.
-fn select(
-    samples: &RaySamples,
-    network: &Distances,
-    beta: f32,
-    points: &[[f32; 3]],
-    min_weight: f64,
-) -> Selection {
-    let (mut distances, pass) = network.pass(points);
-    network.cap(points, &mut distances);
-    let weights = rendering_weights_on_host(&distances, samples, beta);
-    let samples = 0..weights.len() as u32;
-    let weight = |i: u32| weights[i as usize];
-    let (mut full, mut light): (Vec<u32>, Vec<u32>) = samples
-        .clone()
-        .partition(|i| weight(*i) > min_weight as f32);
-    if full.is_empty() {
-        let heaviest = samples.max_by(|a, b| weight(*a).total_cmp(&weight(*b)));
-        full = heaviest.into_iter().collect();
-        light.retain(|i| Some(*i) != heaviest);
-    }
-    let order: Arc<[u32]> = full.iter().chain(&light).copied().collect();
-    Selection {
-        full,
-        known: pass.map(|pass| KnownRows {
-            pass,
-            rows: Arc::clone(&order),
-        }),
-        order,
-    }
-}
-
-/// Which samples all networks are evaluated at.
-struct Selection {
-    /// Their indices, ascending.
-    full: Vec<u32>,
-    /// All indices: those of `full`, then the others.
-    order: Arc<[u32]>,
-    /// What the pass that told the weights knows of the samples in that order.
-    known: Option<KnownRows>,
+    /// Rays that light from outside the ball comes along; `None` where it is all.
+    open: Option<Vec<usize>>,
 }
 
 /// Point and viewing direction `[N, 6]` of the samples `indices`.

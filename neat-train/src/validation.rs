@@ -1,6 +1,6 @@
 //! Configurations that contradict themselves.
 
-use crate::config::{BatchViews, TrainingConfig};
+use crate::config::{BatchViews, ModelConfig, TrainingConfig};
 use crate::error::TrainError;
 use neat_sdf::RaySamplerConfig;
 
@@ -29,6 +29,7 @@ impl TrainingConfig {
         implicit.validate()?;
         self.model.rendering.encoding.validate()?;
         self.model.attraction.encoding.validate()?;
+        self.model.background.encoding.validate()?;
         if implicit.octaves > 24 || self.model.attraction.octaves > 24 {
             return refuse("more than 24 octaves exceed what float32 resolves");
         }
@@ -55,6 +56,9 @@ impl TrainingConfig {
             return refuse("train.checkpoint_seconds must be positive");
         }
         self.model.perceiver.validate()?;
+        if self.model.background.shells == 1 {
+            return refuse("model.background.shells must be 0, or 2 and more");
+        }
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let density = &self.model.density;
         if !positive(density.initial_beta) || !positive(density.final_beta) {
@@ -119,28 +123,26 @@ fn sizes(config: &TrainingConfig) -> Vec<(&'static str, usize, usize)> {
     let uniform_points = train.eikonal.uniform_points.unwrap_or(0);
     let junctions = model.perceiver.junctions.fixed().unwrap_or(0);
     let (implicit, rendering, attraction) = (&model.implicit, &model.rendering, &model.attraction);
-    vec![
+    let background = &model.background;
+    let mut sizes = grid_sizes(model).to_vec();
+    sizes.extend([
         (what, train.rays.saturating_mul(samples.max(1)), MAX_SAMPLES),
+        (
+            "train.rays times model.background.shells",
+            train.rays.saturating_mul(background.shells),
+            MAX_SAMPLES,
+        ),
         ("train.sampler.resolution", resolution, MAX_RESOLUTION),
         ("train.eikonal.uniform_points", uniform_points, MAX_SAMPLES),
         ("train.surface_points", train.surface_points, MAX_SAMPLES),
         ("model.perceiver.junctions", junctions, MAX_JUNCTIONS),
         ("model.perceiver.width", model.perceiver.width, MAX_WIDTH),
         ("model.implicit.width", implicit.width, MAX_WIDTH),
+        ("model.background.width", background.width, MAX_WIDTH),
         (
-            "the size of the grids of model.implicit.encoding",
-            implicit.encoding.parameters(),
-            MAX_GRID_NUMBERS,
-        ),
-        (
-            "the size of the grids of model.rendering.encoding",
-            rendering.encoding.parameters(),
-            MAX_GRID_NUMBERS,
-        ),
-        (
-            "the size of the grids of model.attraction.encoding",
-            attraction.encoding.parameters(),
-            MAX_GRID_NUMBERS,
+            "model.background.hidden_layers",
+            background.hidden_layers,
+            MAX_LAYERS,
         ),
         ("model.implicit.features", implicit.features, MAX_WIDTH),
         (
@@ -160,7 +162,31 @@ fn sizes(config: &TrainingConfig) -> Vec<(&'static str, usize, usize)> {
             attraction.hidden_layers,
             MAX_LAYERS,
         ),
-    ]
+    ]);
+    sizes
+}
+
+/// Numbers that are learned in grids.
+fn grid_sizes(model: &ModelConfig) -> [(&'static str, usize, usize); 4] {
+    let encodings = [
+        (
+            "the size of the grids of model.implicit.encoding",
+            &model.implicit.encoding,
+        ),
+        (
+            "the size of the grids of model.rendering.encoding",
+            &model.rendering.encoding,
+        ),
+        (
+            "the size of the grids of model.attraction.encoding",
+            &model.attraction.encoding,
+        ),
+        (
+            "the size of the grids of model.background.encoding",
+            &model.background.encoding,
+        ),
+    ];
+    encodings.map(|(name, encoding)| (name, encoding.parameters(), MAX_GRID_NUMBERS))
 }
 
 #[cfg(test)]
@@ -247,9 +273,10 @@ mod tests {
             features: 3,
             ..GridConfig::default()
         });
-        let changes: [fn(&mut TrainingConfig, PointEncoding); 2] = [
+        let changes: [fn(&mut TrainingConfig, PointEncoding); 3] = [
             |config, odd| config.model.rendering.encoding = odd,
             |config, odd| config.model.attraction.encoding = odd,
+            |config, odd| config.model.background.encoding = odd,
         ];
         for change in changes {
             let refused = refusal(|config| change(config, odd.clone()));

@@ -69,6 +69,7 @@ pub fn rows_of_step(train: &TrainConfig) -> StepRows {
         full,
         segment: ((1.0 - train.background_share) * full as f64) as usize,
         eikonal: own_points + on_rays,
+        background: 0,
     }
 }
 

@@ -89,6 +89,21 @@ fn a_field_of_photographs_gets_a_sphere_behind_them() {
 }
 
 #[test]
+fn shells_stand_behind_photographs_in_place_of_the_sphere() {
+    let mut asked = with_field();
+    asked.model.background.shells = 4;
+    let (plan, decisions) = settled(&asked, &photographs());
+    assert_eq!(plan.config().model, asked.model);
+    assert_eq!(decisions, ["data.background", "train.loss.mask"]);
+    let (on_black, decisions) = settled(&asked, &black());
+    assert_eq!(on_black.config().model.background.shells, 0);
+    assert_eq!(decisions, ["data.background", "model.background.shells"]);
+    // What was trained stays.
+    let (later, _) = settle(&asked, &black(), MACHINE, Some(&plan)).unwrap();
+    assert_eq!(later.config().model, plan.config().model);
+}
+
+#[test]
 fn what_is_given_or_decided_stays() {
     let (plan, _) = settled(&with_field(), &photographs());
     // As a person has it who leaves nothing open.

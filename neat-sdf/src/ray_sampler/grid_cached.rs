@@ -5,6 +5,7 @@
 //! every few iterations.
 
 use super::inverse_cdf::{cumulate, invert};
+use super::redrawn::Redraw;
 use super::{DistanceQuery, RayBundle, RaySamples, SamplingNoise};
 use neat_tensor::kernels::cpu::density::passed_shares;
 use neat_tensor::sampling::{GRID_FLAT_STEP, MIN_HALF_CHORD_SQUARED, MIN_NEAR};
@@ -29,6 +30,9 @@ pub struct GridCachedConfig {
     pub uniform_samples: usize,
     /// Added to every look-up's weight.
     pub weight_floor: f64,
+    /// Whether samples are drawn once more, by the network's distances at the first ones: the
+    /// grid places them to a cell, which may be wide beside the density's scale.
+    pub redraw: bool,
 }
 
 impl Default for GridCachedConfig {
@@ -41,6 +45,7 @@ impl Default for GridCachedConfig {
             importance_samples: 8,
             uniform_samples: 4,
             weight_floor: 1e-4,
+            redraw: false,
         }
     }
 }
@@ -214,12 +219,42 @@ impl GridCachedConfig {
         rays: &RayBundle,
         beta: f32,
         grid: &DistanceGrid,
+        query: &mut DistanceQuery<'_>,
         noise: &mut impl SamplingNoise,
+    ) -> RaySamples {
+        let per_ray = self.importance_samples + self.uniform_samples;
+        let by_grid = self.lookups + per_ray;
+        let stratum = by_grid + if self.redraw { per_ray } else { 0 };
+        let noise = noise.uniform(rays.len() * stratum);
+        let jitter = |ray: usize, i: usize| noise.as_ref().map_or(0.5, |u| u[ray * stratum + i]);
+        let samples = self.sample_by_grid(rays, beta, grid, jitter);
+        if !self.redraw || rays.is_empty() {
+            return samples;
+        }
+        let redraw = Redraw {
+            sdf: &query(&rays.points(&samples.z, per_ray)),
+            first: &samples,
+            beta,
+            weight_floor: self.weight_floor as f32,
+            drawn: self.importance_samples,
+        };
+        redraw.samples(
+            |ray| chord(rays, ray, grid.radius),
+            |ray, i| jitter(ray, by_grid + i),
+        )
+    }
+
+    /// Samples by the grid alone; `jitter(ray, i)` in [0, 1) says where in its stratum the
+    /// look-up or sample `i` of a ray lies.
+    fn sample_by_grid(
+        &self,
+        rays: &RayBundle,
+        beta: f32,
+        grid: &DistanceGrid,
+        jitter: impl Fn(usize, usize) -> f32 + Sync,
     ) -> RaySamples {
         let (lookups, drawn, even) = (self.lookups, self.importance_samples, self.uniform_samples);
         let per_ray = drawn + even;
-        let stratum = lookups + drawn + even;
-        let noise = noise.uniform(rays.len() * stratum);
         // A density sharper than the grid resolves would miss the surface.
         let beta = beta.max(0.5 * grid.cell());
         let mut far = vec![0.0f32; rays.len()];
@@ -228,7 +263,7 @@ impl GridCachedConfig {
             .zip(far.par_iter_mut())
             .enumerate()
             .for_each_init(Scratch::default, |scratch, (ray, (z, far))| {
-                let jitter = |i: usize| noise.as_ref().map_or(0.5, |u| u[ray * stratum + i]);
+                let jitter = |i: usize| jitter(ray, i);
                 let (near, end) = chord(rays, ray, grid.radius);
                 *far = end;
                 let at = |t: f32| near + (end - near) * t;

@@ -9,6 +9,7 @@ pub(crate) mod error_bound;
 pub(crate) mod grid_cached;
 pub(crate) mod inverse_cdf;
 mod noise;
+mod redrawn;
 mod uniform;
 
 pub use error_bound::{ErrorBoundConfig, ErrorBoundTrace, StopRule};
@@ -188,7 +189,7 @@ impl RaySampler {
     ) -> RaySamples {
         match self {
             Self::ErrorBound(config) => config.sample(rays, beta, query, noise, None),
-            Self::GridCached(config, grid) => config.sample(rays, beta, grid, noise),
+            Self::GridCached(config, grid) => config.sample(rays, beta, grid, query, noise),
             Self::Uniform(config) => config.sample(rays, noise),
         }
     }

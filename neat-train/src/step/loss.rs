@@ -109,6 +109,7 @@ pub(super) fn render(
         full: rendering.evaluated.as_ref().map_or(samples, Vec::len),
         segment: rendering.segment_samples,
         eikonal: input.eikonal_points.len() + eikonal_samples,
+        background: rendering.background_points,
     };
     (rendering, rows)
 }
