@@ -1,15 +1,18 @@
-//! Learned grids in all three networks: trained, continued, and at their own rate.
+//! Learned grids in all networks: trained, continued, and at their own rate.
 
 use neat_core::Scene;
 use neat_core::synthetic::{SyntheticScene, generate};
 use neat_pipeline::config::{Config, Preset};
+use neat_sdf::RaySamplerConfig;
+use neat_sdf::ray_sampler::GridCachedConfig;
 use neat_tensor::checkpoint::Checkpoint;
 use neat_tensor::{GridConfig, Kernels, PointEncoding};
 use neat_tests::backends::on_each_cpu_backend;
 use neat_train::Trainer;
 
-const TABLES: [&str; 3] = [
+const TABLES: [&str; 4] = [
     "model.attraction_network.grid.table",
+    "model.background_network.grid.table",
     "model.implicit_network.mlp.grid.table",
     "model.rendering_network.grid.table",
 ];
@@ -37,6 +40,12 @@ fn with_grids() -> Config {
     config.model.implicit.encoding = grid(1, 8);
     config.model.rendering.encoding = grid(2, 9);
     config.model.attraction.encoding = grid(4, 10);
+    config.model.background.shells = 3;
+    config.model.background.encoding = grid(2, 8);
+    config.train.sampler = RaySamplerConfig::GridCached(GridCachedConfig {
+        redraw: true,
+        ..GridCachedConfig::default()
+    });
     config
 }
 
@@ -125,7 +134,7 @@ fn grids_have_a_rate_of_their_own() {
         };
         let weights = longest("model.attraction_network.mlp.layers.0.weight");
         // The columns of the distance's grids start silent, and their table moves later.
-        ([TABLES[0], TABLES[2]].map(longest), weights)
+        ([TABLES[0], TABLES[1], TABLES[3]].map(longest), weights)
     };
     let (tables, weights) = of_first_step(1.0);
     let (longer, same) = of_first_step(4.0);

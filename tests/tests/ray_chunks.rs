@@ -74,6 +74,7 @@ fn of_the_fast_preset() {
     config.train.rays = 64;
     config.train.eikonal.uniform_points = Some(30);
     config.train.junction_interval = 1;
+    config.model.background.shells = 3;
     check(&config);
 }
 

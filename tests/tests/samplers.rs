@@ -48,6 +48,13 @@ fn samplers() -> Vec<(&'static str, RaySampler)> {
             RaySamplerConfig::GridCached(GridCachedConfig::default()),
         ),
         (
+            "redrawn",
+            RaySamplerConfig::GridCached(GridCachedConfig {
+                redraw: true,
+                ..GridCachedConfig::default()
+            }),
+        ),
+        (
             "uniform",
             RaySamplerConfig::Uniform(UniformConfig::default()),
         ),

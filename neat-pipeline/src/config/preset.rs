@@ -229,6 +229,7 @@ mod tests {
             FieldUse::Trained
         );
         assert!(config.model.attraction.encoding.grid().is_some());
+        assert!(config.model.background.encoding.grid().is_some());
         // And its own back end, if it is asked for that, fits junctions to the images.
         assert!(config.distill.paper.image_refinement.enabled);
         let published = Preset::PaperAbc.config().distill.paper;

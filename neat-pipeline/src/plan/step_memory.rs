@@ -45,10 +45,9 @@ pub fn rows_of_step(train: &TrainConfig) -> StepRows {
         RaySamplerConfig::GridCached(sampler) => {
             let nodes = sampler.resolution.pow(3) / sampler.refresh_stride.max(1);
             let per_step = nodes as f64 / sampler.refresh_interval.max(1) as f64;
-            (
-                sampler.importance_samples + sampler.uniform_samples,
-                per_step as usize,
-            )
+            let per_ray = sampler.importance_samples + sampler.uniform_samples;
+            let first = if sampler.redraw { per_ray } else { 0 };
+            (per_ray, per_step as usize + train.rays * first)
         }
         RaySamplerConfig::Uniform(sampler) => (sampler.samples, 0),
     };
@@ -69,6 +68,7 @@ pub fn rows_of_step(train: &TrainConfig) -> StepRows {
         full,
         segment: ((1.0 - train.background_share) * full as f64) as usize,
         eikonal: own_points + on_rays,
+        // How many rays leave the scene is not known before.
         background: 0,
     }
 }
