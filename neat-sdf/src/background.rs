@@ -175,6 +175,7 @@ pub fn light_of_shells(outputs: Tensor<2>, crossed: Tensor<2>) -> Tensor<2> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use burn::module::Param;
     use neat_tensor::host::host_points;
     use neat_tensor::random::{Purpose, stream};
 
@@ -202,7 +203,7 @@ mod tests {
     #[test]
     fn rays_cross_shells_at_even_inverse_distances() {
         let network = network(2.0);
-        let rays = rays(&[([0.5, 1.0, -5.0], [0.0, 0.6, 0.8])]);
+        let rays = rays(&[([0.5, -2.0, -5.0], [0.0, 0.6, 0.8])]);
         let Crossings { points, crossed } = network.crossings(&rays, 0..1);
         assert_eq!(crossed, [1.0; 4]);
         let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -213,7 +214,7 @@ mod tests {
             // Away from the centre by the scene's radius over the inverse distance, it lies
             // on the ray.
             let [x, y, z] = point.map(|c| c / length * 2.0 / inverse);
-            let along = (y - 1.0) / 0.6;
+            let along = (y + 2.0) / 0.6;
             assert!(along > 0.0, "{point:?}");
             let off = [x - 0.5, z - (along * 0.8 - 5.0)];
             assert!(off.iter().all(|off| off.abs() < 1e-4), "{off:?}");
@@ -236,9 +237,8 @@ mod tests {
         let mut network = network(1.0);
         let bias = [0.3f32, 0.5, -1.0, 2.0];
         let last = network.mlp.layers.last_mut().expect("a layer");
-        let zero = |tensor: &burn::module::Param<Tensor<2>>| tensor.val().zeros_like();
-        last.weight = burn::module::Param::from_tensor(zero(&last.weight));
-        last.bias = burn::module::Param::from_data(bias, &device());
+        last.weight = Some(Param::from_tensor(Tensor::zeros([4, 64], &device())));
+        last.bias = Param::from_data(bias, &device());
         let rays = rays(&[
             ([0.0, 0.0, 1.3], [0.0, 0.0, 1.0]),
             ([0.0, 0.2, 0.0], [1.0, 0.0, 0.0]),

@@ -132,7 +132,8 @@ mod tests {
         let part = 0.2 / PARTS as f32;
         for wall in [0.63, 1.17] {
             for z in redrawn(wall, 0.001, 10) {
-                assert!((z - wall).abs() < 1.1 * part, "{z} for {wall}");
+                // In the part whose middle is the first behind the surface, or the one before.
+                assert!((z - wall).abs() < 1.5 * part, "{z} for {wall}");
             }
         }
     }
