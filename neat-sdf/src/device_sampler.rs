@@ -241,10 +241,12 @@ impl DeviceGrid {
 }
 
 impl GridCachedConfig {
-    /// Whether a GPU can sample so many rays so: there are two nodes to look between,
+    /// Whether a GPU can sample so many rays so: nothing is drawn once more, for which there
+    /// is no kernel, there are two nodes to look between,
     /// and no tensor is empty.
     pub fn runs_on_device(&self, grid: &DistanceGrid, rays: usize) -> bool {
-        grid.resolution() >= 2
+        !self.redraw
+            && grid.resolution() >= 2
             && self.lookups >= 1
             && self.importance_samples + self.uniform_samples >= 1
             && (1..=MAX_RAYS).contains(&rays)
