@@ -84,7 +84,7 @@ use line_continuation::continue_lines;
 use line_selection::{Selection, select_lines, sure_lines};
 use neat_core::{CircularArc, EdgelMap, LineSegment2};
 use pose_fitting::fit_poses;
-use profiles::place_lines;
+use profiles::place_curves;
 use progress::part;
 use rayon::prelude::*;
 use slab_ends::close_slabs;
@@ -204,16 +204,25 @@ pub fn assemble_with_progress(
     report.lines = selection.lines.len();
     report.curved_lines = selection.curved;
     report.outlines = selection.outlines;
-    let arcs = find_arcs(
+    let mut arcs = find_arcs(
         &selection,
         config,
         &mut part(progress, [SELECTED, FOLLOWED]),
     )?;
     report.arcs = arcs.len();
-    let covariance = |arc: &FoundArc| selection.images.covariance_of_arc(arc);
-    let arc_covariances: Vec<_> = arcs.iter().map(covariance).collect();
+    let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
-    let wireframe = graph_of(selection, photographs, config, &mut report, progress)?;
+    let wireframe = graph_of(
+        selection,
+        &mut arcs,
+        photographs,
+        config,
+        &mut report,
+        progress,
+    )?;
+    let covariance =
+        |found: &FoundArc| (found.covariance).or_else(|| images.covariance_of_arc(found));
+    let arc_covariances: Vec<_> = arcs.iter().map(covariance).collect();
     let wireframe = wireframe.map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
     report.edges = wireframe.edges.len();
@@ -282,6 +291,7 @@ fn proposals(
 /// From lines to a graph: merged, continued, joined at corners, completed, cut and fitted.
 fn graph_of(
     mut selection: Selection<'_>,
+    arcs: &mut [FoundArc],
     photographs: Option<Photographs<'_>>,
     config: &AssembleConfig,
     report: &mut AssembleReport,
@@ -298,7 +308,7 @@ fn graph_of(
     report.merged_pieces = report.lines - lines.len();
     if let Some(photographs) = photographs {
         let progress = &mut part(progress, [CONTINUED, PLACED]);
-        place_lines(&images, photographs, &mut lines, progress)?;
+        place_curves(&images, photographs, &mut lines, arcs, progress)?;
     }
     progress(PLACED)?;
     let mut corners = find_corners(&images, &lines);
