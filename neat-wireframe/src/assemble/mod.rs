@@ -82,6 +82,7 @@ use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Alternatives, Scoring, score_hypotheses};
 use line_continuation::continue_lines;
 use line_selection::{Selection, select_lines, sure_lines};
+use nalgebra::Matrix4;
 use neat_core::{CircularArc, EdgelMap, LineSegment2};
 use pose_fitting::fit_poses;
 use profiles::place_curves;
@@ -204,7 +205,7 @@ pub fn assemble_with_progress(
     report.lines = selection.lines.len();
     report.curved_lines = selection.curved;
     report.outlines = selection.outlines;
-    let mut arcs = find_arcs(
+    let arcs = &mut find_arcs(
         &selection,
         config,
         &mut part(progress, [SELECTED, FOLLOWED]),
@@ -212,17 +213,8 @@ pub fn assemble_with_progress(
     report.arcs = arcs.len();
     let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
-    let wireframe = graph_of(
-        selection,
-        &mut arcs,
-        photographs,
-        config,
-        &mut report,
-        progress,
-    )?;
-    let covariance =
-        |found: &FoundArc| (found.covariance).or_else(|| images.covariance_of_arc(found));
-    let arc_covariances: Vec<_> = arcs.iter().map(covariance).collect();
+    let wireframe = graph_of(selection, arcs, photographs, config, &mut report, progress)?;
+    let arc_covariances = covariances_of_arcs(&images, arcs, scene_radius);
     let wireframe = wireframe.map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
     report.edges = wireframe.edges.len();
@@ -230,10 +222,8 @@ pub fn assemble_with_progress(
     let refined_cameras = poses.map(|poses| poses.cameras(scene_radius));
     ControlFlow::Continue(Assembled {
         wireframe,
-        arcs: scaled_arcs(&arcs, scene_radius),
-        arc_covariances: (arc_covariances.into_iter())
-            .map(|covariance| Some(covariance? * scene_radius.powi(2)))
-            .collect(),
+        arcs: scaled_arcs(arcs, scene_radius),
+        arc_covariances,
         report,
         refined_cameras,
     })
@@ -262,6 +252,19 @@ fn counted(
 fn scaled_arcs(arcs: &[FoundArc], factor: f64) -> Vec<CircularArc> {
     let scaled = |found: &FoundArc| found.arc.map(|point| point * factor);
     arcs.iter().map(scaled).collect()
+}
+
+/// Of centre and radius: by profiles where these have placed an arc, else by edgels.
+fn covariances_of_arcs(
+    images: &Images,
+    arcs: &[FoundArc],
+    scene_radius: f64,
+) -> Vec<Option<Matrix4<f64>>> {
+    let covariance = |found: &FoundArc| {
+        let by_edgels = || images.covariance_of_arc(found);
+        Some(found.covariance.or_else(by_edgels)? * scene_radius.powi(2))
+    };
+    arcs.iter().map(covariance).collect()
 }
 
 /// The views in a world whose scene ball is the unit ball.
