@@ -15,12 +15,16 @@ use std::f64::consts::TAU;
 /// hundredth from the mean.
 const PARTS_OF_CIRCLE: f64 = 16.0;
 
+/// So far, in pixels, an arc may come to lie from where its Jacobian has it.
+const MAX_OFF: f64 = 0.1;
+
 /// An arc that shifts outward and along its axis, by a similarity about its centroid: three numbers
 /// move that, one lets the radius grow, and two turn the arc around both axes (times the radius).
 /// About the circle's centre, far from a short arc, they would be much the same. Places are angles.
 pub(super) struct Circular {
     arc: CircularArc,
     centroid: Vector3<f64>,
+    pixel: f64,
     sectors: Vec<Shown>,
 }
 
@@ -38,6 +42,7 @@ impl Circular {
         Self {
             arc: *arc,
             centroid: arc.center + middle * (arc.radius * half.sin() / half),
+            pixel: found.pixel,
             sectors: (found.sectors.iter())
                 .map(|sector| Shown {
                     until: sector.angles[1],
@@ -47,16 +52,33 @@ impl Circular {
         }
     }
 
-    /// The arc after a step, which ends where it has ended.
-    pub(super) fn moved(&self, step: &Step<6>) -> CircularArc {
-        let mut moved = self.similar(step);
-        if !self.arc.is_closed() {
-            moved.angles = self.arc.angles.map(|angle| {
-                let beside = moved.angle_of(&self.arc.point_at(angle)) - angle;
-                angle + (beside + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU
-            });
+    /// The arc after a step, which ends where it has ended; `None` if the Jacobian does not hold so
+    /// far: a bend within a pixel may turn to any side.
+    pub(super) fn moved(&self, step: &Step<6>) -> Option<CircularArc> {
+        let similar = self.similar(step);
+        let off = |angle: f64| {
+            let point = self.arc.point_at(angle);
+            let expected = point + self.by_step(&point) * step;
+            (similar.point_at(angle) - expected).norm()
+        };
+        if self
+            .ends()
+            .into_iter()
+            .any(|end| off(end) > MAX_OFF * self.pixel)
+        {
+            return None;
         }
-        moved
+        if similar.is_closed() {
+            return Some(similar);
+        }
+        let angles = self.arc.angles.map(|angle| {
+            let beside = similar.angle_of(&self.arc.point_at(angle)) - angle;
+            angle + (beside + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU
+        });
+        // Ends of nearly a whole circle may pass each other.
+        let moved = CircularArc { angles, ..similar };
+        let moved = if moved.is_valid() { moved } else { similar };
+        moved.is_valid().then_some(moved)
     }
 
     /// The arc under the similarity of a step.
@@ -241,7 +263,7 @@ mod tests {
             let mut of_step = Matrix6::zeros();
             of_step[(k, k)] = 1.0;
             let of_arc = circular.covariance(&of_step);
-            let [low, high] = [-1e-5, 1e-5].map(|change| circular.moved(&Step::ith(k, change)));
+            let [low, high] = [-1e-5, 1e-5].map(|change| circular.similar(&Step::ith(k, change)));
             let center = (high.center - low.center) / 2e-5;
             let radius = (high.radius - low.radius) / 2e-5;
             let expected = center.push(radius);
@@ -253,11 +275,31 @@ mod tests {
     #[test]
     fn a_moved_arc_ends_where_it_did() {
         let circular = circular(0.7);
-        let moved = circular.moved(&Step::from([0.001, -0.002, 0.001, 0.03, 0.002, -0.001]));
+        let step = Step::from([0.001, -0.002, 0.001, 0.03, 0.002, -0.001]);
+        let moved = circular.moved(&step).unwrap();
         assert!((moved.radius - 0.33).abs() < 1e-12);
         for (new, old) in moved.angles.iter().zip(circular.arc.angles) {
             let apart = moved.point_at(*new) - circular.arc.point_at(old);
             assert!(apart.dot(&moved.tangent_at(*new)).abs() < 1e-9, "{apart}");
+        }
+    }
+
+    #[test]
+    fn an_arc_does_not_turn_to_another_side() {
+        let circular = circular(0.5);
+        assert!(circular.moved(&Step::ith(4, 0.01)).is_some());
+        assert!(circular.moved(&Step::ith(4, 0.3)).is_none());
+    }
+
+    #[test]
+    fn an_arc_of_nearly_a_circle_stays_an_arc() {
+        let circular = circular(TAU - 1e-4);
+        for shift in [-0.002, 0.002] {
+            let middle = circular.arc.tangent_at(circular.arc.angles[0]);
+            let step = shift * middle;
+            let step = Step::from([step.x, step.y, step.z, 0.01, 0.0, 0.0]);
+            let moved = circular.moved(&step).unwrap();
+            assert!(moved.is_valid(), "{moved:?}");
         }
     }
 

@@ -11,10 +11,11 @@ pub(super) struct PlacedArc(Option<(CircularArc, Option<Matrix4<f64>>)>);
 
 impl PlacedArc {
     pub(super) fn new(circular: &Circular, bundle: &Bundle<'_, 6>) -> Self {
-        Self(bundle.own.map(|step| {
+        let moved = bundle.own.and_then(|step| circular.moved(&step));
+        Self(moved.map(|arc| {
             let covariance = bundle.covariance();
             let of_arc = covariance.map(|covariance| circular.covariance(&covariance));
-            (circular.moved(&step), of_arc)
+            (arc, of_arc)
         }))
     }
 }
