@@ -1,4 +1,5 @@
-//! How sure the centre and the radius of an arc are: by leaving out one view after the other.
+//! How sure the centre and the radius of an arc are that no profiles place: by leaving out one view
+//! after the other.
 //!
 //! Edgels along an arc are no witnesses of their own. What is off in a view, its pose, its light,
 //! its focus, is off for all of them. Views are: how the circle would move without each of them
@@ -8,17 +9,25 @@ use super::circle_fitting::FoundArc;
 use super::curve_samples::SPACING;
 use super::edge_samples::Images;
 use super::line_fitting::loss_of_reach;
-use nalgebra::{Matrix4, Matrix6, RowVector3, SMatrix, Vector6};
+use crate::solve::{NormalEquations, jackknife};
+use nalgebra::{DMatrix, DVector, Matrix4, Matrix6, RowVector3, SMatrix, Vector6};
 use neat_core::CircularArc;
 use rayon::prelude::*;
 
 /// Fewer views do not tell how they differ, judged.
-const MIN_VIEWS: usize = 4;
+pub(super) const MIN_VIEWS: usize = 4;
 /// What all views have in common they do not tell: shading beside an edge, rendering and smoothing
-/// move it a little along a stretch, in pixels.
-const SHARED_ERROR: f64 = 0.05;
+/// move it a little along a stretch, in pixels. So do interpolation, and values that are taken for
+/// light, where profiles place an arc: with half of it intervals of radii of parts hold .90 and .86
+/// instead of .96 and .91.
+pub(super) const SHARED_ERROR: f64 = 0.05;
 /// It may be one all along an arc, tilted or bent: as many polynomials.
-const SHAPES: usize = 3;
+pub(super) const SHAPES: usize = 3;
+
+/// These polynomials at a place along an arc, which reaches from -1 to 1.
+pub(super) fn shapes(along: f64) -> [f64; SHAPES] {
+    [1.0, along, 0.5 * (3.0 * along * along - 1.0)]
+}
 
 /// What the edgels of one view ask of a circle: the normal equations of its parameters, and how
 /// each shape of an error, one pixel large, would change the right side.
@@ -34,25 +43,15 @@ impl Images<'_> {
     pub(super) fn covariance_of_arc(&self, found: &FoundArc) -> Option<Matrix4<f64>> {
         let asked = self.asked_by_views(found)?;
         let matrix: Matrix6<f64> = asked.iter().map(|view| view.matrix).sum();
-        let right: Vector6<f64> = asked.iter().map(|view| view.right).sum();
-        let without: Vec<Vector6<f64>> = (asked.iter())
-            .map(|view| {
-                Some(
-                    (matrix - view.matrix)
-                        .cholesky()?
-                        .solve(&(right - view.right)),
-                )
+        let views: Vec<NormalEquations> = (asked.iter())
+            .map(|view| NormalEquations {
+                matrix: DMatrix::from_iterator(6, 6, view.matrix.iter().copied()),
+                right: DVector::from_iterator(6, view.right.iter().copied()),
             })
-            .collect::<Option<_>>()?;
-        let count = without.len() as f64;
-        let mean = without.iter().sum::<Vector6<f64>>() / count;
-        let spread: Matrix6<f64> = (without.iter().map(|moved| moved - mean))
-            .map(|off| off * off.transpose())
-            .sum();
+            .collect();
         let shared: SMatrix<f64, 6, SHAPES> = asked.iter().map(|view| view.shared).sum();
         let moved = matrix.cholesky()?.solve(&shared) * SHARED_ERROR;
-        let covariance =
-            spread * ((count - 1.0) / count) + moved * moved.transpose() / SHAPES as f64;
+        let covariance = jackknife(&views)? + moved * moved.transpose() / SHAPES as f64;
         (covariance.iter().all(|x| x.is_finite()))
             .then(|| covariance.fixed_view::<4, 4>(0, 0).into_owned())
     }
@@ -79,7 +78,7 @@ impl Images<'_> {
         let loss = loss_of_reach(self.reach);
         let samples = self.samples_of_sector(view, arc, part, SPACING);
         let along = (part[0] + part[1] - arc.angles[0] - arc.angles[1]) / arc.sweep();
-        let shapes = [1.0, along, 0.5 * (3.0 * along * along - 1.0)];
+        let shapes = RowVector3::from(shapes(along));
         for (row, value) in
             self.rows_of_samples(arc, view, &samples.unwrap_or_default(), self.reach)
         {
@@ -93,7 +92,7 @@ impl Images<'_> {
             });
             asked.matrix += weight * row * row.transpose();
             asked.right += weight * value * row;
-            asked.shared += outward * row * RowVector3::from(shapes);
+            asked.shared += outward * row * shapes;
         }
     }
 }

@@ -11,7 +11,7 @@ use super::line_extent::{best_stretch, gain_of_sample};
 use super::line_fitting::change_by_edgels;
 use super::line_selection::{CLAIM_DENSITY, take_beside};
 use crate::statistics::upper_median;
-use nalgebra::{SVector, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Matrix4, SVector, Unit, UnitQuaternion, Vector3};
 use neat_core::CircularArc;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -45,6 +45,10 @@ pub(super) struct FoundArc {
     pub gain: f64,
     /// The size of a pixel.
     pub pixel: f64,
+    /// Its sectors, one after the other.
+    pub sectors: Vec<Sector>,
+    /// The covariance of its centre and radius, where profiles tell.
+    pub covariance: Option<Matrix4<f64>>,
 }
 
 /// How the distance of an edgel from an arc changes with the circle's centre, its radius and its
@@ -52,6 +56,7 @@ pub(super) struct FoundArc {
 type Row = (SVector<f64, 6>, f64);
 
 /// A part of an arc, and what the images say about it.
+#[derive(Clone, Debug)]
 pub(super) struct Sector {
     pub angles: [f64; 2],
     pub evidence: LineEvidence,
@@ -115,6 +120,8 @@ impl Images<'_> {
             arc,
             gain: sectors.iter().map(|sector| sector.evidence.gain).sum(),
             pixel,
+            sectors,
+            covariance: None,
         })
     }
 
@@ -130,6 +137,8 @@ impl Images<'_> {
             arc,
             gain: sectors.iter().map(|sector| sector.evidence.gain).sum(),
             pixel: found.pixel,
+            sectors,
+            covariance: None,
         })
     }
 

@@ -82,9 +82,10 @@ use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Alternatives, Scoring, score_hypotheses};
 use line_continuation::continue_lines;
 use line_selection::{Selection, select_lines, sure_lines};
+use nalgebra::Matrix4;
 use neat_core::{CircularArc, EdgelMap, LineSegment2};
 use pose_fitting::fit_poses;
-use profiles::place_lines;
+use profiles::place_curves;
 use progress::part;
 use rayon::prelude::*;
 use slab_ends::close_slabs;
@@ -204,16 +205,16 @@ pub fn assemble_with_progress(
     report.lines = selection.lines.len();
     report.curved_lines = selection.curved;
     report.outlines = selection.outlines;
-    let arcs = find_arcs(
+    let arcs = &mut find_arcs(
         &selection,
         config,
         &mut part(progress, [SELECTED, FOLLOWED]),
     )?;
     report.arcs = arcs.len();
-    let covariance = |arc: &FoundArc| selection.images.covariance_of_arc(arc);
-    let arc_covariances: Vec<_> = arcs.iter().map(covariance).collect();
+    let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
-    let wireframe = graph_of(selection, photographs, config, &mut report, progress)?;
+    let wireframe = graph_of(selection, arcs, photographs, config, &mut report, progress)?;
+    let arc_covariances = covariances_of_arcs(&images, arcs, scene_radius);
     let wireframe = wireframe.map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
     report.edges = wireframe.edges.len();
@@ -221,10 +222,8 @@ pub fn assemble_with_progress(
     let refined_cameras = poses.map(|poses| poses.cameras(scene_radius));
     ControlFlow::Continue(Assembled {
         wireframe,
-        arcs: scaled_arcs(&arcs, scene_radius),
-        arc_covariances: (arc_covariances.into_iter())
-            .map(|covariance| Some(covariance? * scene_radius.powi(2)))
-            .collect(),
+        arcs: scaled_arcs(arcs, scene_radius),
+        arc_covariances,
         report,
         refined_cameras,
     })
@@ -255,6 +254,19 @@ fn scaled_arcs(arcs: &[FoundArc], factor: f64) -> Vec<CircularArc> {
     arcs.iter().map(scaled).collect()
 }
 
+/// Of centre and radius: by profiles where these have placed an arc, else by edgels.
+fn covariances_of_arcs(
+    images: &Images,
+    arcs: &[FoundArc],
+    scene_radius: f64,
+) -> Vec<Option<Matrix4<f64>>> {
+    let covariance = |found: &FoundArc| {
+        let by_edgels = || images.covariance_of_arc(found);
+        Some(found.covariance.or_else(by_edgels)? * scene_radius.powi(2))
+    };
+    arcs.iter().map(covariance).collect()
+}
+
 /// The views in a world whose scene ball is the unit ball.
 fn prepared_views(
     observations: &[ViewObservation],
@@ -282,6 +294,7 @@ fn proposals(
 /// From lines to a graph: merged, continued, joined at corners, completed, cut and fitted.
 fn graph_of(
     mut selection: Selection<'_>,
+    arcs: &mut [FoundArc],
     photographs: Option<Photographs<'_>>,
     config: &AssembleConfig,
     report: &mut AssembleReport,
@@ -298,7 +311,7 @@ fn graph_of(
     report.merged_pieces = report.lines - lines.len();
     if let Some(photographs) = photographs {
         let progress = &mut part(progress, [CONTINUED, PLACED]);
-        place_lines(&images, photographs, &mut lines, progress)?;
+        place_curves(&images, photographs, &mut lines, arcs, progress)?;
     }
     progress(PLACED)?;
     let mut corners = find_corners(&images, &lines);

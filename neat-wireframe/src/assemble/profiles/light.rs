@@ -4,7 +4,7 @@
 //! differ much, its values change fastest on the darker side of the edge, up to half a pixel off.
 
 use super::profile::{PLACES, Profile};
-use nalgebra::Vector2;
+use nalgebra::{SVector, Vector2};
 
 /// Darker values are noise and rounding, by which light is known no better.
 const DARKEST: f64 = 6.0;
@@ -20,12 +20,14 @@ pub(super) struct Response {
 
 /// A profile in light.
 #[derive(Clone, Debug)]
-pub(super) struct LightProfile {
+pub(super) struct LightProfile<const N: usize> {
     pub view: usize,
     /// See [`Profile::along`].
     pub along: f64,
     /// See [`Profile::by_shift`].
     pub by_shift: Vector2<f64>,
+    /// See [`Profile::by_step`].
+    pub by_step: SVector<f64, N>,
     /// Each channel about its mean, in so large units that white is 255.
     pub light: [[f64; PLACES]; 3],
     /// How much a squared residual counts at each place: the square of how much values change by
@@ -33,9 +35,9 @@ pub(super) struct LightProfile {
     pub weights: [f64; PLACES],
 }
 
-impl LightProfile {
+impl<const N: usize> LightProfile<N> {
     /// Of a file in which light is the `exponent`th power of values.
-    pub(super) fn new(profile: &Profile, exponent: f64) -> Self {
+    pub(super) fn new(profile: &Profile<N>, exponent: f64) -> Self {
         let value = |k: usize, c: usize, least| f64::from(profile.values[k][c]).max(least) / 255.0;
         let channel = |c: usize| {
             let light: [f64; PLACES] =
@@ -48,6 +50,7 @@ impl LightProfile {
             view: profile.view,
             along: profile.along,
             by_shift: profile.by_shift,
+            by_step: profile.by_step,
             light: std::array::from_fn(channel),
             weights: std::array::from_fn(|k| {
                 (0..3).map(|c| by_light(k, c).powi(2)).sum::<f64>() / 3.0

@@ -1,46 +1,58 @@
-//! Lines where the light changes, to a fraction of a pixel, and the edges beside them.
+//! Lines and arcs where the light changes, to a fraction of a pixel, and the edges beside lines.
 //!
 //! Edgels are where smoothed gradients are strongest. Of two edges less than three pixels apart
 //! that is neither the one nor the other, and it is the darker side of an edge with much contrast,
 //! since files hold about a root of the light that lens and pixels have added up. So the images
-//! are asked once more: the light across a line, in all views at once, is explained by steps
+//! are asked once more: the light across a curve, in all views at once, is explained by steps
 //! whose places are the same in space and whose heights are free in each view. The step nearest
-//! to a line is where it is. Others are edges beside it, if they explain enough and both halves
+//! to a curve is where it is. Others are edges beside it, if they explain enough and both halves
 //! of the views put them at the same place.
 
 mod bundle;
+mod circular;
+mod covariance;
+mod curve;
 mod light;
+mod pixels;
+mod placed_arcs;
 mod profile;
 mod pursuit;
 mod response;
 mod step_fit;
 mod step_model;
+mod straight;
 #[cfg(test)]
 mod test_profiles;
 
+use super::circle_fitting::FoundArc;
 use super::edge_samples::Images;
-use super::line_fitting::directions_across;
 use super::line_selection::ChosenLine;
-use super::progress::OnProgress;
+use super::progress::{OnProgress, part};
 use bundle::Bundle;
+use circular::Circular;
+use curve::Curve;
 use image::RgbImage;
-use light::LightProfile;
-use neat_core::LineSegment3;
-use profile::{Across, Profile};
+use light::{LightProfile, Response};
+use neat_core::{Camera, LineSegment3};
+use pixels::Pixels;
+use placed_arcs::{PlacedArc, move_arcs};
+use profile::{Profile, profiles};
 use rayon::prelude::*;
 use response::response_of;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
+use straight::Straight;
 
 /// Lines nearer to each other are the same, in pixels: nearer ones are not told apart.
 const SAME: f64 = 0.7;
 /// Cosine of the largest angle between them, about 14°: ends that are a pixel off turn short
 /// lines by that.
 const SAME_COSINE: f64 = 0.97;
-/// Share of the time after which all images have been looked at.
+/// Shares of the time after which all images have been looked at, and arcs explained.
 const LOOKED: f64 = 0.2;
-/// So many lines are explained between two words about progress.
-const LINES_AT_ONCE: usize = 64;
+const ROUND: f64 = 0.3;
+/// So many curves are explained between two words about progress.
+const CURVES_AT_ONCE: usize = 64;
 
 /// The images of all views.
 #[derive(Clone, Copy)]
@@ -51,54 +63,134 @@ pub struct Photographs<'a> {
     pub pixel_center: f64,
 }
 
-/// A line, its profiles, and the directions across it.
-type Line<'a> = ((&'a ChosenLine, &'a Vec<Profile>), &'a Option<Across>);
+/// Curves, and what the views show across each.
+struct Profiled<const N: usize, C> {
+    curves: Vec<C>,
+    profiles: Vec<Vec<Profile<N>>>,
+}
 
-/// Moves lines to where the light changes, and adds those beside them. Those that the images
-/// tell nothing of stay.
-pub(super) fn place_lines(
+impl<const N: usize, C: Curve<N>> Profiled<N, C> {
+    fn new(curves: Vec<C>) -> Self {
+        let profiles = curves.iter().map(|_| Vec::new()).collect();
+        Self { curves, profiles }
+    }
+
+    /// Adds what one view shows.
+    fn look(&mut self, view: usize, camera: &Camera, image: &Pixels<'_>) {
+        let curves = self.curves.par_iter().zip(&mut self.profiles);
+        curves.for_each(|(curve, found)| found.extend(profiles(curve, view, camera, image)));
+    }
+
+    /// What is made of the bundle that explains the profiles of each curve.
+    fn explained<T: Send>(
+        &self,
+        response: Response,
+        make: impl Fn(&C, &Bundle<'_, N>) -> T + Sync,
+        progress: OnProgress<'_>,
+    ) -> ControlFlow<(), Vec<Option<T>>> {
+        let count = self.curves.len();
+        let mut made = Vec::with_capacity(count);
+        while made.len() < count {
+            let from = made.len();
+            let to = (from + CURVES_AT_ONCE).min(count);
+            let some = self.curves[from..to].par_iter();
+            let of_curve = |(curve, profiles): (&C, &Vec<Profile<N>>)| {
+                let in_light = |profile| LightProfile::new(profile, response.exponent);
+                let light: Vec<LightProfile<N>> = profiles.iter().map(in_light).collect();
+                Bundle::new(curve, &light, response.blur).map(|bundle| make(curve, &bundle))
+            };
+            made.par_extend(some.zip(&self.profiles[from..to]).map(of_curve));
+            progress(to as f64 / count as f64)?;
+        }
+        ControlFlow::Continue(made)
+    }
+}
+
+/// Moves lines and arcs to where the light changes, and adds lines beside lines. Those that the
+/// images tell nothing of stay.
+pub(super) fn place_curves(
     images: &Images,
     photographs: Photographs<'_>,
     lines: &mut Vec<ChosenLine>,
+    arcs: &mut [FoundArc],
     progress: OnProgress<'_>,
 ) -> ControlFlow<()> {
-    let across: Vec<Option<Across>> = (lines.iter())
-        .map(|chosen| {
-            let across = directions_across(&chosen.line)?;
-            Some([across.column(0).into_owned(), across.column(1).into_owned()])
-        })
-        .collect();
-    let profiles = profiles(images, photographs, lines, &across, progress)?;
-    let Some(response) = response_of(&profiles) else {
+    let of_line = |(index, chosen): (usize, &ChosenLine)| {
+        Straight::new(&chosen.line).map(|straight| (index, straight))
+    };
+    let (indices, straight): (Vec<usize>, Vec<Straight>) =
+        lines.iter().enumerate().filter_map(of_line).unzip();
+    let mut straight = Profiled::new(straight);
+    let mut circular = Profiled::new(arcs.iter().map(Circular::new).collect());
+    for (view, prepared) in images.views.iter().enumerate() {
+        let camera = &prepared.camera;
+        if let Some(image) = (photographs.image_of)(view)
+            && image.dimensions() == (camera.width, camera.height)
+        {
+            let pixels = Pixels {
+                image: &image,
+                pixel_center: photographs.pixel_center,
+            };
+            straight.look(view, camera, &pixels);
+            circular.look(view, camera, &pixels);
+        }
+        progress(LOOKED * (view + 1) as f64 / images.views.len() as f64)?;
+    }
+    let Some(response) = response_of(&straight.profiles, &circular.profiles) else {
         return ControlFlow::Continue(());
     };
-    let mut bundles: Vec<Option<Bundle>> = Vec::with_capacity(lines.len());
-    while bundles.len() < lines.len() {
-        let from = bundles.len();
-        let to = (from + LINES_AT_ONCE).min(lines.len());
-        let some = lines[from..to].par_iter().zip(&profiles[from..to]);
-        let of_line = |((chosen, profiles), across): Line<'_>| {
-            let in_light = |profile| LightProfile::new(profile, response.exponent);
-            let light: Vec<LightProfile> = profiles.iter().map(in_light).collect();
-            Bundle::new(&chosen.line, across.as_ref()?, &light, response.blur)
-        };
-        bundles.par_extend(some.zip(&across[from..to]).map(of_line));
-        progress(LOOKED + (1.0 - LOOKED) * to as f64 / lines.len() as f64)?;
-    }
-    let (before, moved) = (lines.len(), move_lines(lines, &bundles));
-    add_beside(images, lines, &bundles);
+    let round = {
+        let progress = &mut part(progress, [LOOKED, ROUND]);
+        move_arcs(
+            arcs,
+            circular.explained(response, PlacedArc::new, progress)?,
+        )
+    };
+    let placed = {
+        let progress = &mut part(progress, [ROUND, 1.0]);
+        straight.explained(response, PlacedLine::new, progress)?
+    };
+    let placed: Vec<(usize, PlacedLine)> = (indices.into_iter().zip(placed))
+        .filter_map(|(index, line)| Some((index, line?)))
+        .collect();
+    let (before, moved) = (lines.len(), move_lines(lines, &placed));
+    add_beside(images, lines, placed);
     let beside = lines.len() - before;
-    tracing::debug!(?response, moved, beside, "lines are placed by profiles");
+    tracing::debug!(
+        ?response,
+        moved,
+        beside,
+        round,
+        "curves are placed by profiles"
+    );
     ControlFlow::Continue(())
 }
 
+/// What profiles tell of a line.
+struct PlacedLine {
+    /// Where it is.
+    line: Option<LineSegment3>,
+    /// What runs beside it, and by how much that lowers the loss of a profile.
+    beside: Vec<(LineSegment3, f64)>,
+}
+
+impl PlacedLine {
+    fn new(straight: &Straight, bundle: &Bundle<'_, 4>) -> Self {
+        let beside = bundle.beside.iter();
+        Self {
+            line: bundle.own.map(|step| straight.moved(&step)),
+            beside: (beside.map(|(step, gain)| (straight.moved(step), *gain))).collect(),
+        }
+    }
+}
+
 /// How many lines have moved.
-fn move_lines(lines: &mut [ChosenLine], bundles: &[Option<Bundle>]) -> usize {
+fn move_lines(lines: &mut [ChosenLine], placed: &[(usize, PlacedLine)]) -> usize {
     let mut moved = 0;
-    for (chosen, bundle) in lines.iter_mut().zip(bundles) {
-        if let Some(line) = bundle.as_ref().and_then(|bundle| bundle.line) {
-            chosen.line = line;
-            chosen.placed = true;
+    for (index, placed) in placed {
+        if let Some(line) = placed.line {
+            lines[*index].line = line;
+            lines[*index].placed = true;
             moved += 1;
         }
     }
@@ -107,15 +199,12 @@ fn move_lines(lines: &mut [ChosenLine], bundles: &[Option<Bundle>]) -> usize {
 
 /// Adds what runs beside lines, the surest first, where no line is yet: as long as the line that
 /// it is beside, in the views that show that.
-fn add_beside(images: &Images, lines: &mut Vec<ChosenLine>, bundles: &[Option<Bundle>]) {
-    let of_bundle = |(parent, bundle): (usize, &Option<Bundle>)| {
-        let beside = bundle.iter().flat_map(|bundle| &bundle.beside);
-        beside
-            .map(move |(line, gain)| (*gain, parent, *line))
-            .collect::<Vec<_>>()
+fn add_beside(images: &Images, lines: &mut Vec<ChosenLine>, placed: Vec<(usize, PlacedLine)>) {
+    let of_line = |(index, placed): (usize, PlacedLine)| {
+        let beside = placed.beside.into_iter();
+        beside.map(move |(line, gain)| (gain, index, line))
     };
-    let mut found: Vec<(f64, usize, LineSegment3)> =
-        bundles.iter().enumerate().flat_map(of_bundle).collect();
+    let mut found: Vec<(f64, usize, LineSegment3)> = placed.into_iter().flat_map(of_line).collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     for (_, parent, line) in found {
         let evidence = lines[parent].evidence.clone();
@@ -140,34 +229,8 @@ fn runs_along(other: &LineSegment3, line: &LineSegment3, gap: f64) -> bool {
         && a.dot(&b).abs() > SAME_COSINE * a.norm() * b.norm()
 }
 
-/// The profiles of all lines, image after image.
-fn profiles(
-    images: &Images,
-    photographs: Photographs<'_>,
-    lines: &[ChosenLine],
-    across: &[Option<Across>],
-    progress: OnProgress<'_>,
-) -> ControlFlow<(), Vec<Vec<Profile>>> {
-    let mut profiles: Vec<Vec<Profile>> = vec![Vec::new(); lines.len()];
-    for view in 0..images.views.len() {
-        let Some(image) = (photographs.image_of)(view) else {
-            continue;
-        };
-        let center = photographs.pixel_center;
-        let of_lines = profiles.par_iter_mut().zip(lines).zip(across);
-        of_lines.for_each(|((profiles, chosen), across)| {
-            if let Some(across) = across {
-                let line = &chosen.line;
-                profiles.extend(images.profiles(view, &image, center, line, across));
-            }
-        });
-        progress(LOOKED * (view + 1) as f64 / images.views.len() as f64)?;
-    }
-    ControlFlow::Continue(profiles)
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::assemble::test_views::{TestViews, chosen, end_distance};
     use crate::assemble::view_segments::PreparedView;
@@ -179,7 +242,7 @@ mod tests {
     /// Two bright bars in the plane z = 0, of 28 and 3 pixels, as they reach along x.
     const BARS: [[f64; 2]; 2] = [[-0.3, -0.2], [0.2, 0.211]];
 
-    fn cameras() -> Vec<Camera> {
+    pub(super) fn cameras() -> Vec<Camera> {
         let place = |k: u32| {
             let (sin, cos) = (0.9 * f64::from(k)).sin_cos();
             2.5 * Vector3::new(0.7 * cos, 0.5 * sin, 1.0).normalize()
@@ -273,6 +336,6 @@ mod tests {
             pixel_center: 0.5,
         };
         let go_on = &mut |_| ControlFlow::Continue(());
-        assert!(place_lines(images, photographs, lines, go_on).is_continue());
+        assert!(place_curves(images, photographs, lines, &mut [], go_on).is_continue());
     }
 }

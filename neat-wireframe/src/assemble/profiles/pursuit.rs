@@ -1,18 +1,19 @@
 //! One more step at a time (matching pursuit): what each profile gains by a step at each place
-//! beside the line is projected back into the plane across the line in space.
+//! beside the curve is projected back into the plane across the curve in space.
 
+use super::curve::{Curve, Step};
 use super::light::LightProfile;
 use super::profile::{PLACES, REACH};
 use super::step_fit::fit_steps;
-use super::step_model::{NOISE_SQUARES, Step, StepModel, loss, offset, step_column};
+use super::step_model::{NOISE_SQUARES, StepModel, loss, offset, step_column};
 use nalgebra::Vector2;
 
-/// Pixels between the places beside the line where a step is tried: half the blur.
+/// Pixels between the places beside the curve where a step is tried: half the blur.
 const TRIED: f64 = 0.25;
 const OFFSETS: usize = (2.0 * REACH / TRIED) as usize + 1;
 /// Pixels between the places in space.
 const CELL: f64 = 0.4;
-/// Pixels around the line where they lie: beyond, an edge is another line's matter.
+/// Pixels around the curve where they lie: beyond, an edge is another line's matter.
 const WINDOW: f64 = 4.5;
 /// Steps nearer to each other cannot be told apart, in pixels.
 const LEAST_DISTANCE: f64 = 0.5;
@@ -33,7 +34,12 @@ impl Columns {
     }
 }
 
-fn gains(profile: &LightProfile, steps: &[Step], columns: &Columns, blur: f64) -> Gains {
+fn gains<const N: usize>(
+    profile: &LightProfile<N>,
+    steps: &[Step<N>],
+    columns: &Columns,
+    blur: f64,
+) -> Gains {
     let model = StepModel::new(profile, steps, blur);
     let rests = profile.light.map(|light| model.rest(&light).0);
     let squares: f64 = rests.iter().map(|rest| model.product(rest, rest)).sum();
@@ -49,36 +55,42 @@ fn gains(profile: &LightProfile, steps: &[Step], columns: &Columns, blur: f64) -
     })
 }
 
-/// How far a shift of the line moves it in the images, in pixels: root mean square.
-pub(super) fn pixels(profiles: &[&LightProfile], shift: &Vector2<f64>) -> f64 {
+/// How far a shift of the curve moves it in the images, in pixels: root mean square.
+pub(super) fn pixels<const N: usize>(profiles: &[&LightProfile<N>], shift: &Vector2<f64>) -> f64 {
     let squares: f64 = profiles.iter().map(|p| p.by_shift.dot(shift).powi(2)).sum();
     (squares / profiles.len() as f64).sqrt()
 }
 
 /// The steps with one more, all fitted together, and the sum of losses; `pixel` is the size of one.
 /// `None` if there is no room.
-pub(super) fn one_more(
-    profiles: &[&LightProfile],
-    steps: &[Step],
+pub(super) fn one_more<const N: usize>(
+    curve: &impl Curve<N>,
+    profiles: &[&LightProfile<N>],
+    steps: &[Step<N>],
     pixel: f64,
     columns: &Columns,
     blur: f64,
-) -> Option<(Vec<Step>, f64)> {
+) -> Option<(Vec<Step<N>>, f64)> {
     let tables: Vec<Gains> = (profiles.iter())
         .map(|profile| gains(profile, steps, columns, blur))
         .collect();
-    let slant = steps.first().copied().unwrap_or_default();
+    let by_step = curve.shift_by_step(curve.middle());
+    let known: Vec<Vector2<f64>> = steps.iter().map(|step| by_step * step).collect();
+    // It is slanted as the first one.
+    let first = steps.first().copied().unwrap_or_else(Step::zeros);
+    let slant = first - curve.step_of_shift(&(by_step * first));
     let cells = (WINDOW / CELL) as i32;
-    let mut best: Option<(f64, Step)> = None;
+    let mut best: Option<(f64, Step<N>)> = None;
     for i in -cells..=cells {
         for j in -cells..=cells {
             let shift = Vector2::new(f64::from(i), f64::from(j)) * (CELL * pixel);
-            let is_known = |other: &Step| pixels(profiles, &(shift - other.xy())) < LEAST_DISTANCE;
-            if steps.iter().any(is_known) {
+            let is_known =
+                |other: &Vector2<f64>| pixels(profiles, &(shift - other)) < LEAST_DISTANCE;
+            if known.iter().any(is_known) {
                 continue;
             }
-            let step = Step::new(shift.x, shift.y, slant.z, slant.w);
-            let gain = |(profile, table): (&&LightProfile, &Gains)| {
+            let step = slant + curve.step_of_shift(&shift);
+            let gain = |(profile, table): (&&LightProfile<N>, &Gains)| {
                 let place = (offset(profile, &step) + REACH) / TRIED;
                 let inside = (0.0..OFFSETS as f64 - 0.5).contains(&place);
                 if inside {

@@ -4,10 +4,11 @@
 //! tell which: with the wrong one an edge lies aside in each view by what its sides look like
 //! there, and views do not agree on where it is in space.
 
+use super::curve::Step;
 use super::light::{LightProfile, Response};
 use super::profile::{PLACES, Profile, SPACING};
 use super::step_fit::fit_steps;
-use super::step_model::{Step, loss, misfit, offset};
+use super::step_model::{loss, misfit_at, offset};
 use crate::statistics::upper_median;
 use rayon::prelude::*;
 
@@ -25,8 +26,8 @@ const MIN_PROFILES: usize = 30;
 /// They hold one edge and nothing else if that explains them but for so many times the noise: in
 /// bricks and leaves few do.
 const CLEAN: f64 = 3.0;
-/// Of a line so many.
-const MIN_OF_LINE: usize = 8;
+/// Of a curve so many.
+const MIN_OF_CURVE: usize = 8;
 /// Share of them all that the blur is known by, the cleanest.
 const CLEANEST: f64 = 0.1;
 /// Sides of an edge, in pixels from it: beyond its blur.
@@ -34,19 +35,23 @@ const SIDE: [f64; 2] = [1.5, 4.0];
 /// Where an edge is sought beside the line, in tenths of pixels.
 const SOUGHT: i32 = 15;
 
-/// The response under which views agree best on where the lines of a scene are, whose profiles
-/// are given; `None` where too few of these are understood.
-pub(super) fn response_of(profiles: &[Vec<Profile>]) -> Option<Response> {
-    let tells = |profile: &&Profile| profile.contrast() > MIN_CONTRAST;
-    let mut lines: Vec<Vec<&Profile>> = (profiles.iter())
-        .map(|profiles| profiles.iter().filter(tells).collect())
-        .collect();
-    let count: usize = lines.iter().map(Vec::len).sum();
-    let stride = count.div_ceil(MAX_PROFILES).max(1);
-    lines = lines.into_iter().step_by(stride).collect();
+/// The profiles of curves that tell, and which of these are asked.
+struct Telling<'a, const N: usize>(Vec<Vec<&'a Profile<N>>>);
+
+/// The response under which views agree best on where the lines and arcs of a scene are, whose
+/// profiles are given; `None` where too few of these are understood.
+pub(super) fn response_of(lines: &[Vec<Profile<4>>], arcs: &[Vec<Profile<6>>]) -> Option<Response> {
+    let (mut lines, mut arcs) = (Telling::new(lines), Telling::new(arcs));
+    let stride = (lines.count() + arcs.count()).div_ceil(MAX_PROFILES).max(1);
+    lines.thin_out(stride);
+    arcs.thin_out(stride);
     let candidates = EXPONENTS.map(|exponent| {
-        let response = blurred(exponent, &lines)?;
-        Some((disagreement(response, &lines)?, response))
+        let misfits = [lines.misfits(exponent), arcs.misfits(exponent)].concat();
+        let response = blurred(exponent, misfits)?;
+        let mut apart = lines.disagreements(response);
+        apart.extend(arcs.disagreements(response));
+        let disagreement = (apart.len() >= MIN_PROFILES).then(|| upper_median(&mut apart));
+        Some((disagreement?, response))
     });
     tracing::debug!(?candidates, "what files hold");
     let best = candidates
@@ -56,19 +61,15 @@ pub(super) fn response_of(profiles: &[Vec<Profile>]) -> Option<Response> {
     Some(best?.1)
 }
 
+/// The misfits of an edge alone with each blur.
+type Misfits = [f64; BLURS.len()];
+
 /// With the blur that the cleanest profiles ask for.
-fn blurred(exponent: f64, lines: &[Vec<&Profile>]) -> Option<Response> {
-    let profiles: Vec<&Profile> = lines.iter().flatten().copied().collect();
-    let mut misfits: Vec<[f64; BLURS.len()]> = (profiles.par_iter())
-        .map(|profile| {
-            let light = LightProfile::new(profile, exponent);
-            BLURS.map(|blur| edge(&light, blur).0)
-        })
-        .collect();
+fn blurred(exponent: f64, mut misfits: Vec<Misfits>) -> Option<Response> {
     if misfits.len() < MIN_PROFILES {
         return None;
     }
-    let least = |of: &[f64; BLURS.len()]| of.iter().copied().fold(f64::INFINITY, f64::min);
+    let least = |of: &Misfits| of.iter().copied().fold(f64::INFINITY, f64::min);
     misfits.sort_by(|a, b| least(a).total_cmp(&least(b)));
     misfits.truncate((CLEANEST * misfits.len() as f64).ceil() as usize);
     let total = |blur: &usize| misfits.iter().map(|of| loss(of[*blur])).sum::<f64>();
@@ -79,38 +80,62 @@ fn blurred(exponent: f64, lines: &[Vec<&Profile>]) -> Option<Response> {
     })
 }
 
-/// How far clean profiles lie from where those of the same line have it together, in pixels: the
-/// median.
-fn disagreement(response: Response, lines: &[Vec<&Profile>]) -> Option<f64> {
-    let of_line = |profiles: &Vec<&Profile>| {
-        let light: Vec<LightProfile> = (profiles.iter())
-            .map(|profile| LightProfile::new(profile, response.exponent))
+impl<'a, const N: usize> Telling<'a, N> {
+    fn new(profiles: &'a [Vec<Profile<N>>]) -> Self {
+        let tells = |profile: &&Profile<N>| profile.contrast() > MIN_CONTRAST;
+        let of_curve = |profiles: &'a Vec<Profile<N>>| profiles.iter().filter(tells).collect();
+        Self(profiles.iter().map(of_curve).collect())
+    }
+
+    fn count(&self) -> usize {
+        self.0.iter().map(Vec::len).sum()
+    }
+
+    /// Leaves one of so many curves.
+    fn thin_out(&mut self, stride: usize) {
+        self.0 = std::mem::take(&mut self.0)
+            .into_iter()
+            .step_by(stride)
             .collect();
-        let (clean, places): (Vec<&LightProfile>, Vec<f64>) = (light.iter())
-            .filter_map(|profile| {
-                let (misfit, place) = edge(profile, response.blur);
-                (misfit < CLEAN).then_some((profile, place))
-            })
-            .unzip();
-        if clean.len() < MIN_OF_LINE {
-            return Vec::new();
-        }
-        let (together, _) = fit_steps(&clean, vec![Step::zeros()], response.blur);
-        let apart =
-            |(profile, place): (&&LightProfile, f64)| (place - offset(profile, &together[0])).abs();
-        clean.iter().zip(places).map(apart).collect()
-    };
-    let mut apart: Vec<f64> = lines.par_iter().flat_map_iter(of_line).collect();
-    (apart.len() >= MIN_PROFILES).then(|| upper_median(&mut apart))
+    }
+
+    fn misfits(&self, exponent: f64) -> Vec<Misfits> {
+        let profiles: Vec<&Profile<N>> = self.0.iter().flatten().copied().collect();
+        let of_profile = |profile: &&Profile<N>| {
+            let light = LightProfile::new(profile, exponent);
+            BLURS.map(|blur| edge(&light, blur).0)
+        };
+        profiles.par_iter().map(of_profile).collect()
+    }
+
+    /// How far clean profiles lie from where those of the same curve have it together, in pixels.
+    fn disagreements(&self, response: Response) -> Vec<f64> {
+        let of_curve = |profiles: &Vec<&Profile<N>>| {
+            let light: Vec<LightProfile<N>> = (profiles.iter())
+                .map(|profile| LightProfile::new(profile, response.exponent))
+                .collect();
+            let (clean, places): (Vec<&LightProfile<N>>, Vec<f64>) = (light.iter())
+                .filter_map(|profile| {
+                    let (misfit, place) = edge(profile, response.blur);
+                    (misfit < CLEAN).then_some((profile, place))
+                })
+                .unzip();
+            if clean.len() < MIN_OF_CURVE {
+                return Vec::new();
+            }
+            let (together, _) = fit_steps(&clean, vec![Step::zeros()], response.blur);
+            let apart = |(profile, place): (&&LightProfile<N>, f64)| {
+                (place - offset(profile, &together[0])).abs()
+            };
+            clean.iter().zip(places).map(apart).collect()
+        };
+        self.0.par_iter().flat_map_iter(of_curve).collect()
+    }
 }
 
 /// The misfit of a single edge where it fits best, and that place beside the line in pixels.
-fn edge(profile: &LightProfile, blur: f64) -> (f64, f64) {
-    let shift_of_pixel = profile.by_shift / profile.by_shift.norm_squared();
-    let at = |place: f64| {
-        let shift = shift_of_pixel * place;
-        misfit(profile, &[Step::new(shift.x, shift.y, 0.0, 0.0)], blur)
-    };
+fn edge<const N: usize>(profile: &LightProfile<N>, blur: f64) -> (f64, f64) {
+    let at = |place: f64| misfit_at(profile, place, blur);
     let tried: Vec<f64> = (-SOUGHT..=SOUGHT)
         .map(|tenths| at(0.1 * f64::from(tenths)))
         .collect();
@@ -128,7 +153,7 @@ fn edge(profile: &LightProfile, blur: f64) -> (f64, f64) {
     (tried[best], place)
 }
 
-impl Profile {
+impl<const N: usize> Profile<N> {
     /// How much the two sides of the line differ, in values.
     fn contrast(&self) -> f64 {
         let middle = PLACES / 2;
@@ -149,12 +174,13 @@ impl Profile {
 mod tests {
     use super::*;
     use crate::assemble::profiles::test_profiles::Steps;
+    use nalgebra::Vector4;
 
-    fn lines(response: Response, noise: f64) -> Vec<Vec<Profile>> {
+    fn lines(response: Response, noise: f64) -> Vec<Vec<Profile<4>>> {
         let line = |k: u32| {
             let place = 0.002 * f64::from(k) - 0.006;
             let height = 60.0 + 20.0 * f64::from(k);
-            let step = Step::new(place, -place, 0.0, 0.001);
+            let step = Vector4::new(place, -place, 0.0, 0.001);
             let steps = vec![(step, [height, 0.9 * height, 0.6 * height])];
             let seen = Steps {
                 steps,
@@ -171,7 +197,7 @@ mod tests {
         for exponent in EXPONENTS {
             for blur in [0.4, 0.7, 1.0] {
                 let truth = Response { exponent, blur };
-                let found = response_of(&lines(truth, 3.0)).unwrap();
+                let found = response_of(&lines(truth, 3.0), &[]).unwrap();
                 assert_eq!(found.exponent, exponent, "{truth:?}");
                 assert!((found.blur - blur).abs() < 0.16, "{found:?} {truth:?}");
             }
@@ -181,15 +207,18 @@ mod tests {
     #[test]
     fn what_is_no_edge_tells_nothing() {
         assert_eq!(
-            response_of(&lines(
-                Response {
-                    exponent: 1.0,
-                    blur: 0.5
-                },
-                200.0
-            )),
+            response_of(
+                &lines(
+                    Response {
+                        exponent: 1.0,
+                        blur: 0.5
+                    },
+                    200.0
+                ),
+                &[]
+            ),
             None
         );
-        assert_eq!(response_of(&[]), None);
+        assert_eq!(response_of(&[], &[]), None);
     }
 }

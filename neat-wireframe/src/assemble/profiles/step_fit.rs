@@ -3,12 +3,13 @@
 //! Heights are those that are best for the places (variable projection: Golub and Pereyra 1973,
 //! with the derivative of Kaufman 1975).
 
+use super::curve::Step;
 use super::light::LightProfile;
 use super::step_model::{
-    MAX_STEPS, NOISE_SQUARES, Step, StepModel, loss, misfit, offset, step_derivative,
+    MAX_STEPS, NOISE_SQUARES, StepModel, loss, misfit, offset, step_derivative,
 };
-use crate::solve::{LeastSquares, Options, minimise};
-use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector4};
+use crate::solve::{LeastSquares, NormalEquations, Options, minimise};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 const OPTIONS: Options = Options {
     max_iterations: 12,
@@ -22,28 +23,57 @@ const OPTIONS: Options = Options {
 const RIDGE: f64 = 1e-9;
 
 /// The steps where the sum of the losses of profiles is least, near those given, and that sum.
-pub(super) fn fit_steps(
-    profiles: &[&LightProfile],
-    steps: Vec<Step>,
+pub(super) fn fit_steps<const N: usize>(
+    profiles: &[&LightProfile<N>],
+    steps: Vec<Step<N>>,
     blur: f64,
-) -> (Vec<Step>, f64) {
+) -> (Vec<Step<N>>, f64) {
     let (steps, summary) = minimise(&StepProblem { profiles, blur }, steps, &OPTIONS);
     (steps, summary.final_cost)
 }
 
-struct StepProblem<'a> {
-    profiles: &'a [&'a LightProfile],
+/// What profiles ask of all steps together: the normal equations of a change of them.
+pub(super) fn normal_equations<const N: usize>(
+    profiles: &[&LightProfile<N>],
+    steps: &[Step<N>],
+    blur: f64,
+) -> NormalEquations {
+    let size = N * steps.len();
+    let mut matrix = DMatrix::zeros(size, size);
+    let mut right = DVector::zeros(size);
+    for profile in profiles {
+        let by_offset = OffsetEquations::new(profile, steps, blur);
+        let offset_by_step = profile.by_step;
+        let square = offset_by_step * offset_by_step.transpose();
+        for i in 0..steps.len() {
+            for j in 0..steps.len() {
+                let mut block = matrix.fixed_view_mut::<N, N>(N * i, N * j);
+                block += by_offset.hessian[(i, j)] * square;
+            }
+            let mut part = right.fixed_rows_mut::<N>(N * i);
+            part -= by_offset.gradient[i] * offset_by_step;
+        }
+    }
+    NormalEquations { matrix, right }
+}
+
+struct StepProblem<'a, const N: usize> {
+    profiles: &'a [&'a LightProfile<N>],
     blur: f64,
 }
 
 /// What a profile says about the offsets of steps, by its loss.
-struct OffsetEquations {
-    hessian: SMatrix<f64, MAX_STEPS, MAX_STEPS>,
+pub(super) struct OffsetEquations {
+    pub hessian: SMatrix<f64, MAX_STEPS, MAX_STEPS>,
     gradient: SVector<f64, MAX_STEPS>,
 }
 
 impl OffsetEquations {
-    fn new(profile: &LightProfile, steps: &[Step], blur: f64) -> Self {
+    pub(super) fn new<const N: usize>(
+        profile: &LightProfile<N>,
+        steps: &[Step<N>],
+        blur: f64,
+    ) -> Self {
         let model = StepModel::new(profile, steps, blur);
         // What of a moving step the others do not make up for; by its height.
         let changes: [[f64; _]; MAX_STEPS] = std::array::from_fn(|k| match steps.get(k) {
@@ -74,48 +104,31 @@ impl OffsetEquations {
     }
 }
 
-impl LeastSquares for StepProblem<'_> {
-    type State = Vec<Step>;
-    type Equations = (DMatrix<f64>, DVector<f64>);
+impl<const N: usize> LeastSquares for StepProblem<'_, N> {
+    type State = Vec<Step<N>>;
+    type Equations = NormalEquations;
 
-    fn cost(&self, steps: &Vec<Step>) -> f64 {
-        let of_profile = |profile: &&LightProfile| loss(misfit(profile, steps, self.blur));
+    fn cost(&self, steps: &Vec<Step<N>>) -> f64 {
+        let of_profile = |profile: &&LightProfile<N>| loss(misfit(profile, steps, self.blur));
         self.profiles.iter().map(of_profile).sum()
     }
 
-    fn linearise(&self, steps: &Vec<Step>) -> Option<Self::Equations> {
-        let size = 4 * steps.len();
-        let mut hessian = DMatrix::zeros(size, size);
-        let mut gradient = DVector::zeros(size);
-        for profile in self.profiles {
-            let by_offset = OffsetEquations::new(profile, steps, self.blur);
-            let [x, y] = [profile.by_shift.x, profile.by_shift.y];
-            let offset_by_step = Vector4::new(x, y, profile.along * x, profile.along * y);
-            let square = offset_by_step * offset_by_step.transpose();
-            for i in 0..steps.len() {
-                for j in 0..steps.len() {
-                    let mut block = hessian.fixed_view_mut::<4, 4>(4 * i, 4 * j);
-                    block += by_offset.hessian[(i, j)] * square;
-                }
-                let mut part = gradient.fixed_rows_mut::<4>(4 * i);
-                part += by_offset.gradient[i] * offset_by_step;
-            }
-        }
-        (size > 0).then_some((hessian, gradient))
+    fn linearise(&self, steps: &Vec<Step<N>>) -> Option<NormalEquations> {
+        (!steps.is_empty()).then(|| normal_equations(self.profiles, steps, self.blur))
     }
 
     fn step(
         &self,
-        steps: &Vec<Step>,
-        (hessian, gradient): &Self::Equations,
+        steps: &Vec<Step<N>>,
+        equations: &NormalEquations,
         damping: f64,
-    ) -> Option<Vec<Step>> {
-        let mut damped = hessian.clone();
+    ) -> Option<Vec<Step<N>>> {
+        let mut damped = equations.matrix.clone();
         for k in 0..damped.nrows() {
             damped[(k, k)] += damping * damped[(k, k)] + RIDGE;
         }
-        let change = damped.cholesky()?.solve(gradient);
-        let moved = |(k, step): (usize, &Step)| step - change.fixed_rows::<4>(4 * k);
+        let change = damped.cholesky()?.solve(&equations.right);
+        let moved = |(k, step): (usize, &Step<N>)| step + change.fixed_rows::<N>(N * k);
         Some(steps.iter().enumerate().map(moved).collect())
     }
 }
@@ -125,16 +138,17 @@ mod tests {
     use super::*;
     use crate::assemble::profiles::light::Response;
     use crate::assemble::profiles::test_profiles::Steps;
+    use nalgebra::Vector4;
 
     const RESPONSE: Response = Response {
         exponent: 2.4,
         blur: 0.6,
     };
 
-    fn seen(noise: f64) -> (Vec<Step>, Vec<LightProfile>) {
+    fn seen(noise: f64) -> (Vec<Step<4>>, Vec<LightProfile<4>>) {
         let steps = vec![
-            Step::new(0.001, -0.002, 0.004, 0.0),
-            Step::new(0.023, 0.004, 0.0, 0.003),
+            Vector4::new(0.001, -0.002, 0.004, 0.0),
+            Vector4::new(0.023, 0.004, 0.0, 0.003),
         ];
         let heights = [[150.0, 120.0, 60.0], [-70.0, 60.0, 20.0]];
         let seen = Steps {
@@ -148,14 +162,14 @@ mod tests {
     #[test]
     fn the_gradient_is_that_of_differences() {
         let (truth, profiles) = seen(3.0);
-        let profiles: Vec<&LightProfile> = profiles.iter().collect();
+        let profiles: Vec<&LightProfile<4>> = profiles.iter().collect();
         let problem = StepProblem {
             profiles: &profiles,
             blur: RESPONSE.blur,
         };
-        let aside = Step::new(0.002, 0.001, -0.001, 0.002);
-        let steps: Vec<Step> = truth.iter().map(|step| step + aside).collect();
-        let (_, gradient) = problem.linearise(&steps).unwrap();
+        let aside = Vector4::new(0.002, 0.001, -0.001, 0.002);
+        let steps: Vec<Step<4>> = truth.iter().map(|step| step + aside).collect();
+        let gradient = -problem.linearise(&steps).unwrap().right;
         let scale = gradient.amax();
         for k in 0..8 {
             let cost = |change: f64| {
@@ -173,8 +187,8 @@ mod tests {
     #[test]
     fn steps_come_to_where_they_are() {
         let (truth, profiles) = seen(0.0);
-        let profiles: Vec<&LightProfile> = profiles.iter().collect();
-        let aside = Step::new(0.004, -0.003, 0.0, 0.0);
+        let profiles: Vec<&LightProfile<4>> = profiles.iter().collect();
+        let aside = Vector4::new(0.004, -0.003, 0.0, 0.0);
         let start = truth.iter().map(|step| step + aside).collect();
         let (found, cost) = fit_steps(&profiles, start, RESPONSE.blur);
         for (found, truth) in found.iter().zip(&truth) {

@@ -1,8 +1,9 @@
 //! A profile as a slope and steps of light.
 
+use super::curve::Step;
 use super::light::LightProfile;
 use super::profile::{PLACES, REACH, places};
-use nalgebra::{Cholesky, Const, SMatrix, SVector, Vector2, Vector4};
+use nalgebra::{Cholesky, Const, SMatrix, SVector};
 use std::f64::consts::{PI, SQRT_2};
 
 /// So many steps at most: with one, two and four of them F1 at the least threshold is .419, .476
@@ -20,18 +21,9 @@ const FLAT: f64 = 8.0;
 /// Keeps heights finite where steps cannot be told apart.
 const RIDGE: f64 = 1e-7;
 
-/// Where a step is in space: shifts along both directions across the line in its middle (x, y),
-/// and by how much more from end to end of it (z, w).
-pub(super) type Step = Vector4<f64>;
-
-/// The shift of a step at a place along the line, from -½ to ½.
-pub(super) fn shift_at(step: &Step, along: f64) -> Vector2<f64> {
-    Vector2::new(step.x + along * step.z, step.y + along * step.w)
-}
-
-/// How far a step lies beside the line in a profile, in pixels.
-pub(super) fn offset(profile: &LightProfile, step: &Step) -> f64 {
-    profile.by_shift.dot(&shift_at(step, profile.along))
+/// How far a step lies beside the curve in a profile, in pixels.
+pub(super) fn offset<const N: usize>(profile: &LightProfile<N>, step: &Step<N>) -> f64 {
+    profile.by_step.dot(step)
 }
 
 /// A step of height 1, blurred by `blur` pixels.
@@ -69,18 +61,31 @@ pub(super) struct StepModel {
 
 impl StepModel {
     /// With steps at most [`MAX_STEPS`].
-    pub(super) fn new(profile: &LightProfile, steps: &[Step], blur: f64) -> Self {
+    pub(super) fn new<const N: usize>(
+        profile: &LightProfile<N>,
+        steps: &[Step<N>],
+        blur: f64,
+    ) -> Self {
+        let mut offsets = [0.0; MAX_STEPS];
+        for (of_step, step) in offsets.iter_mut().zip(steps) {
+            *of_step = offset(profile, step);
+        }
+        Self::at(&profile.weights, &offsets[..steps.len()], blur)
+    }
+
+    /// With steps at some places across the curve, at most [`MAX_STEPS`].
+    fn at(weights: &[f64; PLACES], offsets: &[f64], blur: f64) -> Self {
         let mut columns = [[0.0; PLACES]; COLUMNS];
         columns[0] = [1.0; PLACES];
         columns[1] = places().map(|place| place / REACH);
-        for (column, step) in columns[2..].iter_mut().zip(steps) {
-            *column = step_column(offset(profile, step), blur);
+        for (column, offset) in columns[2..].iter_mut().zip(offsets) {
+            *column = step_column(*offset, blur);
         }
-        let used = 2 + steps.len();
+        let used = 2 + offsets.len();
         let mut normal = SMatrix::<f64, COLUMNS, COLUMNS>::identity();
         for i in 0..used {
             for j in 0..=i {
-                let product = product(&profile.weights, &columns[i], &columns[j]);
+                let product = product(weights, &columns[i], &columns[j]);
                 normal[(i, j)] = product;
                 normal[(j, i)] = product;
             }
@@ -89,7 +94,7 @@ impl StepModel {
         Self {
             columns,
             used,
-            weights: profile.weights,
+            weights: *weights,
             // Positive definite by the ridge.
             cholesky: Cholesky::new_unchecked(normal),
         }
@@ -132,8 +137,20 @@ fn product(weights: &[f64; PLACES], a: &[f64; PLACES], b: &[f64; PLACES]) -> f64
 }
 
 /// The sum of the squares of what steps do not explain of a profile, by that of noise.
-pub(super) fn misfit(profile: &LightProfile, steps: &[Step], blur: f64) -> f64 {
-    let model = StepModel::new(profile, steps, blur);
+pub(super) fn misfit<const N: usize>(
+    profile: &LightProfile<N>,
+    steps: &[Step<N>],
+    blur: f64,
+) -> f64 {
+    misfit_of(&StepModel::new(profile, steps, blur), profile)
+}
+
+/// Likewise, of a single step at a place across the curve.
+pub(super) fn misfit_at<const N: usize>(profile: &LightProfile<N>, place: f64, blur: f64) -> f64 {
+    misfit_of(&StepModel::at(&profile.weights, &[place], blur), profile)
+}
+
+fn misfit_of<const N: usize>(model: &StepModel, profile: &LightProfile<N>) -> f64 {
     let squares = profile.light.iter().map(|light| {
         let (rest, _) = model.rest(light);
         model.product(&rest, &rest)
@@ -152,7 +169,7 @@ mod tests {
     use super::*;
     use crate::assemble::profiles::light::Response;
     use crate::assemble::profiles::test_profiles::Steps;
-    use nalgebra::{DMatrix, DVector};
+    use nalgebra::{DMatrix, DVector, Vector4};
 
     const RESPONSE: Response = Response {
         exponent: 2.4,
@@ -163,15 +180,18 @@ mod tests {
     fn what_is_left_is_what_a_decomposition_leaves() {
         let seen = Steps {
             steps: vec![
-                (Step::new(0.001, -0.002, 0.001, 0.0), [150.0, 120.0, 60.0]),
-                (Step::new(0.022, 0.004, 0.0, 0.002), [-90.0, 40.0, 20.0]),
+                (
+                    Vector4::new(0.001, -0.002, 0.001, 0.0),
+                    [150.0, 120.0, 60.0],
+                ),
+                (Vector4::new(0.022, 0.004, 0.0, 0.002), [-90.0, 40.0, 20.0]),
             ],
             response: RESPONSE,
             noise: 4.0,
         };
         let tried = [
-            Step::new(0.003, 0.0, 0.0, 0.0),
-            Step::new(0.02, 0.0, 0.0, 0.0),
+            Vector4::new(0.003, 0.0, 0.0, 0.0),
+            Vector4::new(0.02, 0.0, 0.0, 0.0),
         ];
         for profile in seen.in_light(5) {
             let mut columns = vec![[1.0; PLACES], places().map(|place| place / REACH)];
