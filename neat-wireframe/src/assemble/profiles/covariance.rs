@@ -9,8 +9,7 @@ use nalgebra::{DMatrix, SMatrix};
 
 /// The covariance of the step of a curve, which is the `own` one of those that explain its
 /// profiles, by leaving out one view after the other, and by what all views have in common. `None`
-/// if too few views show it, or if it
-/// hangs on one of them.
+/// if too few views show it, or if it hangs on one of them.
 pub(super) fn covariance<const N: usize>(
     profiles: &[&LightProfile<N>],
     steps: &[Step<N>],
