@@ -4,11 +4,10 @@
 //! evaluations of the error-bounded sampler: a share of its nodes is refreshed
 //! every few iterations.
 
-use super::inverse_cdf::{cumulate, invert};
+use super::ray_sections::RaySections;
 use super::redrawn::Redraw;
 use super::{DistanceQuery, RayBundle, RaySamples, SamplingNoise};
-use neat_tensor::kernels::cpu::density::passed_shares;
-use neat_tensor::sampling::{GRID_FLAT_STEP, MIN_HALF_CHORD_SQUARED, MIN_NEAR};
+use neat_tensor::sampling::{MIN_HALF_CHORD_SQUARED, MIN_NEAR};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -178,16 +177,6 @@ fn mix(a: f32, b: f32, t: f32) -> f32 {
 /// Points per query while a grid is refreshed: bounds the memory of the network.
 const QUERY_CHUNK: usize = 16_384;
 
-/// Working memory of one ray after the other.
-#[derive(Default)]
-struct Scratch {
-    edges: Vec<f32>,
-    sdf: Vec<f32>,
-    lengths: Vec<f32>,
-    positions: Vec<f32>,
-    cdf: Vec<f32>,
-}
-
 impl GridCachedConfig {
     /// Refreshes the share of the grid that is due at `iteration`; everything at
     /// the first.
@@ -253,8 +242,8 @@ impl GridCachedConfig {
         grid: &DistanceGrid,
         jitter: impl Fn(usize, usize) -> f32 + Sync,
     ) -> RaySamples {
-        let (lookups, drawn, even) = (self.lookups, self.importance_samples, self.uniform_samples);
-        let per_ray = drawn + even;
+        let lookups = self.lookups;
+        let per_ray = self.importance_samples + self.uniform_samples;
         // A density sharper than the grid resolves would miss the surface.
         let beta = beta.max(0.5 * grid.cell());
         let mut far = vec![0.0f32; rays.len()];
@@ -262,20 +251,16 @@ impl GridCachedConfig {
         z.par_chunks_mut(per_ray)
             .zip(far.par_iter_mut())
             .enumerate()
-            .for_each_init(Scratch::default, |scratch, (ray, (z, far))| {
+            .for_each_init(RaySections::default, |sections, (ray, (z, far))| {
                 let jitter = |i: usize| jitter(ray, i);
                 let (near, end) = chord(rays, ray, grid.radius);
                 *far = end;
-                let at = |t: f32| near + (end - near) * t;
-                let Scratch {
-                    edges,
-                    sdf,
-                    lengths,
-                    positions,
-                    cdf,
-                } = scratch;
+                let RaySections { edges, sdf, .. } = sections;
                 edges.clear();
-                edges.extend((0..lookups).map(|i| at((i as f32 + jitter(i)) / lookups as f32)));
+                edges.extend(
+                    (0..lookups)
+                        .map(|i| near + (end - near) * ((i as f32 + jitter(i)) / lookups as f32)),
+                );
                 edges.push(end);
                 sdf.clear();
                 sdf.extend(
@@ -283,27 +268,10 @@ impl GridCachedConfig {
                         .iter()
                         .map(|t| grid.lookup(rays.point(ray, *t))),
                 );
-                lengths.clear();
-                lengths.extend(edges.windows(2).map(|e| (e[1] - e[0]).max(0.0)));
-                cdf.resize(lookups + 1, 0.0);
-                passed_shares(sdf, lengths, beta, &mut cdf[1..]);
-                let mut transmittance = 1.0f32;
-                for mass in &mut cdf[1..] {
-                    let passed = *mass;
-                    *mass = transmittance * (1.0 - passed) + self.weight_floor as f32;
-                    transmittance *= passed;
-                }
-                cumulate(cdf);
-                positions.clear();
-                positions.extend((0..drawn).map(|i| {
-                    let u = (i as f32 + jitter(lookups + i)) / drawn as f32;
-                    invert(edges, cdf, GRID_FLAT_STEP, u)
-                }));
-                positions.extend(
-                    (0..even).map(|i| at((i as f32 + jitter(lookups + drawn + i)) / even as f32)),
-                );
-                positions.sort_unstable_by(f32::total_cmp);
-                z.copy_from_slice(positions);
+                sections.weigh(beta, self.weight_floor as f32);
+                sections.draw(z, self.importance_samples, (near, end), |i| {
+                    jitter(lookups + i)
+                });
             });
         RaySamples::new(z, per_ray, |ray, last| (far[ray] - last).max(0.0))
     }

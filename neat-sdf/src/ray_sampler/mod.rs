@@ -9,6 +9,7 @@ pub(crate) mod error_bound;
 pub(crate) mod grid_cached;
 pub(crate) mod inverse_cdf;
 mod noise;
+mod ray_sections;
 mod redrawn;
 mod uniform;
 

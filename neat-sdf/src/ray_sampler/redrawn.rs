@@ -5,9 +5,7 @@
 //! what VolSDF's Algorithm 1 repeats until its bound holds.
 
 use super::RaySamples;
-use super::inverse_cdf::{cumulate, invert};
-use neat_tensor::kernels::cpu::density::passed_shares;
-use neat_tensor::sampling::GRID_FLAT_STEP;
+use super::ray_sections::RaySections;
 use rayon::prelude::*;
 
 /// A section between two samples is cut into so many, each with the density of its middle.
@@ -27,14 +25,6 @@ pub(super) struct Redraw<'a> {
     pub drawn: usize,
 }
 
-#[derive(Default)]
-struct Scratch {
-    edges: Vec<f32>,
-    middles: Vec<f32>,
-    lengths: Vec<f32>,
-    cdf: Vec<f32>,
-}
-
 impl Redraw<'_> {
     /// As many samples as the first. `chord` says where a ray enters and leaves what is
     /// sampled, `jitter(ray, i)` in [0, 1) where in its stratum sample `i` lies.
@@ -46,62 +36,34 @@ impl Redraw<'_> {
         let per_ray = self.first.per_ray;
         let mut z = vec![0.0f32; self.first.z.len()];
         (z.par_chunks_mut(per_ray).enumerate()).for_each_init(
-            Scratch::default,
-            |scratch, (ray, z)| {
-                let (near, far) = chord(ray);
-                self.cut(scratch, ray, near, far);
-                let Scratch { edges, cdf, .. } = &*scratch;
-                for (i, z) in z.iter_mut().enumerate() {
-                    *z = if i < self.drawn {
-                        let u = (i as f32 + jitter(ray, i)) / self.drawn as f32;
-                        invert(edges, cdf, GRID_FLAT_STEP, u)
-                    } else {
-                        let even = (per_ray - self.drawn) as f32;
-                        let t = ((i - self.drawn) as f32 + jitter(ray, i)) / even;
-                        near + (far - near) * t
-                    };
-                }
-                z.sort_unstable_by(f32::total_cmp);
+            RaySections::default,
+            |sections, (ray, z)| {
+                self.cut(sections, ray, chord(ray));
+                sections.weigh(self.beta, self.weight_floor);
+                sections.draw(z, self.drawn, chord(ray), |i| jitter(ray, i));
             },
         );
         RaySamples::new(z, per_ray, |ray, last| (chord(ray).1 - last).max(0.0))
     }
 
-    /// Fills `edges` and `cdf` with those of ray `ray`.
-    fn cut(&self, scratch: &mut Scratch, ray: usize, near: f32, far: f32) {
+    /// Cuts ray `ray` into parts.
+    fn cut(&self, sections: &mut RaySections, ray: usize, (near, far): (f32, f32)) {
         let per_ray = self.first.per_ray;
         let of_ray = ray * per_ray..(ray + 1) * per_ray;
         let (z, sdf) = (&self.first.z[of_ray.clone()], &self.sdf[of_ray]);
-        let Scratch {
-            edges,
-            middles,
-            lengths,
-            cdf,
-        } = scratch;
-        edges.clear();
-        middles.clear();
+        sections.edges.clear();
+        sections.sdf.clear();
         let (first, last) = ((near, sdf[0]), (far, sdf[per_ray - 1]));
         let mut from = first;
         for to in z.iter().copied().zip(sdf.iter().copied()).chain([last]) {
             for part in 0..PARTS {
                 let at = |t: f32, a: f32, b: f32| a + (b - a) * t / PARTS as f32;
-                edges.push(at(part as f32, from.0, to.0));
-                middles.push(at(part as f32 + 0.5, from.1, to.1));
+                sections.edges.push(at(part as f32, from.0, to.0));
+                sections.sdf.push(at(part as f32 + 0.5, from.1, to.1));
             }
             from = to;
         }
-        edges.push(far);
-        lengths.clear();
-        lengths.extend(edges.windows(2).map(|e| (e[1] - e[0]).max(0.0)));
-        cdf.resize(edges.len(), 0.0);
-        passed_shares(middles, lengths, self.beta, &mut cdf[1..]);
-        let mut transmittance = 1.0f32;
-        for mass in &mut cdf[1..] {
-            let passed = *mass;
-            *mass = transmittance * (1.0 - passed) + self.weight_floor;
-            transmittance *= passed;
-        }
-        cumulate(cdf);
+        sections.edges.push(far);
     }
 }
 
