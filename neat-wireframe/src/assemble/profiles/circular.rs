@@ -61,11 +61,8 @@ impl Circular {
             let expected = point + self.by_step(&point) * step;
             (similar.point_at(angle) - expected).norm()
         };
-        if self
-            .ends()
-            .into_iter()
-            .any(|end| off(end) > MAX_OFF * self.pixel)
-        {
+        let is_off = |end: &f64| off(*end) > MAX_OFF * self.pixel;
+        if self.ends().iter().any(is_off) {
             return None;
         }
         if similar.is_closed() {

@@ -139,7 +139,7 @@ pub(super) fn place_curves(
     let Some(response) = response_of(&straight.profiles, &circular.profiles) else {
         return ControlFlow::Continue(());
     };
-    let round = {
+    let moved_arcs = {
         let progress = &mut part(progress, [LOOKED, ROUND]);
         move_arcs(
             arcs,
@@ -160,7 +160,7 @@ pub(super) fn place_curves(
         ?response,
         moved,
         beside,
-        round,
+        moved_arcs,
         "curves are placed by profiles"
     );
     ControlFlow::Continue(())
