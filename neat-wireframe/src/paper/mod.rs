@@ -2,6 +2,7 @@
 //! (§4.3): refine, gather lines, vote, attract, check visibility.
 
 mod attraction;
+mod corner_evidence;
 mod image_refinement;
 mod junction_refinement;
 mod junction_voting;
