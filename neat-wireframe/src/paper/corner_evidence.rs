@@ -3,56 +3,45 @@
 //! A detector cuts a curve into segments, or a long line, somewhere else in each view, and the
 //! field puts junctions where it may. They attract whatever ends nearby. Around a corner ends
 //! lie as near as the detector puts them; of cuts the nearest junction tells nothing. So the
-//! distances of the ends that a junction attracts, along which a segment may be cut, are
-//! explained by both:
+//! distances of the ends that a junction attracts are explained in two ways:
 //!
-//! - a corner: Cauchy's distribution, whose scale the corners of the scene tell, and
-//! - cuts: any distance up to the gate is as likely as any other.
-
-use crate::statistics::upper_median;
+//! - by cuts: any distance up to the gate is as likely as any other;
+//! - by a corner, around which some share of the ends has Cauchy's distribution, and cuts.
 
 /// What has been fitted to the ends of a corner.
 const COORDINATES: f64 = 3.0;
-/// Scale and corners depend on each other. They settle in two or three rounds.
-const MAX_ROUNDS: usize = 10;
+/// Halvings of the interval in which the likeliest share of a corner's ends lies.
+const HALVINGS: usize = 30;
 
-/// For each junction what speaks for a corner there, in nats. A corner has more than none.
+/// What speaks for a corner that attracts ends at these `distances` in pixels, none of them
+/// larger than `gate`, in nats. Around corners half of the ends lie nearer than `scale`.
 ///
-/// `distances` are those of the ends that it attracts from its projection, in pixels; none is
-/// larger than `gate`. The scale of the ends around corners is never taken for less than
-/// `min_scale`.
-///
-/// The fit of its coordinates costs a corner half the logarithm of the number of all ends for
-/// each (Schwarz's criterion): some ends are near each other anywhere.
-pub(super) fn corner_evidence(distances: &[Vec<f64>], gate: f64, min_scale: f64) -> Vec<f64> {
-    let count: usize = distances.iter().map(Vec::len).sum();
-    let cost = 0.5 * COORDINATES * (count.max(1) as f64).ln();
-    let mut is_corner = vec![true; distances.len()];
-    let mut evidence = Vec::new();
-    for _ in 0..MAX_ROUNDS {
-        let of_corners = distances.iter().zip(&is_corner).filter(|(_, is)| **is);
-        let mut ends: Vec<f64> = of_corners.flat_map(|(ends, _)| ends).copied().collect();
-        // Half of Cauchy's magnitudes are smaller than its scale.
-        let scale = upper_median(&mut ends).max(min_scale);
-        let of_junction = |ends: &Vec<f64>| {
-            let gains = ends.iter().map(|end| corner_over_cut(*end, scale, gate));
-            gains.sum::<f64>() - cost
-        };
-        evidence = distances.iter().map(of_junction).collect();
-        let now: Vec<bool> = evidence.iter().map(|nats| *nats > 0.0).collect();
-        if now == is_corner || !now.contains(&true) {
-            break;
+/// Its coordinates have been fitted to these ends, which costs half the logarithm of their
+/// number for each (Schwarz's criterion). Of no ends nothing speaks.
+pub(super) fn corner_evidence(distances: &[f64], gate: f64, scale: f64) -> f64 {
+    // By how much a corner's end is likelier than a cut so far away, less one.
+    let gains: Vec<f64> = (distances.iter())
+        .map(|distance| corner_by_cut(*distance, gate, scale) - 1.0)
+        .collect();
+    let slope = |share: f64| -> f64 { gains.iter().map(|gain| gain / (1.0 + share * gain)).sum() };
+    // The likelihood is concave in the share.
+    let [mut low, mut high] = [0.0, 1.0];
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if slope(middle) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
         }
-        is_corner = now;
     }
-    evidence
+    let explained: f64 = gains.iter().map(|gain| (low * gain).ln_1p()).sum();
+    explained - 0.5 * COORDINATES * (distances.len().max(1) as f64).ln()
 }
 
-/// Logarithm of how much likelier an end is so far from a corner than from a cut.
-fn corner_over_cut(distance: f64, scale: f64, gate: f64) -> f64 {
+/// How much likelier an end is so far from a corner than from a cut.
+fn corner_by_cut(distance: f64, gate: f64, scale: f64) -> f64 {
     let ratio = distance / scale;
-    let corner = (scale * (gate / scale).atan() * (1.0 + ratio * ratio)).recip();
-    (corner * gate).ln()
+    gate / (scale * (gate / scale).atan() * (1.0 + ratio * ratio))
 }
 
 #[cfg(test)]
@@ -65,41 +54,38 @@ mod tests {
     #[test]
     fn both_explanations_are_distributions() {
         let cells = 100_000;
-        let at = |cell: usize| GATE * (cell as f64 + 0.5) / f64::from(cells as u32);
+        let at = |cell: u32| GATE * (f64::from(cell) + 0.5) / f64::from(cells);
         for scale in [0.05, 0.5, 5.0] {
-            let mean = (0..cells)
-                .map(|cell| corner_over_cut(at(cell), scale, GATE).exp())
-                .sum::<f64>()
-                / cells as f64;
-            assert!((mean - 1.0).abs() < 1e-3, "{mean}");
+            let sum: f64 = (0..cells)
+                .map(|cell| corner_by_cut(at(cell), GATE, scale))
+                .sum();
+            assert!((sum / f64::from(cells) - 1.0).abs() < 1e-3, "{sum}");
         }
     }
 
-    /// Ends around a corner with this noise, and as many cuts.
-    fn ends(noise: &mut Noise, count: usize, scale: f64) -> Vec<f64> {
-        (0..count).map(|_| scale * noise.uniform().abs()).collect()
+    fn ends(noise: &mut Noise, count: usize, farthest: f64) -> Vec<f64> {
+        let end = |_| farthest * noise.uniform().abs();
+        (0..count).map(end).collect()
     }
 
     #[test]
-    fn corners_are_told_from_cuts_whatever_the_noise_and_however_many() {
+    fn corners_are_told_from_cuts() {
         let mut noise = Noise(1);
-        for (scale, corners, cuts) in [(0.5, 8, 24), (2.0, 8, 8), (0.5, 8, 0), (0.01, 2, 20)] {
-            let mut distances: Vec<Vec<f64>> =
-                (0..corners).map(|_| ends(&mut noise, 40, scale)).collect();
-            distances.extend((0..cuts).map(|_| ends(&mut noise, 25, GATE)));
-            let evidence = corner_evidence(&distances, GATE, 1.0);
-            assert!(evidence[..corners].iter().all(|nats| *nats > 0.0));
-            assert!(evidence[corners..].iter().all(|nats| *nats < 0.0));
+        let evidence = |ends: &[f64]| corner_evidence(ends, GATE, 1.0);
+        for _ in 0..100 {
+            let corner = ends(&mut noise, 20, 1.0);
+            let cuts = ends(&mut noise, 20, GATE);
+            assert!(evidence(&corner) > 20.0);
+            assert!(evidence(&cuts) < 0.0);
+            // Ends that belong elsewhere do not hide a corner.
+            assert!(evidence(&[corner, cuts].concat()) > 0.0);
         }
     }
 
     #[test]
-    fn few_ends_are_no_corner() {
-        let mut noise = Noise(2);
-        let mut distances = vec![ends(&mut noise, 40, 0.5); 3];
-        distances.extend([vec![], vec![0.2; 3], vec![0.2; 6]]);
-        let evidence = corner_evidence(&distances, GATE, 1.0);
-        assert!(evidence[3] < 0.0 && evidence[4] < 0.0 && evidence[5] > 0.0);
-        assert!(corner_evidence(&[], GATE, 1.0).is_empty());
+    fn one_end_is_a_corner_and_none_or_far_ones_are_not() {
+        assert!(corner_evidence(&[0.1], GATE, 1.0) > 0.0);
+        assert!(corner_evidence(&[], GATE, 1.0) <= 0.0);
+        assert!(corner_evidence(&[5.0; 10], GATE, 1.0) < 0.0);
     }
 }

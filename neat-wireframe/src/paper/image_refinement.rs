@@ -83,13 +83,7 @@ pub(super) fn refine_by_images(
         refined = round(&places(&refined));
     }
     // What a junction without a corner attracted goes to others, or nowhere.
-    loop {
-        let corners = corners(&places(&refined), views, lines_by_view, config);
-        if corners.len() == refined.len() {
-            return refined;
-        }
-        refined = round(&corners);
-    }
+    round(&corners(&places(&refined), views, lines_by_view, config))
 }
 
 /// The junctions at which 2D segments end because a corner is there.
@@ -109,15 +103,15 @@ fn corners(
             ends[junction].extend(pixel.map(|pixel| (key, (pixel - end).norm())));
         }
     }
-    let distances: Vec<Vec<f64>> = (ends.into_iter())
-        .map(|ends| ends.into_values().collect())
-        .collect();
-    // Nearer ends than what the fit takes for noise tell no more of a corner: junctions that
-    // became one had each its own.
-    let min_scale = LOSS.cauchy_scale_in_pixels;
-    let evidence = corner_evidence(&distances, config.max_end_distance, min_scale);
-    let told = junctions.iter().zip(evidence);
-    told.filter(|(_, nats)| *nats > 0.0)
+    let is_corner = |ends: BTreeMap<_, f64>| {
+        let distances: Vec<f64> = ends.into_values().collect();
+        // Nearer ends than what the fit takes for noise tell no more of a corner: junctions
+        // that became one had each its own.
+        let scale = LOSS.cauchy_scale_in_pixels;
+        corner_evidence(&distances, config.max_end_distance, scale) > 0.0
+    };
+    let told = junctions.iter().zip(ends.into_iter().map(is_corner));
+    told.filter(|(_, is_corner)| *is_corner)
         .map(|(place, _)| *place)
         .collect()
 }
