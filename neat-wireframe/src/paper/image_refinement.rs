@@ -61,7 +61,7 @@ impl Default for ImageRefinementConfig {
 }
 
 /// Moves and merges `junctions` until the edges between them lie on the 2D segments of the
-/// NEAT lines that they attract, and leaves out those at which segments do not end: with the
+/// NEAT lines that they attract, and leaves out those between which segments are cut: with the
 /// number of 2D segments of each. Junctions that attract none are left out.
 pub(super) fn refine_by_images(
     junctions: Vec<Vector3<f64>>,
@@ -82,12 +82,19 @@ pub(super) fn refine_by_images(
     for _ in 0..ROUNDS {
         refined = round(&places(&refined));
     }
-    // What a junction without a corner attracted goes to others, or nowhere.
-    round(&corners(&places(&refined), views, lines_by_view, config))
+    // What the others attracted goes to these, or nowhere.
+    round(&ends_of_edges(
+        &places(&refined),
+        views,
+        lines_by_view,
+        config,
+    ))
 }
 
-/// The junctions at which 2D segments end because a corner is there.
-fn corners(
+/// The junctions at which 2D segments end because a corner is there, and those that 2D segments
+/// join to one: an edge may end where nothing else does, or something hides it, but one between
+/// two places that are no corners is a piece of something longer.
+fn ends_of_edges(
     junctions: &[Vector3<f64>],
     views: &[ViewObservation],
     lines_by_view: &[Vec<NeatLine>],
@@ -110,8 +117,15 @@ fn corners(
         let scale = LOSS.cauchy_scale_in_pixels;
         corner_evidence(&distances, config.max_end_distance, scale) > 0.0
     };
-    let told = junctions.iter().zip(ends.into_iter().map(is_corner));
-    told.filter(|(_, is_corner)| *is_corner)
+    let is_corner: Vec<bool> = ends.into_iter().map(is_corner).collect();
+    let mut kept = is_corner.clone();
+    for AttractedSegment { junctions, .. } in &attracted {
+        let [a, b] = *junctions;
+        kept[a] |= is_corner[b];
+        kept[b] |= is_corner[a];
+    }
+    let told = junctions.iter().zip(kept);
+    told.filter(|(_, kept)| *kept)
         .map(|(place, _)| *place)
         .collect()
 }
@@ -277,25 +291,30 @@ mod tests {
         }
     }
 
+    /// Adds the 2D segment between two points to a view, and its line.
+    fn add(view: &mut ViewObservation, lines: &mut Vec<NeatLine>, [a, b]: [Vector3<f64>; 2]) {
+        let seen = |place| project_in_front(&view.camera, &place).unwrap();
+        let (segment_in_view, segment) = (view.segments.len(), LineSegment2::new(seen(a), seen(b)));
+        lines.push(NeatLine {
+            segment_in_view,
+            segment: LineSegment3::new(a, b),
+            rays: 1,
+            support_distance: 0.0,
+        });
+        view.segments.push(ScoredSegment2 {
+            segment,
+            score: 1.0,
+            edge: segment_in_view,
+        });
+    }
+
     /// Adds the rim of a hole to the views of a cube: twelve chords, cut elsewhere in each.
     fn add_rim(views: &mut [ViewObservation], lines: &mut [Vec<NeatLine>]) {
         let mut noise = Noise(3);
         for (view, lines) in views.iter_mut().zip(lines) {
             let turn = noise.uniform();
             for chord in 0..12 {
-                let [a, b] = [chord, chord + 1].map(|cut| on_rim(cut, turn));
-                let seen = |place| project_in_front(&view.camera, &place).unwrap();
-                lines.push(NeatLine {
-                    segment_in_view: view.segments.len(),
-                    segment: LineSegment3::new(a, b),
-                    rays: 1,
-                    support_distance: 0.0,
-                });
-                view.segments.push(ScoredSegment2 {
-                    segment: LineSegment2::new(seen(a), seen(b)),
-                    score: 1.0,
-                    edge: view.segments.len(),
-                });
+                add(view, lines, [chord, chord + 1].map(|cut| on_rim(cut, turn)));
             }
         }
     }
@@ -320,6 +339,26 @@ mod tests {
             let off = corners.iter().map(|corner| (junction - corner).norm());
             assert!(off.fold(f64::INFINITY, f64::min) < 1e-3);
         }
+    }
+
+    #[test]
+    fn an_edge_of_a_corner_may_end_anywhere() {
+        let (mut views, mut lines) = field_of_cube(0.01);
+        let (mut junctions, _) = cube();
+        let [corner, end] = [junctions[0], 1.8 * junctions[0]];
+        let mut noise = Noise(4);
+        let mut far_ends = Vec::new();
+        for (view, lines) in views.iter_mut().zip(&mut lines) {
+            let cut = end * (1.0 + 0.02 * noise.uniform());
+            far_ends.push(view.camera.project(&cut).pixel - view.camera.project(&end).pixel);
+            add(view, lines, [corner, cut]);
+        }
+        let config = ImageRefinementConfig::default();
+        let distances: Vec<f64> = far_ends.iter().map(|end| end.norm()).collect();
+        assert!(corner_evidence(&distances, config.max_end_distance, 1.0) < 0.0);
+        junctions.push(end);
+        let refined = refine_by_images(junctions, &views, &lines, &config);
+        assert_eq!(refined.len(), 9);
     }
 
     #[test]
