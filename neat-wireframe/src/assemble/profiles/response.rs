@@ -229,6 +229,27 @@ mod tests {
     }
 
     #[test]
+    fn the_curves_of_most_views_are_asked_until_there_are_enough() {
+        let seen = Steps {
+            steps: vec![(Vector4::zeros(), [200.0; 3])],
+            response: Response {
+                exponent: 1.0,
+                blur: 0.5,
+            },
+            noise: 0.0,
+        };
+        let lines = [3, 12, 6, 12].map(|views| seen.profiles(views));
+        let telling = Telling::new(&lines);
+        let asked = |share: f64| -> Vec<usize> {
+            let views = |profiles: &Vec<&Profile<4>>| profiles.last().unwrap().view + 1;
+            telling.most_seen(share).0.iter().map(views).collect()
+        };
+        assert_eq!(asked(0.3), [12]);
+        assert_eq!(asked(0.7), [12, 12]);
+        assert_eq!(asked(2.0), [12, 12, 6, 3]);
+    }
+
+    #[test]
     fn what_is_no_edge_tells_nothing() {
         assert_eq!(
             response_of(
