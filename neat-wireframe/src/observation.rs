@@ -29,3 +29,9 @@ impl ViewObservation {
             .collect()
     }
 }
+
+/// What tells the detected ends of all views apart. Ends of one vertex have the same
+/// coordinates: that is how 2D wireframes reach this crate.
+pub(crate) fn end_key(view: usize, end: &Vector2<f64>) -> (usize, [u64; 2]) {
+    (view, [end.x, end.y].map(f64::to_bits))
+}

@@ -8,6 +8,7 @@
 use super::config::CovarianceConfig;
 use super::provenance::EdgeProvenance;
 use crate::ViewObservation;
+use crate::observation::end_key;
 use crate::projection::project_in_front;
 use nalgebra::{Vector2, Vector3};
 use std::collections::BTreeMap;
@@ -46,9 +47,6 @@ pub(super) fn detected_ends(
     provenance: &[EdgeProvenance],
     config: &CovarianceConfig,
 ) -> Vec<DetectedEnd> {
-    // Ends of one vertex have the same coordinates: that is how 2D wireframes
-    // reach this crate.
-    let key = |view: usize, end: &Vector2<f64>| (view, [end.x, end.y].map(f64::to_bits));
     let mut ends: BTreeMap<_, Gathered> = BTreeMap::new();
     for (edge, found) in edges.iter().zip(provenance) {
         if edge[0] == edge[1] {
@@ -61,7 +59,7 @@ pub(super) fn detected_ends(
                 .min(config.max_end_distance_in_pixels);
             for (junction, end) in edge.iter().zip(support.segment.ends()) {
                 let gathered = ends
-                    .entry(key(support.view, &end))
+                    .entry(end_key(support.view, &end))
                     .or_insert_with(|| Gathered::new(end));
                 gathered.edges.push(*edge);
                 gathered.direction = along.normalize();
@@ -76,7 +74,7 @@ pub(super) fn detected_ends(
     }
     for (view, observation) in observations.iter().enumerate() {
         for end in observation.segments.iter().flat_map(|s| s.segment.ends()) {
-            if let Some(gathered) = ends.get_mut(&key(view, &end)) {
+            if let Some(gathered) = ends.get_mut(&end_key(view, &end)) {
                 gathered.segments += 1;
             }
         }

@@ -11,6 +11,7 @@ use super::corner_evidence::corner_evidence;
 use super::neat_lines::NeatLine;
 use crate::ViewObservation;
 use crate::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, bundle_adjust};
+use crate::observation::end_key;
 use crate::projection::project_in_front;
 use crate::statistics::upper_median;
 use nalgebra::{Vector2, Vector3};
@@ -105,7 +106,7 @@ fn ends_of_edges(
     let mut ends = vec![BTreeMap::new(); junctions.len()];
     for segment in &attracted {
         for (junction, end) in segment.junctions.into_iter().zip(segment.detection.ends()) {
-            let key = (segment.view, [end.x, end.y].map(f64::to_bits));
+            let key = end_key(segment.view, &end);
             let pixel = project_in_front(&views[segment.view].camera, &junctions[junction]);
             ends[junction].extend(pixel.map(|pixel| (key, (pixel - end).norm())));
         }
@@ -147,16 +148,9 @@ fn attracted_segments(
     config: &ImageRefinementConfig,
 ) -> Vec<AttractedSegment> {
     let of_view = |(view, lines): (usize, &Vec<NeatLine>)| -> Vec<AttractedSegment> {
-        let attracted = lines.iter().filter_map(|line| {
-            attracted_segment(junctions, &views[view], line, config.max_end_distance)
-        });
-        attracted
-            .map(|(junctions, detection)| AttractedSegment {
-                view,
-                junctions,
-                detection,
-            })
-            .collect()
+        let attracted =
+            |line| attracted_segment(junctions, views, view, line, config.max_end_distance);
+        lines.iter().filter_map(attracted).collect()
     };
     let by_view: Vec<_> = (lines_by_view.par_iter().enumerate())
         .map(of_view)
@@ -164,27 +158,34 @@ fn attracted_segments(
     by_view.into_iter().flatten().collect()
 }
 
-/// The junctions that a line is attracted to, in ascending order, and its 2D segment in that
-/// order; `None` if they do not lie where it ends.
+/// The 2D segment of a line that is attracted; `None` if it does not end where the junctions lie.
 fn attracted_segment(
     junctions: &[Vector3<f64>],
-    view: &ViewObservation,
+    views: &[ViewObservation],
+    view: usize,
     line: &NeatLine,
     max_end_distance: f64,
-) -> Option<([usize; 2], LineSegment2)> {
+) -> Option<AttractedSegment> {
+    let ViewObservation {
+        camera, segments, ..
+    } = &views[view];
     let mut ends = attracted_ends(&line.segment, junctions)?;
-    let mut detection = view.segments[line.segment_in_view].segment;
+    let mut detection = segments[line.segment_in_view].segment;
     if ends[0] > ends[1] {
         ends.reverse();
         detection = detection.reversed();
     }
     let near = |junction: usize, end: Vector2<f64>| {
-        let pixel = project_in_front(&view.camera, &junctions[junction]);
+        let pixel = project_in_front(camera, &junctions[junction]);
         pixel.is_some_and(|pixel| (pixel - end).norm() < max_end_distance)
     };
     let [start, end] = ends;
     let is_near = start != end && near(start, detection.start) && near(end, detection.end);
-    is_near.then_some((ends, detection))
+    is_near.then_some(AttractedSegment {
+        view,
+        junctions: ends,
+        detection,
+    })
 }
 
 /// The edges between junctions, each with the 2D segments that it attracts.
