@@ -10,7 +10,8 @@ OUT is the folder that
 has filled. Every format must hold as many vertices and edges as WIREFRAME.json, the
 same edges, and the same coordinates to 1e-6 of the wireframe's extent; and its arcs, as
 arcs or as chains of straight pieces, where the format has them. Closed shells must be valid
-solids in STEP and watertight triangles elsewhere, of the volume that their loops enclose.
+solids in STEP and CityJSON and watertight triangles elsewhere, of the volume that their loops
+enclose; surfaces in CityJSON are what their normals say, and those of the house what it has.
 Prints a line per file; the exit code is 1 if one differs. Needs scripts/requirements-readers.txt.
 """
 
@@ -18,6 +19,7 @@ import json
 import math
 import sys
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -56,10 +58,10 @@ class Arc:
 class Wireframe:
     """Vertices [V, 3], index pairs [E, 2], arcs and shells."""
 
-    def __init__(self, vertices, edges, arcs=(), shells=()):
+    def __init__(self, vertices, edges, arcs=(), shells=(), name=None):
         self.vertices = np.asarray(vertices, dtype=float).reshape(-1, 3)
         self.edges = np.asarray(edges, dtype=int).reshape(-1, 2)
-        self.arcs, self.shells = arcs, shells
+        self.arcs, self.shells, self.name = arcs, shells, name
 
     def drawn(self):
         """With arcs as chains of straight pieces, for formats without curves."""
@@ -526,6 +528,61 @@ def read_geojson(path, expected):
     return "json"
 
 
+def read_cityjson(path, expected):
+    import trimesh
+    from cjio.cityjson import CityJSON
+
+    with open(path) as file:
+        city = CityJSON(file=file)
+    check(city.j["version"] == "2.0" and city.is_transform(), "another version")
+    check(set(city.j["CityObjects"]) == {f"building-{i + 1}" for i in range(
+        sum(shell["closed"] for shell in expected.shells)
+        + any(not shell["closed"] for shell in expected.shells))}, "buildings")
+    faces = [face for shell in expected.shells for face in shell["faces"]]
+    counts = [surface_counts(building) for building in city.j["CityObjects"].values()]
+    if expected.name == "house":
+        check(counts[0] == {"GroundSurface": 1, "WallSurface": 6, "RoofSurface": 2,
+                            "OuterFloorSurface": 1, "OuterCeilingSurface": 1}, f"{counts[0]}")
+    city.triangulate(sloppy=True)
+    city.decompress()
+    vertices = np.asarray(city.j["vertices"], dtype=float).reshape(-1, 3)
+    solids = 0.0
+    for building in city.j["CityObjects"].values():
+        (geometry,) = building["geometry"]
+        is_solid = geometry["type"] == "Solid"
+        boundaries, values = geometry["boundaries"], geometry["semantics"]["values"]
+        if is_solid:
+            (boundaries,), (values,) = boundaries, values
+        triangles = np.asarray(boundaries).reshape(-1, 3)
+        corners = vertices[triangles]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        rises = normals[:, 2] / np.linalg.norm(normals, axis=-1)
+        for points, rise, value in zip(corners, rises, values, strict=True):
+            surface = geometry["semantics"]["surfaces"][value]
+            face = faces[surface["face"]]
+            if "plane" in face:
+                off = points @ face["plane"]["normal"] - face["plane"]["offset"]
+                check(np.abs(off).max() < 1e-4 * expected.extent(), "a vertex beside its plane")
+            kind = surface["type"]
+            agrees = {"WallSurface": abs(rise) < 0.18, "RoofSurface": rise > 0.17,
+                      "OuterFloorSurface": rise > 0.17, "GroundSurface": rise < -0.17,
+                      "OuterCeilingSurface": rise < -0.17}[kind]
+            check(agrees, f"a {kind} whose normal rises by {rise}")
+        if is_solid:
+            mesh = trimesh.Trimesh(vertices, triangles, process=False)
+            check(mesh.is_watertight and mesh.is_winding_consistent, "a solid has holes")
+            solids += mesh.volume
+    check_volume(solids, expected, "solids")
+    return f"cjio and trimesh, {counts}"
+
+
+def surface_counts(building):
+    """How many surfaces of each kind a building has, before it is cut into triangles."""
+    semantics = building["geometry"][0]["semantics"]
+    values = np.ravel(semantics["values"]).tolist()
+    return dict(Counter(semantics["surfaces"][value]["type"] for value in values))
+
+
 def read_npz(path, expected):
     arrays = np.load(path)
     # As the published evaluation reads it.
@@ -571,11 +628,13 @@ def main(arguments):
     truth = json.loads(Path(arguments[0]).read_text())
     directory = Path(arguments[1])
     expected = Wireframe(truth["junctions"], truth.get("edges", truth.get("lines", [])),
-                         [Arc(**arc) for arc in truth.get("arcs", [])], truth.get("shells", []))
+                         [Arc(**arc) for arc in truth.get("arcs", [])], truth.get("shells", []),
+                         truth.get("metadata", {}).get("scene"))
     readers = [("wireframe.json", read_json), ("wireframe.obj", read_obj),
                ("wireframe.ply", read_ply), ("wireframe.gltf", read_gltf),
                ("wireframe.glb", read_gltf), ("wireframe.dxf", read_dxf),
                ("wireframe.step", read_step), ("wireframe.geojson", read_geojson),
+               ("wireframe.city.json", read_cityjson),
                ("wireframe.npz", read_npz), ("colmap", read_colmap)]
     for view in ("front", "top", "side", "isometric"):
         readers += [(f"wireframe-{view}.svg", read_svg), (f"wireframe-{view}.png", read_png)]

@@ -102,7 +102,7 @@ fn an_export_takes_every_probability() {
 #[test]
 fn an_export_refuses_options_without_effect() {
     let run = TestRun::new();
-    let cases: [(&[&str], &str); 11] = [
+    let cases: [(&[&str], &str); 14] = [
         (
             &["--format", "dxf", "--view", "top"],
             "--view has no meaning for dxf",
@@ -115,6 +115,14 @@ fn an_export_refuses_options_without_effect() {
             &["--format", "svg", "--unit", "m"],
             "--unit has no meaning for svg",
         ),
+        (
+            &["--format", "geojson", "--up", "-y"],
+            "--up has no meaning for geojson",
+        ),
+        (
+            &["--format", "cityjson", "--up", "north"],
+            "possible values: x, y, z, -x, -y, -z",
+        ),
         (&["--format", "dxf", "--backend", "flex"], "--backend"),
         (&["--out", "house.dxf", "--backend", "flex"], "--mesh"),
         (&["--format", "dxf", "--no-cache"], "--no-cache"),
@@ -122,6 +130,7 @@ fn an_export_refuses_options_without_effect() {
         (&["--format", "dxf", "--resolution", "64"], "--resolution"),
         (&["--mesh", "--view", "top"], "--view"),
         (&["--mesh", "--unit", "m"], "--unit"),
+        (&["--mesh", "--up", "y"], "--up"),
         (&["--mesh", "--out", "house.obj"], ".ply"),
     ];
     for (arguments, part) in cases {
@@ -131,6 +140,7 @@ fn an_export_refuses_options_without_effect() {
     for arguments in [
         ["--format", "svg", "--width", "800"],
         ["--format", "step", "--unit", "m"],
+        ["--format", "cityjson", "--up", "-y"],
     ] {
         neat(&["export", &run.path("run")])
             .args(arguments)

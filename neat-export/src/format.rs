@@ -5,7 +5,7 @@
 
 use crate::ExportError;
 use crate::target::Target;
-use crate::{colmap, dxf, geojson, gltf, limap, npz, picture, step, svg};
+use crate::{cityjson, colmap, dxf, geojson, gltf, limap, npz, picture, step, svg};
 use neat_wireframe::export::{write_json, write_obj, write_ply};
 use std::path::Path;
 
@@ -33,6 +33,8 @@ pub enum Format {
     Png,
     /// Features for geographic information systems.
     GeoJson,
+    /// CityJSON 2.0, the buildings of geographic information systems.
+    CityJson,
     /// NumPy arrays.
     Npz,
     /// A COLMAP text model whose points are the junctions.
@@ -56,7 +58,7 @@ const FOLDER: &[&str] = &[];
 
 /// Every format, in the order of [`Format`] and of help texts.
 #[rustfmt::skip] // One row a line.
-static FORMATS: [Row; 13] = [
+static FORMATS: [Row; 14] = [
     row(Format::Json, "json", &["json"], |to| Ok(write_json(to.path, to.document)?), "everything that is known, by docs/wireframe.schema.json"),
     row(Format::Obj, "obj", &["obj"], |to| Ok(write_obj(to.path, &to.document.drawn(), &to.document.drawn_triangles())?), "Wavefront OBJ: v, l and f elements (Blender, MeshLab, trimesh)"),
     row(Format::Ply, "ply", &["ply"], |to| Ok(write_ply(to.path, &to.document.drawn(), &to.document.drawn_triangles())?), "PLY, ASCII, with vertex, face and edge elements (CloudCompare, trimesh)"),
@@ -67,6 +69,7 @@ static FORMATS: [Row; 13] = [
     row(Format::Svg, "svg", &["svg"], svg::write, "orthographic view, vector graphics"),
     row(Format::Png, "png", &["png"], picture::write, "orthographic view, image"),
     row(Format::GeoJson, "geojson", &["geojson"], geojson::write, "LineString features with z, coordinates as they are (QGIS)"),
+    row(Format::CityJson, "cityjson", &["city.json"], cityjson::write, "CityJSON 2.0: faces as ground, walls and roofs of buildings, solids where they close (GIS)"),
     row(Format::Npz, "npz", &["npz"], npz::write, "NumPy: lines3d as the published NEAT code, junctions, edges, arcs"),
     row(Format::Colmap, "colmap", FOLDER, colmap::write, "a folder: COLMAP text model of the junctions, and lines3D.txt"),
     row(Format::Limap, "limap", FOLDER, limap::write, "a folder: line tracks with their 2D segments, as LIMAP leaves them"),
@@ -124,7 +127,13 @@ impl Format {
     pub fn holds_faces(self) -> bool {
         matches!(
             self,
-            Self::Json | Self::Obj | Self::Ply | Self::Gltf | Self::Glb | Self::Step
+            Self::Json
+                | Self::Obj
+                | Self::Ply
+                | Self::Gltf
+                | Self::Glb
+                | Self::Step
+                | Self::CityJson
         )
     }
 
@@ -142,9 +151,20 @@ impl Format {
     /// # Errors
     /// If it has no ending or one that no format has.
     pub fn from_path(path: &Path) -> Result<Self, ExportError> {
-        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
-        let named = |format: &Self| format.endings().iter().any(|known| ending == *known);
-        Self::ALL.into_iter().find(named).ok_or_else(|| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let name = name.to_ascii_lowercase();
+        // How long the ending is by which a format knows the name.
+        let known_by = |format: &Self| {
+            let endings = format.endings().iter().filter(|ending| {
+                let stem = name.strip_suffix(*ending);
+                let stem = stem.and_then(|stem| stem.strip_suffix('.'));
+                stem.is_some_and(|stem| !stem.is_empty())
+            });
+            endings.map(|ending| ending.len()).max()
+        };
+        let known = Self::ALL.into_iter().filter(|f| known_by(f).is_some());
+        // `.city.json` is no `.json`.
+        known.max_by_key(known_by).ok_or_else(|| {
             let endings: Vec<_> = Self::ALL
                 .iter()
                 .flat_map(|format| format.endings())
@@ -187,6 +207,19 @@ mod tests {
                 assert_eq!(Format::from_path(Path::new(&path)).unwrap(), format);
                 assert_eq!(Format::from_name(ending).unwrap(), format);
             }
+        }
+    }
+
+    #[test]
+    fn the_longest_ending_says_the_format() {
+        for (name, format) in [
+            ("house.city.json", Format::CityJson),
+            ("house.CITY.Json", Format::CityJson),
+            ("city.json", Format::Json),
+            (".city.json", Format::Json),
+            ("house.simplicity.json", Format::Json),
+        ] {
+            assert_eq!(Format::from_path(Path::new(name)).unwrap(), format);
         }
     }
 

@@ -33,6 +33,7 @@
 
 pub mod marching_cubes;
 
+mod cityjson;
 mod colmap;
 mod confidence;
 mod cube_case;
@@ -61,7 +62,7 @@ pub use edge_filter::EdgeFilter;
 pub use error::ExportError;
 pub use export::export;
 pub use format::Format;
-pub use options::{ExportOptions, LengthUnit};
+pub use options::{ExportOptions, LengthUnit, UpAxis};
 pub use orthographic::ViewDirection;
 pub use target::Written;
 pub use triangle_mesh::TriangleMesh;

@@ -26,10 +26,11 @@ const EXACT: [Format; 8] = [
     Format::Colmap,
 ];
 
-/// The formats that need nothing but a graph; LIMAP's tracks are made of 2D segments.
+/// The formats that need nothing but a graph: LIMAP's tracks are made of 2D segments, and CityJSON
+/// of faces.
 fn of_a_graph() -> impl Iterator<Item = Format> {
     let all = Format::ALL.into_iter();
-    all.filter(|format| *format != Format::Limap)
+    all.filter(|format| !matches!(format, Format::Limap | Format::CityJson))
 }
 
 fn write(document: &WireframeDocument, path: &Path, format: Format) -> Result<(), ExportError> {

@@ -168,7 +168,7 @@ proptest! {
                 },
             };
         }
-        for format in [Format::Step, Format::Obj, Format::Gltf] {
+        for format in [Format::Step, Format::Obj, Format::Gltf, Format::CityJson] {
             let text = exported(&document, format, EdgeFilter::default());
             prop_assert!(!text.contains("NaN") && !text.contains("inf"), "{format:?}");
         }

@@ -6,7 +6,7 @@ use crate::errors::{Failure, NeatWarning};
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Wireframe3d};
 use neat_export::{
-    EdgeFilter, ExportOptions, Format, LengthUnit, ViewDirection, export as write_as,
+    EdgeFilter, ExportOptions, Format, LengthUnit, UpAxis, ViewDirection, export as write_as,
 };
 use neat_wireframe::export::{WireframeDocument, read_json};
 use numpy::{PyArray1, PyArray2, PyArray3};
@@ -235,8 +235,9 @@ impl Wireframe {
     ///
     /// format: one of `neat3d.FORMATS`; by default what the ending of path says. view: from
     /// where svg and png look (front, top, side, isometric). width: of svg and png in pixels.
-    /// unit: of your files, which step has to name (mm, cm, m).
-    #[pyo3(signature = (path, format=None, *, view=None, width=None, unit=None))]
+    /// unit: of your files, which step has to name (mm, cm, m). up: the axis of your files that
+    /// points upward, which cityjson turns to +z (x, y, z, -x, -y, -z).
+    #[pyo3(signature = (path, format=None, *, view=None, width=None, unit=None, up=None))]
     fn export(
         &self,
         py: Python<'_>,
@@ -245,6 +246,7 @@ impl Wireframe {
         view: Option<&str>,
         width: Option<u32>,
         unit: Option<&str>,
+        up: Option<&str>,
     ) -> PyResult<Vec<PathBuf>> {
         let format = match format {
             Some(name) => Format::from_name(name),
@@ -256,6 +258,7 @@ impl Wireframe {
             ("view", view.is_some(), is_drawing),
             ("width", width.is_some(), is_drawing),
             ("unit", unit.is_some(), format == Format::Step),
+            ("up", up.is_some(), format == Format::CityJson),
         ] {
             if given && !is_used {
                 let name = format.name();
@@ -267,6 +270,9 @@ impl Wireframe {
             direction: view.map_or(Ok(default.direction), direction)?,
             width: width.unwrap_or(default.width),
             unit: unit.map_or(Ok(default.unit), length_unit)?,
+            up: up
+                .map_or(Ok(default.up), UpAxis::from_name)
+                .map_err(Failure::from)?,
             ..default
         };
         let document = Arc::clone(&self.document);

@@ -94,6 +94,7 @@ def test_exports_have_options(run, tmp_path):
     for options, message in [
         (dict(view="top"), "view has no meaning for dxf"),
         (dict(unit="m"), "unit has no meaning for dxf"),
+        (dict(up="y"), "up has no meaning for dxf"),
     ]:
         with pytest.raises(neat3d.InputError, match=message):
             run.wireframe.export(tmp_path / "a.dxf", **options)
@@ -101,6 +102,8 @@ def test_exports_have_options(run, tmp_path):
         run.wireframe.export(tmp_path / "a.docx")
     with pytest.raises(neat3d.InputError, match="no unit `ft`"):
         run.wireframe.export(tmp_path / "a.step", unit="ft")
+    with pytest.raises(neat3d.InputError, match="`north`: give x, y, z"):
+        run.wireframe.export(tmp_path / "a.city.json", up="north")
 
 
 def test_filters_leave_the_certain(run):

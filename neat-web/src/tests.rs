@@ -25,6 +25,7 @@ fn the_bundled_scene_becomes_a_wireframe_a_report_and_exports() {
         ("step", &b"ISO-10303-21"[..]),
         ("limap", b"PK"),
         ("glb", b"glTF"),
+        ("cityjson", b"{\"CityObjects\":"),
     ] {
         let file = path(format);
         run(&["export", &json, format, &file]).unwrap().unwrap();

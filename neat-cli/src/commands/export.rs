@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
 use neat_export::marching_cubes::{Grid, Region, marching_cubes};
 use neat_export::{
-    EdgeFilter, ExportError, ExportOptions, Format, LengthUnit, ViewDirection, export,
+    EdgeFilter, ExportError, ExportOptions, Format, LengthUnit, UpAxis, ViewDirection, export,
 };
 use neat_pipeline::event::{Event, Stage};
 use neat_pipeline::reconstruct::open_run;
@@ -26,7 +26,7 @@ const MAX_SLOPE: f64 = 2.0;
 
 /// Options that --mesh and all that belongs to it exclude. Both have to be said: clap does
 /// not ask for a required option that another one excludes.
-const OF_WIREFRAMES: [&str; 7] = [
+const OF_WIREFRAMES: [&str; 8] = [
     "format",
     "min_probability",
     "min_views",
@@ -34,6 +34,7 @@ const OF_WIREFRAMES: [&str; 7] = [
     "view",
     "width",
     "unit",
+    "up",
 ];
 
 /// Write a wireframe for other programs
@@ -48,6 +49,7 @@ Examples:
   neat export RUN --out house.step --unit m --min-probability 0.7
   neat export RUN --out house.dxf --only structure
   neat export RUN --out house.svg --view top
+  neat export RUN --out house.city.json --up=-y
   neat export RUN --format colmap --out colmap
   neat export RUN/wireframe.json --format glb
   neat export RUN --mesh --out house.ply --resolution 512",
@@ -85,6 +87,10 @@ pub struct ExportArgs {
     /// The unit of your files, which step has to name, mm by default; numbers stay as they are
     #[arg(long, value_enum)]
     unit: Option<UnitArg>,
+    /// The axis of your files that points upward, which cityjson turns to +z: x, y, z (the
+    /// default), -x, -y or -z
+    #[arg(long, value_name = "AXIS", value_parser = up_parser(), allow_hyphen_values = true)]
+    up: Option<UpAxis>,
     /// Write the learned surface of a run as a triangle mesh (PLY) instead; RUN/mesh.ply by default
     #[arg(long, conflicts_with_all = OF_WIREFRAMES)]
     mesh: bool,
@@ -166,6 +172,12 @@ fn format_parser() -> impl TypedValueParser<Value = Format> {
     PossibleValuesParser::new(values).try_map(|name| Format::from_name(&name))
 }
 
+/// Takes the name of an axis.
+fn up_parser() -> impl TypedValueParser<Value = UpAxis> {
+    PossibleValuesParser::new(UpAxis::NAMED.map(|(name, _)| name))
+        .try_map(|name| UpAxis::from_name(&name))
+}
+
 impl ExportArgs {
     pub fn run(self, quiet: bool) -> Result<(), CliError> {
         if self.mesh {
@@ -218,6 +230,7 @@ impl ExportArgs {
             ("--view", self.view.is_some(), is_drawing),
             ("--width", self.width.is_some(), is_drawing),
             ("--unit", self.unit.is_some(), format == Format::Step),
+            ("--up", self.up.is_some(), format == Format::CityJson),
         ] {
             if given && !is_used {
                 let name = format.name();
@@ -240,6 +253,7 @@ impl ExportArgs {
             direction: self.view.map_or(default.direction, ViewDirection::from),
             width: self.width.unwrap_or(default.width),
             unit: self.unit.map_or(default.unit, LengthUnit::from),
+            up: self.up.unwrap_or(default.up),
         }
     }
 
@@ -380,6 +394,10 @@ mod tests {
             path.strip_prefix(run.path()).unwrap().to_owned()
         };
         assert_eq!(name(Format::Dxf, ALL), Path::new("wireframe.dxf"));
+        assert_eq!(
+            name(Format::CityJson, ALL),
+            Path::new("wireframe.city.json")
+        );
         assert_eq!(name(Format::Limap, ALL), Path::new("limap"));
         assert_eq!(
             name(Format::Json, SOME),
