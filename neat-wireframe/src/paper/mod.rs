@@ -4,8 +4,10 @@
 mod attraction;
 mod corner_evidence;
 mod image_refinement;
+mod junction_merging;
 mod junction_refinement;
 mod junction_voting;
+mod line_visibility;
 mod neat_lines;
 mod visibility;
 
@@ -20,7 +22,8 @@ pub use visibility::{VisibilityConfig, seeing_views, squared_reprojection_distan
 
 use crate::used_junctions::UsedJunctions;
 use crate::{SignedDistance, ViewObservation, Wireframe3d};
-use image_refinement::refine_by_images;
+use image_refinement::{attracted_edges, refine_by_images};
+use line_visibility::views_that_show;
 use nalgebra::Vector3;
 use neat_core::assignment::AssignmentError;
 use rayon::prelude::*;
@@ -187,12 +190,22 @@ impl PaperBackEndConfig {
             .filter(|line| self.image_refinement.enabled || line.is_supported(&self.neat_lines))
             .map(|line| line.segment)
             .collect();
+        let by_images = &self.image_refinement;
         let attracted = Wireframe3d {
-            edges: attract(&supported, &positions, &self.attraction),
+            edges: if by_images.enabled {
+                attracted_edges(&positions, views, &lines_by_view, by_images)
+            } else {
+                attract(&supported, &positions, &self.attraction)
+            },
             junctions: positions,
         };
 
-        let seen = seeing_views(&attracted.segments(), views, &self.visibility);
+        let segments = attracted.segments();
+        let seen = if by_images.enabled {
+            views_that_show(&segments, views, &lines_by_view, &self.visibility)
+        } else {
+            seeing_views(&segments, views, &self.visibility)
+        };
         let (edges, visible_views): (Vec<_>, Vec<_>) = attracted
             .edges
             .iter()
