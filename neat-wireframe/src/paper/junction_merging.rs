@@ -7,6 +7,7 @@
 use super::corner_evidence::explained;
 use crate::ViewObservation;
 use crate::projection::{project_in_front, project_with_jacobian};
+use crate::solve::Cauchy;
 use nalgebra::{Matrix3, Vector2, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -139,6 +140,7 @@ fn fitted(
     views: &[ViewObservation],
     scale: f64,
 ) -> Vector3<f64> {
+    let loss = Cauchy { scale };
     let mut place = start;
     for _ in 0..STEPS {
         let mut normal = Matrix3::identity() * DAMPING;
@@ -149,7 +151,7 @@ fn fitted(
                 continue;
             };
             let off = pixel - end;
-            let weight = 1.0 / (1.0 + off.norm_squared() / (scale * scale));
+            let weight = loss.weight(off.norm_squared());
             normal += jacobian.transpose() * jacobian * weight;
             gradient += jacobian.transpose() * off * weight;
         }

@@ -10,7 +10,7 @@ use super::visibility::{VisibilityConfig, squared_reprojection_distance};
 use crate::ViewObservation;
 use crate::interval_cover::covered_length;
 use crate::projection::project_in_front;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use neat_core::{LineSegment2, LineSegment3};
 use rayon::prelude::*;
 
@@ -78,28 +78,19 @@ fn stretch_along(
     detected: &LineSegment2,
     max_squared_distance: f64,
 ) -> Option<[f64; 2]> {
-    let along = edge.end - edge.start;
-    let squared_length = along.norm_squared();
-    let off = detected.ends().map(|end| along.perp(&(end - edge.start)));
-    let squared = off.iter().map(|off| off * off).sum::<f64>();
-    if squared >= max_squared_distance * squared_length {
+    let squared = |end: &Vector2<f64>| edge.distance_to_line(end).powi(2);
+    if detected.ends().iter().map(squared).sum::<f64>() >= max_squared_distance {
         return None;
     }
-    let mut stretch = detected
-        .ends()
-        .map(|end| along.dot(&(end - edge.start)) / squared_length);
+    let mut stretch = detected.ends().map(|end| edge.line_parameter(&end));
     stretch.sort_by(f64::total_cmp);
     (stretch[0] < 1.0 && stretch[1] > 0.0).then_some(stretch)
 }
 
 /// Sum of the distances of both ends of a line from an edge.
 fn distance_to_edge(line: &LineSegment3, edge: &LineSegment3) -> f64 {
-    let along = edge.end - edge.start;
-    let distance = |end: Vector3<f64>| {
-        let share = along.dot(&(end - edge.start)) / along.norm_squared();
-        (end - edge.point_at(share.clamp(0.0, 1.0))).norm()
-    };
-    line.ends().into_iter().map(distance).sum()
+    let distance = |end: &Vector3<f64>| edge.distance_to_point(end);
+    line.ends().iter().map(distance).sum()
 }
 
 #[cfg(test)]
