@@ -15,7 +15,7 @@ use crate::grid_encoding::GridEncoding;
 use crate::kernel_choice::Kernels;
 use crate::kernels::cpu::KnownPass;
 use crate::kernels::cpu::softplus_network::SoftplusNetwork;
-use crate::linear::{Linear, affine, flat_parameters};
+use crate::linear::{Linear, flat_parameters};
 use crate::neat_backend::{DistanceNetwork, Field, FieldQuery, NeatBackend};
 use burn::module::Module;
 use burn::tensor::Tensor;
@@ -68,7 +68,7 @@ impl CoordinateMlp {
             if self.skip == Some(l) {
                 h = Tensor::cat(vec![h, encoded.clone()], 1).div_scalar(std::f64::consts::SQRT_2);
             }
-            let z = affine(h, weights[l].clone(), layer.bias.val());
+            let z = by.affine(h, weights[l].clone(), layer.bias.val());
             if l < last {
                 pre_activations.push(z.clone());
                 h = by.softplus(z, self.sharpness);
@@ -204,7 +204,7 @@ impl Recorded {
             if l < last {
                 let z = self.pre_activations[l].clone();
                 let slope = by.times_softplus_slope(g, z, mlp.sharpness);
-                g = slope.matmul(weights[l].clone());
+                g = by.linear(slope, weights[l].clone());
             }
             if mlp.skip == Some(l) {
                 let scaled = g.div_scalar(std::f64::consts::SQRT_2);

@@ -1,6 +1,7 @@
 //! The side of GPUs in [`NeatBackend`].
 
 use crate::encoding::PositionalEncoding;
+use crate::grid_encoding::GridEncoding;
 use crate::kernels::gpu::adam::StepNumbers;
 use crate::kernels::gpu::operations::GpuOperations;
 use crate::kernels::gpu::{adam, error_bound, grid, primitive, tensor};
@@ -9,8 +10,8 @@ use crate::sampling::{DrawNumbers, GridNumbers, RefineNumbers};
 use burn::backend::Dispatch;
 use burn::tensor::{Device, Tensor};
 
-/// GPUs in float32: activations, encoding, optimiser and samplers as kernels in CubeCL;
-/// products stay burn's.
+/// GPUs in float32: activations, encodings, optimiser and samplers as kernels in CubeCL;
+/// products are burn's, by parts where they sum over many rows.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Gpu;
 
@@ -32,6 +33,17 @@ impl NeatBackend for Gpu {
 
     fn places_samples(&self) -> bool {
         true
+    }
+
+    fn affine(&self, x: Tensor<2>, weight: Tensor<2>, bias: Tensor<1>) -> Tensor<2> {
+        let (x, bias) = (x.into_dispatch(), bias.unsqueeze::<2>().into_dispatch());
+        let weight = weight.transpose().into_dispatch();
+        Tensor::from_dispatch(Dispatch::gpu_affine(x, weight, bias))
+    }
+
+    fn linear(&self, x: Tensor<2>, matrix: Tensor<2>) -> Tensor<2> {
+        let (x, matrix) = (x.into_dispatch(), matrix.into_dispatch());
+        Tensor::from_dispatch(Dispatch::gpu_linear(x, matrix))
     }
 
     fn softplus(&self, z: Tensor<2>, sharpness: f64) -> Tensor<2> {
@@ -62,6 +74,18 @@ impl NeatBackend for Gpu {
         }
         let (x, gradient) = (x.into_dispatch(), gradient.into_dispatch());
         Tensor::from_dispatch(Dispatch::gpu_pull_back(x, gradient, encoding.octaves))
+    }
+
+    fn encode_grid(&self, grid: &GridEncoding, x: Tensor<2>) -> Tensor<2> {
+        let (x, table) = (x.into_dispatch(), grid.table.val().into_dispatch());
+        Tensor::from_dispatch(Dispatch::gpu_grid(x, table, grid.shape.clone()))
+    }
+
+    fn pull_back_grid(&self, grid: &GridEncoding, x: Tensor<2>, gradient: Tensor<2>) -> Tensor<2> {
+        let (x, table) = (x.into_dispatch(), grid.table.val().into_dispatch());
+        let gradient = gradient.into_dispatch();
+        let shape = grid.shape.clone();
+        Tensor::from_dispatch(Dispatch::gpu_pull_back_grid(x, table, gradient, shape))
     }
 
     fn adam(

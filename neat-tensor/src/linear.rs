@@ -140,13 +140,8 @@ impl Linear {
 
     /// `[N, in]` → `[N, out]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
-        affine(x, self.effective_weight(), self.bias.val())
+        x.matmul(self.effective_weight().transpose()) + self.bias.val().unsqueeze()
     }
-}
-
-/// `x Wᵀ + b` with `W` `[out, in]`.
-pub(crate) fn affine(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<1>) -> Tensor<2> {
-    x.matmul(weight.transpose()) + bias.unsqueeze()
 }
 
 /// Inputs and outputs of each layer.

@@ -35,6 +35,16 @@ pub trait NeatBackend: Debug + Send + Sync {
         false
     }
 
+    /// `x Wᵀ + b` of `x` `[N, in]` and `W` `[out, in]`.
+    fn affine(&self, x: Tensor<2>, weight: Tensor<2>, bias: Tensor<1>) -> Tensor<2> {
+        self.linear(x, weight.transpose()) + bias.unsqueeze()
+    }
+
+    /// `x M` of `x` `[N, k]` and `M` `[k, m]`.
+    fn linear(&self, x: Tensor<2>, matrix: Tensor<2>) -> Tensor<2> {
+        x.matmul(matrix)
+    }
+
     /// Softplus of `z`: [`softplus::softplus`].
     fn softplus(&self, z: Tensor<2>, sharpness: f64) -> Tensor<2> {
         softplus::softplus(z, sharpness)

@@ -36,14 +36,19 @@ impl ReluMlp {
 
     /// `[N, in]` → `[N, out]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        self.forward_by(self.kernels.of(&x), x)
+    }
+
+    fn forward_by(&self, by: &(impl NeatBackend + ?Sized), x: Tensor<2>) -> Tensor<2> {
+        let affine = |x, layer: &Linear| by.affine(x, layer.effective_weight(), layer.bias.val());
         let (last, hidden) = self
             .layers
             .split_last()
             .expect("ReluMlp: a perceptron has at least one layer");
         let x = hidden
             .iter()
-            .fold(x, |x, layer| activation::relu(layer.forward(x)));
-        last.forward(x)
+            .fold(x, |x, layer| activation::relu(affine(x, layer)));
+        affine(x, last)
     }
 
     /// [`Self::forward`] of encoded ray columns, gradients and features side by
@@ -69,6 +74,6 @@ impl ReluMlp {
             })
             .collect();
         columns.extend([inputs.gradients, inputs.features]);
-        self.forward(Tensor::cat(columns, 1))
+        self.forward_by(by, Tensor::cat(columns, 1))
     }
 }

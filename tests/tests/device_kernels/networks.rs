@@ -1,4 +1,4 @@
-//! Activations, encoding and optimiser in float32 against plain tensor operations in
+//! Products, activations, encodings and optimiser in float32 against plain tensor operations in
 //! float64, which `finite_differences` checks: values and all gradients.
 
 use burn::module::{Module, Param};
@@ -7,7 +7,7 @@ use burn::tensor::{DType, Device, Tensor, TensorData};
 use neat_tensor::adam::{Adam, AdamConfig};
 use neat_tensor::random::{Purpose, standard_normal, stream};
 use neat_tensor::softplus::{softplus, times_softplus_slope};
-use neat_tensor::{Kernels, PositionalEncoding};
+use neat_tensor::{GridConfig, GridEncoding, Kernels, NeatBackend, Plain, PositionalEncoding};
 use neat_tests::backends::{flex, on_each_gpu_backend};
 use neat_tests::comparison::assert_relatively_close;
 use neat_tests::tensors::numbers;
@@ -17,11 +17,15 @@ const ROWS: usize = 1003;
 
 /// Normal numbers of deviation `scale`.
 fn normal(columns: usize, scale: f64, which: u64) -> TensorData {
+    matrix(ROWS, columns, scale, which)
+}
+
+fn matrix(rows: usize, columns: usize, scale: f64, which: u64) -> TensorData {
     let mut rng = stream(which, Purpose::Weights, 0);
-    let values: Vec<f32> = (0..ROWS * columns)
+    let values: Vec<f32> = (0..rows * columns)
         .map(|_| (scale * standard_normal(&mut rng)) as f32)
         .collect();
-    TensorData::new(values, [ROWS, columns])
+    TensorData::new(values, [rows, columns])
 }
 
 /// Value and gradients of `function` at `inputs`, weighted by normal numbers.
@@ -54,7 +58,7 @@ fn compare<const K: usize>(
     on_each_gpu_backend(|device| {
         let found = value_and_gradients(inputs, &device, DType::F32, &kernel);
         for (i, (found, truth)) in found.iter().zip(&truth).enumerate() {
-            let part = ["value", "1st gradient", "2nd gradient"][i];
+            let part = ["value", "1st gradient", "2nd gradient", "3rd gradient"][i];
             assert_relatively_close(&format!("{what}, {part}"), found, truth, tolerance);
         }
     });
@@ -129,6 +133,70 @@ fn encoding_and_its_jacobian() {
             2e-6,
             |[x, gradient]| kernels.of(&x).pull_back(encoding, x, gradient),
             |[x, gradient]| encoding.pull_back(x, gradient),
+        );
+    }
+}
+
+/// More rows than are summed at once, and a rest.
+#[test]
+fn products_of_many_rows() {
+    let kernels = Kernels::default();
+    let [x, weight, bias] = [
+        normal(7, 1.0, 5),
+        matrix(5, 7, 1.0, 6),
+        matrix(1, 5, 1.0, 7),
+    ];
+    let row = |bias: Tensor<2>| bias.reshape([5]);
+    compare(
+        "affine",
+        &[x.clone(), weight.clone(), bias],
+        1e-5,
+        |[x, weight, bias]| kernels.of(&x).affine(x, weight, row(bias)),
+        |[x, weight, bias]| Plain.affine(x, weight, row(bias)),
+    );
+    compare(
+        "linear",
+        &[x, matrix(7, 5, 1.0, 6)],
+        1e-5,
+        |[x, matrix]| kernels.of(&x).linear(x, matrix),
+        |[x, matrix]| x.matmul(matrix),
+    );
+}
+
+/// Dense levels and one with a hash; many points share entries, some lie outside.
+#[test]
+fn learned_grids_and_their_pull_back() {
+    let kernels = Kernels::default();
+    for features in [1, 2, 4, 8] {
+        let config = GridConfig {
+            levels: 3,
+            features,
+            log2_entries: 8,
+            coarsest: 2,
+            finest: 11,
+        };
+        let shape = config.shape(1.5);
+        let hashed = shape.levels.iter().filter(|level| level.mask.is_some());
+        assert_eq!(hashed.count(), 1, "{shape:?}");
+        let grid = |table: Tensor<2>| GridEncoding {
+            table: Param::from_tensor(table),
+            shape: shape.clone(),
+        };
+        let [x, table] = [normal(3, 1.0, 3), matrix(shape.entries(), features, 1.0, 4)];
+        let gradient = normal(shape.width(), 1.0, 5);
+        compare(
+            &format!("grids of {features} features"),
+            &[x.clone(), table.clone()],
+            1e-5,
+            |[x, table]| kernels.of(&x).encode_grid(&grid(table), x),
+            |[x, table]| grid(table).encode(x),
+        );
+        compare(
+            &format!("pulled back through grids of {features} features"),
+            &[x, table, gradient],
+            1e-5,
+            |[x, table, gradient]| kernels.of(&x).pull_back_grid(&grid(table), x, gradient),
+            |[x, table, gradient]| grid(table).pull_back(x, gradient),
         );
     }
 }

@@ -10,7 +10,9 @@ mod columns;
 mod encoding;
 pub(crate) mod error_bound;
 pub(crate) mod grid;
+mod grid_features;
 pub(crate) mod operations;
+mod products;
 
 use burn::Tensor;
 use burn::backend::TensorMetadata;
@@ -40,12 +42,13 @@ fn empty_of(like: &CubeTensor, shape: impl Into<Shape>) -> CubeTensor {
 
 /// A launch of one unit per number of `tensor`.
 fn elementwise(tensor: &CubeTensor) -> (CubeCount, CubeDim) {
-    let units = tensor.shape().num_elements();
-    let dim = CubeDim::new(&tensor.client, units);
-    (
-        calculate_cube_count_elemwise(&tensor.client, units, dim),
-        dim,
-    )
+    units(tensor, tensor.shape().num_elements())
+}
+
+/// A launch of so many units where `like` lies.
+fn units(like: &CubeTensor, count: usize) -> (CubeCount, CubeDim) {
+    let dim = CubeDim::new(&like.client, count);
+    (calculate_cube_count_elemwise(&like.client, count, dim), dim)
 }
 
 /// Runs a kernel with one unit per number of `$out`; the value is `$out`.

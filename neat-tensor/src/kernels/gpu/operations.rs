@@ -1,9 +1,10 @@
-//! Activations and encoding as operations that burn differentiates.
+//! Products, activations and encodings as operations that burn differentiates.
 //!
 //! burn reaches the tensors of a backend, and the graph of its derivatives, through an
 //! extension trait. A derivative is one function per input, of the adjoint and the inputs.
 
-use super::{activations, encoding};
+use super::{activations, encoding, grid_features, products};
+use crate::kernels::cpu::grid::GridShape;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, backend_extension};
 use burn_autodiff::Autodiff;
@@ -15,7 +16,7 @@ use burn_cubecl::CubeBackend;
 use burn_cubecl::tensor::CubeTensor;
 use std::fmt::Debug;
 
-/// The operations; see [`activations`] and [`encoding`].
+/// The operations; see [`products`], [`activations`], [`encoding`] and [`grid_features`].
 #[backend_extension(Cube, Autodiff)]
 pub trait GpuOperations: Backend {
     /// Softplus of `z`.
@@ -32,6 +33,31 @@ pub trait GpuOperations: Backend {
         x: FloatTensor<Self>,
         gradient: FloatTensor<Self>,
         octaves: usize,
+    ) -> FloatTensor<Self>;
+
+    /// `x w + b` of `x` `[N, k]`, `w` `[k, m]` and `b` `[1, m]`.
+    fn gpu_affine(
+        x: FloatTensor<Self>,
+        w: FloatTensor<Self>,
+        b: FloatTensor<Self>,
+    ) -> FloatTensor<Self>;
+
+    /// `x w` of `x` `[N, k]` and `w` `[k, m]`.
+    fn gpu_linear(x: FloatTensor<Self>, w: FloatTensor<Self>) -> FloatTensor<Self>;
+
+    /// The features of the grids of `table` at `points`.
+    fn gpu_grid(
+        points: FloatTensor<Self>,
+        table: FloatTensor<Self>,
+        shape: GridShape,
+    ) -> FloatTensor<Self>;
+
+    /// `gradient`, with respect to these features, pulled back to `points`.
+    fn gpu_pull_back_grid(
+        points: FloatTensor<Self>,
+        table: FloatTensor<Self>,
+        gradient: FloatTensor<Self>,
+        shape: GridShape,
     ) -> FloatTensor<Self>;
 }
 
@@ -54,6 +80,35 @@ impl GpuOperations for CubeBackend {
         octaves: usize,
     ) -> FloatTensor<Self> {
         encoding::pull_back([x, gradient], octaves)
+    }
+
+    fn gpu_affine(
+        x: FloatTensor<Self>,
+        w: FloatTensor<Self>,
+        b: FloatTensor<Self>,
+    ) -> FloatTensor<Self> {
+        products::affine([x, w, b])
+    }
+
+    fn gpu_linear(x: FloatTensor<Self>, w: FloatTensor<Self>) -> FloatTensor<Self> {
+        products::linear([x, w])
+    }
+
+    fn gpu_grid(
+        points: FloatTensor<Self>,
+        table: FloatTensor<Self>,
+        shape: GridShape,
+    ) -> FloatTensor<Self> {
+        grid_features::encode([points, table], &shape)
+    }
+
+    fn gpu_pull_back_grid(
+        points: FloatTensor<Self>,
+        table: FloatTensor<Self>,
+        gradient: FloatTensor<Self>,
+        shape: GridShape,
+    ) -> FloatTensor<Self> {
+        grid_features::pull_back([points, table, gradient], &shape)
     }
 }
 
@@ -84,9 +139,59 @@ impl<C: CheckpointStrategy> GpuOperations for Autodiff<CubeBackend, C> {
         let derivatives = [to_x, to_gradient];
         recorded::<C, _, 2>([x, gradient], octaves, encoding::pull_back, derivatives)
     }
+
+    fn gpu_affine(
+        x: FloatTensor<Self>,
+        w: FloatTensor<Self>,
+        b: FloatTensor<Self>,
+    ) -> FloatTensor<Self> {
+        let to_x: Derivative<(), 3> = |a, [_, w, _], ()| products::to_rows(a, w);
+        let to_w: Derivative<(), 3> = |a, [x, _, _], ()| products::to_matrix(a, x);
+        let to_b: Derivative<(), 3> = |a, _, ()| products::to_bias(a);
+        let value = |inputs, ()| products::affine(inputs);
+        recorded::<C, _, 3>([x, w, b], (), value, [to_x, to_w, to_b])
+    }
+
+    fn gpu_linear(x: FloatTensor<Self>, w: FloatTensor<Self>) -> FloatTensor<Self> {
+        let to_x: Derivative<(), 2> = |a, [_, w], ()| products::to_rows(a, w);
+        let to_w: Derivative<(), 2> = |a, [x, _], ()| products::to_matrix(a, x);
+        let value = |inputs, ()| products::linear(inputs);
+        recorded::<C, _, 2>([x, w], (), value, [to_x, to_w])
+    }
+
+    fn gpu_grid(
+        points: FloatTensor<Self>,
+        table: FloatTensor<Self>,
+        shape: GridShape,
+    ) -> FloatTensor<Self> {
+        let to_points: Derivative<GridShape, 2> =
+            |a, [points, table], shape| grid_features::pull_back([points, table, a], &shape);
+        let to_table: Derivative<GridShape, 2> =
+            |a, [points, _], shape| grid_features::scatter([points, a], &shape);
+        let value = |inputs, shape| grid_features::encode(inputs, &shape);
+        recorded::<C, _, 2>([points, table], shape, value, [to_points, to_table])
+    }
+
+    fn gpu_pull_back_grid(
+        points: FloatTensor<Self>,
+        table: FloatTensor<Self>,
+        gradient: FloatTensor<Self>,
+        shape: GridShape,
+    ) -> FloatTensor<Self> {
+        let to_points: Derivative<GridShape, 3> =
+            |a, [x, table, g], shape| grid_features::curvature([x, a, table, g], &shape);
+        let to_table: Derivative<GridShape, 3> =
+            |a, [x, _, g], shape| grid_features::scatter_slope([x, a, g], &shape);
+        let to_gradient: Derivative<GridShape, 3> =
+            |a, [x, table, _], shape| grid_features::push_forward([x, a, table], &shape);
+        let derivatives = [to_points, to_table, to_gradient];
+        let value = |inputs, shape| grid_features::pull_back(inputs, &shape);
+        recorded::<C, _, 3>([points, table, gradient], shape, value, derivatives)
+    }
 }
 
-/// The adjoint of one input, from that of the value, the inputs, and the number.
+/// The adjoint of one input, from that of the value, the inputs, and what else the operation
+/// is given.
 type Derivative<P, const N: usize> = fn(CubeTensor, [CubeTensor; N], P) -> CubeTensor;
 
 /// What an operation leaves for its backward pass.
@@ -102,7 +207,7 @@ struct Operation<P>(std::marker::PhantomData<P>);
 
 impl<P, const N: usize> Backward<CubeBackend, N> for Operation<P>
 where
-    P: Copy + Debug + Send + Sync + 'static,
+    P: Clone + Debug + Send + Sync + 'static,
 {
     type State = State<P, N>;
 
@@ -116,7 +221,8 @@ where
         let state = ops.state;
         for (node, derivative) in ops.parents.into_iter().zip(state.derivatives) {
             if let Some(node) = node {
-                let to_input = derivative(adjoint.clone(), state.inputs.clone(), state.number);
+                let to_input =
+                    derivative(adjoint.clone(), state.inputs.clone(), state.number.clone());
                 gradients.register::<CubeBackend>(node.id, to_input);
             }
         }
@@ -131,14 +237,14 @@ fn recorded<C: CheckpointStrategy, P, const N: usize>(
     derivatives: [Derivative<P, N>; N],
 ) -> FloatTensor<Autodiff<CubeBackend, C>>
 where
-    P: Copy + Debug + Send + Sync + 'static,
+    P: Clone + Debug + Send + Sync + 'static,
 {
     let nodes = inputs.each_ref().map(|input| input.node());
     let inputs = inputs.map(|input| input.into_primitive());
     let operation = Operation(std::marker::PhantomData::<P>);
     match operation.prepare::<C>(nodes).compute_bound().stateful() {
         OpsKind::Tracked(prepared) => {
-            let value = value(inputs.clone(), number);
+            let value = value(inputs.clone(), number.clone());
             let state = State {
                 inputs,
                 number,
