@@ -21,44 +21,10 @@ const OF_Z: u32 = HASH[1];
 /// Numbers that kernels get of a level: cells along a side, first entry, mask of the hash or 0.
 const LEVEL: usize = 3;
 
-/// Where a point lies along one axis.
-#[derive(CubeType, Clone, Copy)]
-struct Axis {
-    cell: u32,
-    /// Weight of the far side of the cell, and its first and second derivative.
-    far: f32,
-    slope: f32,
-    bend: f32,
-}
-
-/// Where a point lies in a level.
-#[derive(CubeType, Clone, Copy)]
-struct Place {
-    x: Axis,
-    y: Axis,
-    z: Axis,
-}
-
-/// Of one corner of a cell along one axis: its weight, and the derivatives of that.
-#[derive(CubeType, Clone, Copy)]
-struct Side {
-    weight: f32,
-    slope: f32,
-    bend: f32,
-}
-
-/// A corner of a cell.
-#[derive(CubeType, Clone, Copy)]
-struct Corner {
-    x: Side,
-    y: Side,
-    z: Side,
-    /// Its entry in the table.
-    entry: usize,
-}
-
+/// Along one axis: the cell of `x`, and the weight of its far side with its first and second
+/// derivative.
 #[cube]
-fn along(x: f32, half_side: f32, cells: u32) -> Axis {
+fn along(x: f32, half_side: f32, cells: u32) -> (u32, f32, f32, f32) {
     let scale = f32::cast_from(cells) / (2.0 * half_side);
     let position = (x + half_side) * scale;
     let corner = f32::floor(f32::clamp(position, 0.0, f32::cast_from(cells - 1)));
@@ -66,79 +32,43 @@ fn along(x: f32, half_side: f32, cells: u32) -> Axis {
     let t = f32::clamp(unbounded, 0.0, 1.0);
     // Outside the weight is constant.
     let inside = if unbounded == t { 1.0f32 } else { 0.0f32 };
-    Axis {
-        cell: u32::cast_from(corner),
-        far: t * t * (3.0 - 2.0 * t),
-        slope: 6.0 * t * (1.0 - t) * scale,
-        bend: inside * (6.0 - 12.0 * t) * (scale * scale),
-    }
+    let bend = inside * (6.0 - 12.0 * t) * (scale * scale);
+    let slope = 6.0 * t * (1.0 - t) * scale;
+    (u32::cast_from(corner), t * t * (3.0 - 2.0 * t), slope, bend)
 }
 
-/// Where point `row` lies in level `l`.
+/// On which side of each axis corner `c` of a cell lies.
 #[cube]
-fn place(
-    points: &Tensor<f32>,
-    row: usize,
-    levels: &Tensor<u32>,
-    l: usize,
-    half_side: f32,
-) -> Place {
-    let cells = levels[l * LEVEL];
-    Place {
-        x: along(points[3 * row], half_side, cells),
-        y: along(points[3 * row + 1], half_side, cells),
-        z: along(points[3 * row + 2], half_side, cells),
-    }
+fn sides(c: u32) -> (u32, u32, u32) {
+    (c & 1, (c >> 1) & 1, c >> 2)
 }
 
+/// The entry of the corner `x`, `y`, `z` of level `l`.
 #[cube]
-fn side(axis: &Axis, far: u32) -> Side {
-    let mut side = Side {
-        weight: axis.far,
-        slope: axis.slope,
-        bend: axis.bend,
-    };
-    if far == 0 {
-        side.weight = 1.0 - axis.far;
-        side.slope = -axis.slope;
-        side.bend = -axis.bend;
-    }
-    side
-}
-
-/// Corner `c`, whose bit `k` is its side on axis `k`.
-#[cube]
-fn corner(place: &Place, levels: &Tensor<u32>, l: usize, c: u32) -> Corner {
-    let (i, j, k) = (c & 1, (c >> 1) & 1, c >> 2);
-    let (x, y, z) = (place.x.cell + i, place.y.cell + j, place.z.cell + k);
-    let side_length = levels[l * LEVEL] + 1;
+fn entry(levels: &Tensor<u32>, l: usize, x: u32, y: u32, z: u32) -> usize {
+    let side = levels[l * LEVEL] + 1;
     let mask = levels[l * LEVEL + 2];
-    let mut within = (z * side_length + y) * side_length + x;
-    if mask > 0 {
-        within = (x ^ (y * OF_Y) ^ (z * OF_Z)) & mask;
-    }
-    Corner {
-        x: side(&place.x, i),
-        y: side(&place.y, j),
-        z: side(&place.z, k),
-        entry: (levels[l * LEVEL + 1] + within) as usize,
-    }
-}
-
-/// Weight of a corner, or, `sloping`, its derivative along tangent `row`.
-#[cube]
-fn weight(corner: &Corner, tangents: &Tensor<f32>, row: usize, #[comptime] sloping: bool) -> f32 {
-    let (x, y, z) = (corner.x.weight, corner.y.weight, corner.z.weight);
-    if comptime![sloping] {
-        tangents[3 * row] * corner.x.slope * y * z
-            + tangents[3 * row + 1] * x * corner.y.slope * z
-            + tangents[3 * row + 2] * x * y * corner.z.slope
+    let within = if mask == 0 {
+        (z * side + y) * side + x
     } else {
-        x * y * z
-    }
+        (x ^ (y * OF_Y) ^ (z * OF_Z)) & mask
+    };
+    (levels[l * LEVEL + 1] + within) as usize
 }
 
-/// What `gradient` `[N, width]` says of an entry of the table at point `row`.
+/// The weight of a side: that of the far one, or what it leaves.
+#[cube]
+fn weight(far: f32, side: u32) -> f32 {
+    if side == 1 { far } else { 1.0 - far }
+}
+
+/// A derivative of that weight.
+#[cube]
+fn signed(slope: f32, side: u32) -> f32 {
+    if side == 1 { slope } else { -slope }
+}
+
+/// What `gradient` says of an entry of the table, from `first` on.
 #[cube]
 fn spoken(
     table: &Tensor<f32>,
@@ -169,14 +99,26 @@ fn features_kernel(
     #[comptime] sloping: bool,
 ) {
     if ABSOLUTE_POS < out.len() {
-        let (row, column) = (ABSOLUTE_POS / width, ABSOLUTE_POS % width);
+        let row = 3 * (ABSOLUTE_POS / width);
+        let column = ABSOLUTE_POS % width;
         let l = column / features;
-        let place = place(points, row, levels, l, half_side);
+        let cells = levels[l * LEVEL];
+        let (x, far_x, slope_x, _bend_x) = along(points[row], half_side, cells);
+        let (y, far_y, slope_y, _bend_y) = along(points[row + 1], half_side, cells);
+        let (z, far_z, slope_z, _bend_z) = along(points[row + 2], half_side, cells);
         let mut sum = 0.0f32;
         for c in 0..8u32 {
-            let corner = corner(&place, levels, l, c);
-            let entry = table[corner.entry * features + column % features];
-            sum += weight(&corner, tangents, row, sloping) * entry;
+            let (i, j, k) = sides(c);
+            let at = entry(levels, l, x + i, y + j, z + k);
+            let (a, b, c) = (weight(far_x, i), weight(far_y, j), weight(far_z, k));
+            let factor = if comptime![sloping] {
+                tangents[row] * signed(slope_x, i) * b * c
+                    + tangents[row + 1] * signed(slope_y, j) * a * c
+                    + tangents[row + 2] * signed(slope_z, k) * a * b
+            } else {
+                a * b * c
+            };
+            sum += factor * table[at * features + column % features];
         }
         out[ABSOLUTE_POS] = sum;
     }
@@ -194,24 +136,30 @@ fn pull_back_kernel(
     features: usize,
     half_side: f32,
 ) {
-    let row = ABSOLUTE_POS;
-    if 3 * row < out.len() {
-        let (mut to_x, mut to_y, mut to_z) = (0.0f32, 0.0f32, 0.0f32);
+    let row = 3 * ABSOLUTE_POS;
+    if row < out.len() {
+        let mut to_x = 0.0f32;
+        let mut to_y = 0.0f32;
+        let mut to_z = 0.0f32;
         for l in 0..width / features {
-            let place = place(points, row, levels, l, half_side);
+            let cells = levels[l * LEVEL];
+            let (x, far_x, slope_x, _bend_x) = along(points[row], half_side, cells);
+            let (y, far_y, slope_y, _bend_y) = along(points[row + 1], half_side, cells);
+            let (z, far_z, slope_z, _bend_z) = along(points[row + 2], half_side, cells);
+            let first = ABSOLUTE_POS * width + l * features;
             for c in 0..8u32 {
-                let corner = corner(&place, levels, l, c);
-                let first = row * width + l * features;
-                let spoken = spoken(table, corner.entry, gradient, first, features);
-                let (x, y, z) = (corner.x, corner.y, corner.z);
-                to_x += spoken * x.slope * y.weight * z.weight;
-                to_y += spoken * x.weight * y.slope * z.weight;
-                to_z += spoken * x.weight * y.weight * z.slope;
+                let (i, j, k) = sides(c);
+                let at = entry(levels, l, x + i, y + j, z + k);
+                let spoken = spoken(table, at, gradient, first, features);
+                let (a, b, c) = (weight(far_x, i), weight(far_y, j), weight(far_z, k));
+                to_x += spoken * signed(slope_x, i) * b * c;
+                to_y += spoken * signed(slope_y, j) * a * c;
+                to_z += spoken * signed(slope_z, k) * a * b;
             }
         }
-        out[3 * row] = to_x;
-        out[3 * row + 1] = to_y;
-        out[3 * row + 2] = to_z;
+        out[row] = to_x;
+        out[row + 1] = to_y;
+        out[row + 2] = to_z;
     }
 }
 
@@ -229,33 +177,32 @@ fn curvature_kernel(
     features: usize,
     half_side: f32,
 ) {
-    let row = ABSOLUTE_POS;
-    if 3 * row < out.len() {
-        let (u, v, w) = (
-            tangents[3 * row],
-            tangents[3 * row + 1],
-            tangents[3 * row + 2],
-        );
-        let (mut to_x, mut to_y, mut to_z) = (0.0f32, 0.0f32, 0.0f32);
+    let row = 3 * ABSOLUTE_POS;
+    if row < out.len() {
+        let (u, v, w) = (tangents[row], tangents[row + 1], tangents[row + 2]);
+        let mut to_x = 0.0f32;
+        let mut to_y = 0.0f32;
+        let mut to_z = 0.0f32;
         for l in 0..width / features {
-            let place = place(points, row, levels, l, half_side);
+            let cells = levels[l * LEVEL];
+            let (x, far_x, slope_x, bend_x) = along(points[row], half_side, cells);
+            let (y, far_y, slope_y, bend_y) = along(points[row + 1], half_side, cells);
+            let (z, far_z, slope_z, bend_z) = along(points[row + 2], half_side, cells);
+            let first = ABSOLUTE_POS * width + l * features;
             for c in 0..8u32 {
-                let corner = corner(&place, levels, l, c);
-                let first = row * width + l * features;
-                let spoken = spoken(table, corner.entry, gradient, first, features);
-                let (x, y, z) = (corner.x, corner.y, corner.z);
-                let (xy, xz, yz) = (x.slope * y.slope, x.slope * z.slope, y.slope * z.slope);
-                let of_x = u * x.bend * y.weight + v * xy;
-                let of_y = v * y.bend * x.weight + u * xy;
-                let of_z = u * xz * y.weight + v * yz * x.weight;
-                to_x += spoken * (of_x * z.weight + w * xz * y.weight);
-                to_y += spoken * (of_y * z.weight + w * yz * x.weight);
-                to_z += spoken * (of_z + w * z.bend * x.weight * y.weight);
+                let (i, j, k) = sides(c);
+                let at = entry(levels, l, x + i, y + j, z + k);
+                let spoken = spoken(table, at, gradient, first, features);
+                let (a, b, c) = (weight(far_x, i), weight(far_y, j), weight(far_z, k));
+                let (p, q, r) = (signed(slope_x, i), signed(slope_y, j), signed(slope_z, k));
+                to_x += spoken * (u * signed(bend_x, i) * b * c + p * (v * q * c + w * r * b));
+                to_y += spoken * (v * signed(bend_y, j) * a * c + q * (u * p * c + w * r * a));
+                to_z += spoken * (w * signed(bend_z, k) * a * b + r * (u * p * b + v * q * a));
             }
         }
-        out[3 * row] = to_x;
-        out[3 * row + 1] = to_y;
-        out[3 * row + 2] = to_z;
+        out[row] = to_x;
+        out[row + 1] = to_y;
+        out[row + 2] = to_z;
     }
 }
 
@@ -298,13 +245,29 @@ fn scatter_kernel(
     #[comptime] sloping: bool,
 ) {
     if ABSOLUTE_POS < gradient.len() {
-        let (row, column) = (ABSOLUTE_POS / width, ABSOLUTE_POS % width);
+        let row = 3 * (ABSOLUTE_POS / width);
+        let column = ABSOLUTE_POS % width;
         let l = column / features;
-        let place = place(points, row, levels, l, half_side);
+        let cells = levels[l * LEVEL];
+        let (x, far_x, slope_x, _bend_x) = along(points[row], half_side, cells);
+        let (y, far_y, slope_y, _bend_y) = along(points[row + 1], half_side, cells);
+        let (z, far_z, slope_z, _bend_z) = along(points[row + 2], half_side, cells);
         for c in 0..8u32 {
-            let corner = corner(&place, levels, l, c);
-            let value = weight(&corner, tangents, row, sloping) * gradient[ABSOLUTE_POS];
-            add(sums, corner.entry * features + column % features, value);
+            let (i, j, k) = sides(c);
+            let at = entry(levels, l, x + i, y + j, z + k);
+            let (a, b, c) = (weight(far_x, i), weight(far_y, j), weight(far_z, k));
+            let factor = if comptime![sloping] {
+                tangents[row] * signed(slope_x, i) * b * c
+                    + tangents[row + 1] * signed(slope_y, j) * a * c
+                    + tangents[row + 2] * signed(slope_z, k) * a * b
+            } else {
+                a * b * c
+            };
+            add(
+                sums,
+                at * features + column % features,
+                factor * gradient[ABSOLUTE_POS],
+            );
         }
     }
 }
