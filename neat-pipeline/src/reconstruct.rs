@@ -1,5 +1,6 @@
 //! From a scene on disk to a run folder: training, distillation, and both.
 
+mod backend_choice;
 mod device_failure;
 mod opened;
 mod report;

@@ -1,5 +1,6 @@
 //! Runs that have been, opened again.
 
+use super::backend_choice::backend_for;
 use crate::config::{Config, differences};
 use crate::error::PipelineError;
 use crate::event::{Event, OnEvent, Warning, WarningKind};
@@ -94,7 +95,7 @@ fn read_run(
 ) -> Result<OpenedRun, PipelineError> {
     let usable = dir.usable_checkpoint()?;
     let backend = match usable {
-        Some(_) => backend.resolve(),
+        Some(_) => backend_for(backend, &asked),
         None => backend.resolve_on_host(),
     };
     let device = backend.device()?;

@@ -1,6 +1,7 @@
 //! A run in progress: its folder, its scene, and its manifest kept up to date.
 
 use super::RunOptions;
+use super::backend_choice::{backend_for, is_too_little_for_a_gpu};
 use super::opened::software_warning;
 use crate::changes::Belonging;
 use crate::config::{Config, FieldUse};
@@ -61,7 +62,7 @@ impl<'a> Session<'a> {
         let trains = settle_field_use(&options.config.distill)? == FieldUse::Trained;
         // Once: looking for GPUs takes a while.
         let backend = match trains {
-            true => options.backend.resolve(),
+            true => backend_for(options.backend, &options.config),
             false => options.backend.resolve_on_host(),
         };
         let device = backend.device()?;
@@ -75,7 +76,7 @@ impl<'a> Session<'a> {
             on_event(event);
         };
         if trains {
-            tell_of_device(options.backend, backend, &device, &mut tell);
+            tell_of_device(options, backend, &device, &mut tell);
         }
         let (prepared, plan) = prepare(options, backend, earlier.as_ref(), cancelled, &mut tell)?;
         manifest.sphere = Some(prepared.sphere);
@@ -290,10 +291,13 @@ fn prepare(
 }
 
 /// Tells what computes if that was open, and what is wrong with it.
-fn tell_of_device(asked: Backend, backend: Backend, device: &Device, on_event: OnEvent<'_>) {
-    if asked == Backend::Auto {
+fn tell_of_device(options: &RunOptions, backend: Backend, device: &Device, on_event: OnEvent<'_>) {
+    if options.backend == Backend::Auto {
         let reason = match gpu_name(device) {
             Some(name) => format!("as there is a GPU, {name}"),
+            None if is_too_little_for_a_gpu(&options.config) => {
+                "as a step is too little work for a GPU".to_owned()
+            }
             None => "as there is no GPU".to_owned(),
         };
         on_event(Event::Decided(Decision {

@@ -183,7 +183,6 @@ fn learned_grids_and_their_pull_back() {
             shape: shape.clone(),
         };
         let [x, table] = [normal(3, 1.0, 3), matrix(shape.entries(), features, 1.0, 4)];
-        let gradient = normal(shape.width(), 1.0, 5);
         compare(
             &format!("grids of {features} features"),
             &[x.clone(), table.clone()],
@@ -191,13 +190,17 @@ fn learned_grids_and_their_pull_back() {
             |[x, table]| kernels.of(&x).encode_grid(&grid(table), x),
             |[x, table]| grid(table).encode(x),
         );
-        compare(
-            &format!("pulled back through grids of {features} features"),
-            &[x, table, gradient],
-            1e-5,
-            |[x, table, gradient]| kernels.of(&x).pull_back_grid(&grid(table), x, gradient),
-            |[x, table, gradient]| grid(table).pull_back(x, gradient),
-        );
+        // Small ones, too: the table's derivatives are added as integers.
+        for scale in [1.0, 1e-6] {
+            let gradient = normal(shape.width(), scale, 5);
+            compare(
+                &format!("pulled back through grids of {features} features, times {scale}"),
+                &[x.clone(), table.clone(), gradient],
+                1e-5,
+                |[x, table, gradient]| kernels.of(&x).pull_back_grid(&grid(table), x, gradient),
+                |[x, table, gradient]| grid(table).pull_back(x, gradient),
+            );
+        }
     }
 }
 
