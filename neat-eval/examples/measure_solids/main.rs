@@ -22,7 +22,9 @@ use neat_eval::{CadFaces, FoundFace, SceneFaces, SceneTruth};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::confidence::{ConfidenceConfig, assess, transformed_covariance};
 use neat_wireframe::export::{WireframeDocument, read_json, write_json};
-use neat_wireframe::faces::{MeasuredGraph, Shell, ShellGeometry, find_shells};
+use neat_wireframe::faces::{
+    MeasuredGraph, Shell, ShellGeometry, SurfacePoint, find_shells, surface_points,
+};
 use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
 use std::env;
 use std::error::Error;
@@ -39,6 +41,7 @@ struct Input {
     arcs: Vec<CircularArc>,
     covariances: Vec<Option<Matrix3<f64>>>,
     views: Vec<ViewObservation>,
+    points: Vec<SurfacePoint>,
 }
 
 fn main() -> Result<()> {
@@ -65,6 +68,7 @@ fn main() -> Result<()> {
             arcs: truth.arcs.clone(),
             covariances: Vec::new(),
             views: Vec::new(),
+            points: Vec::new(),
         };
         println!(
             "{name}: {} edges, {} arcs, {} other curves, {} faces",
@@ -137,13 +141,20 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
         },
         ..view
     };
+    let views: Vec<_> = views.into_iter().map(in_original).collect();
+    let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
+    let mut points = scene.sparse_points.clone();
+    for point in &mut points {
+        point.position_in_world = original(&scene, &point.position_in_world);
+    }
     Ok(Some(Input {
         wireframe: wireframe.map(|p| original(&scene, p)),
         arcs,
         covariances: (confidence.junctions.iter())
             .map(|junction| junction.covariance.as_ref().map(covariance))
             .collect(),
-        views: views.into_iter().map(in_original).collect(),
+        points: surface_points(&cameras, &points),
+        views,
     }))
 }
 
@@ -154,7 +165,7 @@ impl Input {
             arcs: &self.arcs,
             covariances: &self.covariances,
         };
-        find_shells(&graph, &self.views)
+        find_shells(&graph, &self.views, &self.points)
     }
 
     fn document(&self, shells: Vec<Shell>) -> WireframeDocument {
