@@ -41,7 +41,7 @@ pub(super) enum Sign {
 }
 
 /// The slab of points beside a plane is so many times as thick, on either side, as that of the
-/// points on it.
+/// points on it: near enough to tell of the same place, and with points enough to count.
 const SLAB: f64 = 5.0;
 
 /// Calls `say` with each place in the plane of which a point speaks.
