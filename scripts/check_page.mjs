@@ -108,10 +108,20 @@ function compare(what, told, truth, document) {
 
 const isShown = (id) => `!document.getElementById("${id}").hidden`;
 
+/** Waits for the first image of a scene. */
+async function started(browser) {
+  await browser.until(`${isShown("views")} || ${isShown("problem")}`, "no image is shown", 5 * MINUTES);
+  assert.equal(await problemOf(browser), null);
+}
+
+/** The sentence with which the page refuses a scene. */
+const problemOf = (browser) =>
+  browser.evaluate(`${isShown("problem")} ? document.getElementById("problem").textContent : null`);
+
 /** Waits for the result of a scene; its sentence if it is refused. */
 async function finished(browser) {
   await browser.until(`${isShown("result")} || ${isShown("problem")}`, "nothing comes out", 10 * MINUTES);
-  const problem = await browser.evaluate(`${isShown("problem")} ? document.getElementById("problem").textContent : null`);
+  const problem = await problemOf(browser);
   // What is on the page moves until the report is there: clicks would miss.
   if (problem === null) {
     const isOpen = `document.getElementById("report").contentWindow?.neat?.viewer`;
@@ -173,7 +183,7 @@ async function pickSegment(browser) {
 
 async function checkStopped(browser) {
   await browser.clickOn("#synthetic");
-  await browser.until(isShown("views"), "no image is shown", 5 * MINUTES);
+  await started(browser);
   await browser.clickOn("#stop");
   assert.ok(await browser.evaluate(`!(${isShown("progress")}) && !document.getElementById("choose").disabled`));
   console.log("ok: a scene is given up");
@@ -181,7 +191,7 @@ async function checkStopped(browser) {
 
 async function checkSynthetic(browser, truth) {
   await browser.clickOn("#synthetic");
-  await browser.until(isShown("views"), "no image is shown", 5 * MINUTES);
+  await started(browser);
   assert.equal(await finished(browser), null);
   const told = await stage(browser);
   const [images, lines] = await browser.evaluate(

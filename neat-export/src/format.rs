@@ -162,9 +162,12 @@ impl Format {
             });
             endings.map(|ending| ending.len()).max()
         };
-        let known = Self::ALL.into_iter().filter(|f| known_by(f).is_some());
+        let known = Self::ALL
+            .into_iter()
+            .filter_map(|f| Some((known_by(&f)?, f)));
         // `.city.json` is no `.json`.
-        known.max_by_key(known_by).ok_or_else(|| {
+        let longest = known.max_by_key(|(length, _)| *length);
+        longest.map(|(_, format)| format).ok_or_else(|| {
             let endings: Vec<_> = Self::ALL
                 .iter()
                 .flat_map(|format| format.endings())

@@ -4,11 +4,12 @@
 /** Whether an answer is there, and what it is. */
 const answer = new Int32Array(new SharedArrayBuffer(8));
 
-/** Asks the worker and waits: for ever where the question ends the program. */
+/** Asks the worker and waits: for ever where the question ends the program. The worker may wake
+ * this thread for an answer that it has already taken: only the flag says that one is there. */
 function ask(call, parameters) {
   Atomics.store(answer, 0, 0);
   postMessage({ call, parameters, answer });
-  Atomics.wait(answer, 0, 0);
+  while (Atomics.load(answer, 0) === 0) Atomics.wait(answer, 0, 0);
   return answer[1];
 }
 

@@ -19,7 +19,7 @@ use crate::ExportError;
 use crate::target::Target;
 use nalgebra::Matrix3;
 use neat_wireframe::export::WireframeDocument;
-use neat_wireframe::faces::{CurveIndex, Face};
+use neat_wireframe::faces::{CurveIndex, Shell};
 use polygon::{Polygon, polygons};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
@@ -140,9 +140,7 @@ fn geometry(building: &Building, bottom: f64, vertices: &mut Vertices) -> Value 
 
 /// How many edges and arcs bound no face.
 fn bounding_nothing(document: &WireframeDocument) -> [usize; 2] {
-    let faces = document.shells.iter().flat_map(|shell| &shell.faces);
-    let bounding: BTreeSet<CurveIndex> =
-        faces.flat_map(Face::steps).map(|step| step.curve).collect();
+    let bounding: BTreeSet<CurveIndex> = document.shells.iter().flat_map(Shell::curves).collect();
     let is_free = |curve: &CurveIndex| !bounding.contains(curve);
     [
         (0..document.edges.len())

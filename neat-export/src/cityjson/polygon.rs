@@ -1,7 +1,6 @@
 //! Faces as planar polygons.
 
 use nalgebra::{Matrix3, Vector3};
-use neat_core::CircularArc;
 use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::faces::{CurveIndex, Face, Shell, ShellGeometry, Surface};
 use std::collections::BTreeMap;
@@ -89,13 +88,11 @@ fn triangles(
     for (junction, point) in &geometry.vertices {
         exact.junctions[*junction] = *point;
     }
-    let arcs = geometry.curves.iter().filter_map(|(index, curve)| {
-        let CurveIndex::Arc(arc) = index else {
-            return None;
-        };
-        Some((*arc, curve.arc?))
-    });
-    arcs.for_each(|(index, arc): (usize, CircularArc)| exact.arcs[index] = arc);
+    for (index, curve) in &geometry.curves {
+        if let (CurveIndex::Arc(index), Some(arc)) = (index, curve.arc) {
+            exact.arcs[*index] = arc;
+        }
+    }
     let points = exact.drawn().junctions;
     let rings = |triangle: &[usize; 3]| vec![triangle.map(|corner| points[corner]).to_vec()];
     let of_faces = exact.triangles_of_faces().into_iter();

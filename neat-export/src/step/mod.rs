@@ -17,7 +17,7 @@ use entities::{Entities, string};
 use nalgebra::Vector3;
 use neat_core::CircularArc;
 use neat_wireframe::export::WireframeDocument;
-use neat_wireframe::faces::{CurveIndex, Face};
+use neat_wireframe::faces::{CurveIndex, Shell};
 use std::collections::BTreeSet;
 
 /// Writes a STEP file.
@@ -69,9 +69,7 @@ type Flaws = [(usize, &'static str); 3];
 /// The edges and arcs that bound no face, each a set of its own, and what they lack: a line needs
 /// a direction, and a vertex an edge.
 fn edge_sets(step: &mut Entities, document: &WireframeDocument) -> (Vec<String>, Flaws) {
-    let faces = document.shells.iter().flat_map(|shell| &shell.faces);
-    let bounding: BTreeSet<CurveIndex> =
-        faces.flat_map(Face::steps).map(|step| step.curve).collect();
+    let bounding: BTreeSet<CurveIndex> = document.shells.iter().flat_map(Shell::curves).collect();
     let mut lonely = vec![true; document.junctions.len()];
     let mut loose = Vec::new();
     for (index, ends) in document.edges.iter().enumerate() {

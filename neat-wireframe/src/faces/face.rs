@@ -75,6 +75,14 @@ pub enum CurveIndex {
 }
 
 impl Shell {
+    /// The curves that bound its faces: those between two faces once for each.
+    pub fn curves(&self) -> impl Iterator<Item = CurveIndex> {
+        self.faces
+            .iter()
+            .flat_map(Face::steps)
+            .map(|step| step.curve)
+    }
+
     /// The same shell where a similarity has moved the wireframe: one that does not turn it, but
     /// may mirror it at a point.
     pub fn map(&self, f: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {

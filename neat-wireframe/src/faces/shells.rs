@@ -138,9 +138,7 @@ fn middle(face: &Face, geometry: &ShellGeometry) -> Option<(Vector3<f64>, Vector
 /// is seen within a solid, and what lies on a face is the rim of something that the shell lacks.
 /// The faces on which they lie are left out; returns whether there are such.
 fn leave_out_where_curves_are(shell: &mut Shell, curves: &Curves) -> bool {
-    let own: BTreeSet<CurveIndex> = (shell.faces.iter().flat_map(Face::steps))
-        .map(|step| step.curve)
-        .collect();
+    let own: BTreeSet<CurveIndex> = shell.curves().collect();
     let (bounding, others): (Vec<&Curve>, Vec<&Curve>) =
         (curves.observed()).partition(|curve| own.contains(&curve.index));
     let bounds = Bounds::of(bounding.iter().flat_map(|curve| &curve.points));

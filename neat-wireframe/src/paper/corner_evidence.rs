@@ -10,8 +10,8 @@
 
 /// What has been fitted to the ends of a corner.
 const COORDINATES: f64 = 3.0;
-/// Halvings of the interval in which the likeliest share of a corner's ends lies.
-const HALVINGS: usize = 30;
+/// Rounds of expectation and maximisation in which shares of ends are found.
+const ROUNDS: usize = 50;
 
 /// What speaks for a corner that attracts ends at these `distances` in pixels, none of them
 /// larger than `gate`, in nats. Around corners half of the ends lie nearer than `scale`.
@@ -19,23 +19,35 @@ const HALVINGS: usize = 30;
 /// Its coordinates have been fitted to these ends, which costs half the logarithm of their
 /// number for each (Schwarz's criterion). Of no ends nothing speaks.
 pub(super) fn corner_evidence(distances: &[f64], gate: f64, scale: f64) -> f64 {
-    // By how much a corner's end is likelier than a cut so far away, less one.
-    let gains: Vec<f64> = (distances.iter())
-        .map(|distance| corner_by_cut(*distance, gate, scale) - 1.0)
-        .collect();
-    let slope = |share: f64| -> f64 { gains.iter().map(|gain| gain / (1.0 + share * gain)).sum() };
-    // The likelihood is concave in the share.
-    let [mut low, mut high] = [0.0, 1.0];
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if slope(middle) > 0.0 {
-            low = middle;
-        } else {
-            high = middle;
+    let distances: Vec<[f64; 1]> = distances.iter().map(|distance| [*distance]).collect();
+    explained(&distances, gate, scale) - 0.5 * COORDINATES * (distances.len().max(1) as f64).ln()
+}
+
+/// By how much ends at these distances from each of `N` corners are likelier than if all were
+/// cuts, in nats, where each corner and the cuts have their likeliest shares.
+pub(super) fn explained<const N: usize>(distances: &[[f64; N]], gate: f64, scale: f64) -> f64 {
+    let by_cut = |distance: f64| match distance < gate {
+        true => corner_by_cut(distance, gate, scale),
+        false => 0.0,
+    };
+    let ratios: Vec<[f64; N]> = distances.iter().map(|end| end.map(by_cut)).collect();
+    let likelihood = |shares: &[f64; N], ratios: &[f64; N]| {
+        let of_corners: f64 = shares.iter().zip(ratios).map(|(w, ratio)| w * ratio).sum();
+        1.0 - shares.iter().sum::<f64>() + of_corners
+    };
+    let mut shares = [1.0 / (N + 1) as f64; N];
+    for _ in 0..ROUNDS {
+        let mut expected = [0.0; N];
+        for end in &ratios {
+            let all = likelihood(&shares, end);
+            for corner in 0..N {
+                expected[corner] += shares[corner] * end[corner] / all;
+            }
         }
+        shares = expected.map(|ends| ends / ratios.len().max(1) as f64);
     }
-    let explained: f64 = gains.iter().map(|gain| (low * gain).ln_1p()).sum();
-    explained - 0.5 * COORDINATES * (distances.len().max(1) as f64).ln()
+    let gains = ratios.iter().map(|end| likelihood(&shares, end).ln());
+    gains.sum()
 }
 
 /// How much likelier an end is so far from a corner than from a cut.

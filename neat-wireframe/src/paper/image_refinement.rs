@@ -8,6 +8,7 @@
 
 use super::attraction::attracted_ends;
 use super::corner_evidence::corner_evidence;
+use super::junction_merging::{AttractingJunction, EndKey, EndScatter, merged};
 use super::neat_lines::NeatLine;
 use crate::ViewObservation;
 use crate::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, bundle_adjust};
@@ -18,12 +19,11 @@ use nalgebra::{Vector2, Vector3};
 use neat_core::LineSegment2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 // Guesses: halved or doubled, each of these and of the settings changes the mean F of segments
 // on nine fields of seven objects by less than 0.01, that of junctions by 0.013 at most. That
-// was before corners were told from cuts.
+// was before corners were told from cuts, and copies from corners.
 
 /// Lines are asked for their junctions so often: moved and merged ones attract others. With
 /// two and four all is the same.
@@ -44,11 +44,9 @@ pub struct ImageRefinementConfig {
     /// then, supported or not, and all junctions, whatever votes they have.
     pub enabled: bool,
     /// A 2D segment speaks for an edge if both ends lie nearer to the projected junctions
-    /// than this, in pixels: as far as a field may be off.
+    /// than this, in pixels: as far as a field may be off. Junctions nearer to each other than
+    /// this may be one corner.
     pub max_end_distance: f64,
-    /// Junctions nearer to each other than this are one: pixels, at the median distance of
-    /// the views that show one of them.
-    pub merge_distance: f64,
 }
 
 impl Default for ImageRefinementConfig {
@@ -56,7 +54,6 @@ impl Default for ImageRefinementConfig {
         Self {
             enabled: false,
             max_end_distance: 10.0,
-            merge_distance: 3.0,
         }
     }
 }
@@ -74,7 +71,11 @@ pub(super) fn refine_by_images(
         let attracted = attracted_segments(junctions, views, lines_by_view, config);
         let edges = observed_edges(&attracted, views);
         let junctions = bundle_adjust(&edges, junctions, LOSS).junctions;
-        merged(&junctions, &edges, config.merge_distance)
+        let scatter = EndScatter {
+            scale: LOSS.cauchy_scale_in_pixels,
+            gate: config.max_end_distance,
+        };
+        merged(attracting(&junctions, &attracted, views), views, scatter)
     };
     let places = |refined: &[(Vector3<f64>, usize)]| -> Vec<Vector3<f64>> {
         refined.iter().map(|(place, _)| *place).collect()
@@ -102,23 +103,19 @@ fn ends_of_edges(
     config: &ImageRefinementConfig,
 ) -> Vec<Vector3<f64>> {
     let attracted = attracted_segments(junctions, views, lines_by_view, config);
-    // A detected end is one point, however many segments of its view meet there.
-    let mut ends = vec![BTreeMap::new(); junctions.len()];
-    for segment in &attracted {
-        for (junction, end) in segment.junctions.into_iter().zip(segment.detection.ends()) {
-            let key = end_key(segment.view, &end);
-            let pixel = project_in_front(&views[segment.view].camera, &junctions[junction]);
-            ends[junction].extend(pixel.map(|pixel| (key, (pixel - end).norm())));
-        }
-    }
-    let is_corner = |ends: BTreeMap<_, f64>| {
-        let distances: Vec<f64> = ends.into_values().collect();
+    let is_corner = |junction: &AttractingJunction| {
+        let distance = |((view, _), end): (&EndKey, &Vector2<f64>)| {
+            let pixel = project_in_front(&views[*view].camera, &junction.place)?;
+            Some((pixel - end).norm())
+        };
+        let distances: Vec<f64> = junction.ends.iter().filter_map(distance).collect();
         // Nearer ends than what the fit takes for noise tell no more of a corner: junctions
         // that became one had each its own.
         let scale = LOSS.cauchy_scale_in_pixels;
         corner_evidence(&distances, config.max_end_distance, scale) > 0.0
     };
-    let is_corner: Vec<bool> = ends.into_iter().map(is_corner).collect();
+    let attracting = attracting(junctions, &attracted, views);
+    let is_corner: Vec<bool> = attracting.iter().map(is_corner).collect();
     let mut kept = is_corner.clone();
     for AttractedSegment { junctions, .. } in &attracted {
         let [a, b] = *junctions;
@@ -129,6 +126,19 @@ fn ends_of_edges(
     told.filter(|(_, kept)| *kept)
         .map(|(place, _)| *place)
         .collect()
+}
+
+/// The edges between junctions that 2D segments show from end to end, each once, sorted: what
+/// [`attract`](super::attract) makes of lines, without those that end elsewhere in the image.
+pub(super) fn attracted_edges(
+    junctions: &[Vector3<f64>],
+    views: &[ViewObservation],
+    lines_by_view: &[Vec<NeatLine>],
+    config: &ImageRefinementConfig,
+) -> Vec<[usize; 2]> {
+    let attracted = attracted_segments(junctions, views, lines_by_view, config);
+    let edges: BTreeSet<[usize; 2]> = attracted.iter().map(|segment| segment.junctions).collect();
+    edges.into_iter().collect()
 }
 
 /// A 2D segment whose NEAT line two junctions attract.
@@ -210,39 +220,39 @@ fn observed_edges(attracted: &[AttractedSegment], views: &[ViewObservation]) -> 
     edges.into_iter().map(observed).collect()
 }
 
-/// One for all junctions that the images hardly tell apart: the one that most 2D segments
-/// observe.
-fn merged(
+/// All junctions with the ends of the 2D segments that they attract.
+fn attracting(
     junctions: &[Vector3<f64>],
-    observed: &[ObservedEdge],
-    distance_in_pixels: f64,
-) -> Vec<(Vector3<f64>, usize)> {
-    // Of each observation the length of a pixel at the junction.
+    attracted: &[AttractedSegment],
+    views: &[ViewObservation],
+) -> Vec<AttractingJunction> {
+    let mut ends = vec![BTreeMap::new(); junctions.len()];
+    // Of each segment the length of a pixel at the junction.
     let mut pixels = vec![Vec::new(); junctions.len()];
-    for edge in observed {
-        for EdgeObservation { camera, .. } in &edge.observations {
-            for junction in edge.junctions {
-                let depth = camera.project(&junctions[junction]).depth;
-                pixels[junction].push(depth / camera.intrinsics.fx);
-            }
+    for segment in attracted {
+        let camera = &views[segment.view].camera;
+        for (junction, end) in segment.junctions.into_iter().zip(segment.detection.ends()) {
+            ends[junction].insert(end_key(segment.view, &end), end);
+            let depth = camera.project(&junctions[junction]).depth;
+            pixels[junction].push(depth / camera.intrinsics.fx);
         }
     }
-    let mut order: Vec<usize> = (0..junctions.len())
-        .filter(|junction| !pixels[*junction].is_empty())
-        .collect();
-    order.sort_by_key(|junction| Reverse(pixels[*junction].len()));
-    let mut kept: Vec<(Vector3<f64>, usize)> = Vec::new();
-    for junction in order {
-        let radius = distance_in_pixels * upper_median(&mut pixels[junction]);
-        let place = junctions[junction];
-        if kept
-            .iter()
-            .all(|(other, _)| (other - place).norm() >= radius)
-        {
-            kept.push((place, pixels[junction].len()));
+    let attracting = |((place, ends), mut pixels): ((&Vector3<f64>, _), Vec<f64>)| {
+        let segments = pixels.len();
+        let pixel = match segments {
+            0 => 0.0,
+            _ => upper_median(&mut pixels),
+        };
+        AttractingJunction {
+            place: *place,
+            ends,
+            segments,
+            pixel,
         }
-    }
-    kept
+    };
+    (junctions.iter().zip(ends).zip(pixels))
+        .map(attracting)
+        .collect()
 }
 
 #[cfg(test)]

@@ -4,8 +4,10 @@
 mod attraction;
 mod corner_evidence;
 mod image_refinement;
+mod junction_merging;
 mod junction_refinement;
 mod junction_voting;
+mod line_visibility;
 mod neat_lines;
 mod visibility;
 
@@ -20,8 +22,10 @@ pub use visibility::{VisibilityConfig, seeing_views, squared_reprojection_distan
 
 use crate::used_junctions::UsedJunctions;
 use crate::{SignedDistance, ViewObservation, Wireframe3d};
-use image_refinement::refine_by_images;
+use image_refinement::{attracted_edges, refine_by_images};
+use line_visibility::views_that_show;
 use nalgebra::Vector3;
+use neat_core::LineSegment3;
 use neat_core::assignment::AssignmentError;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -187,12 +191,7 @@ impl PaperBackEndConfig {
             .filter(|line| self.image_refinement.enabled || line.is_supported(&self.neat_lines))
             .map(|line| line.segment)
             .collect();
-        let attracted = Wireframe3d {
-            edges: attract(&supported, &positions, &self.attraction),
-            junctions: positions,
-        };
-
-        let seen = seeing_views(&attracted.segments(), views, &self.visibility);
+        let (attracted, seen) = self.attracted(positions, &supported, views, &lines_by_view);
         let (edges, visible_views): (Vec<_>, Vec<_>) = attracted
             .edges
             .iter()
@@ -225,6 +224,30 @@ impl PaperBackEndConfig {
             result.drop_isolated_junctions();
         }
         Ok(result)
+    }
+
+    /// The edges between junctions, and in how many views each is seen.
+    fn attracted(
+        &self,
+        junctions: Vec<Vector3<f64>>,
+        supported: &[LineSegment3],
+        views: &[ViewObservation],
+        lines_by_view: &[Vec<NeatLine>],
+    ) -> (Wireframe3d, Vec<usize>) {
+        let by_images = &self.image_refinement;
+        let edges = if by_images.enabled {
+            attracted_edges(&junctions, views, lines_by_view, by_images)
+        } else {
+            attract(supported, &junctions, &self.attraction)
+        };
+        let attracted = Wireframe3d { junctions, edges };
+        let segments = attracted.segments();
+        let seen = if by_images.enabled {
+            views_that_show(&segments, views, lines_by_view, &self.visibility)
+        } else {
+            seeing_views(&segments, views, &self.visibility)
+        };
+        (attracted, seen)
     }
 
     /// The junctions that lines go to, each with its votes or 2D segments.
