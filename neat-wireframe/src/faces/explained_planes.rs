@@ -79,7 +79,8 @@ pub(super) fn explained_planes(curves: &Curves, points: &[Measured]) -> Vec<Plan
     let mut queue = BinaryHeap::from(scored);
     let mut planes = Vec::new();
     while let Some(mut proposal) = queue.pop() {
-        // What others have taken by now is explained already, so a gain can only have fallen.
+        // What others have taken by now is explained already, so that gains fall: nearly always,
+        // as the share on a plane grows when others take what does not lie on it.
         proposal.gain = score(&items, proposal.plane);
         if proposal.gain <= 0.0 {
             continue;
@@ -196,7 +197,8 @@ fn score(items: &[Item], normal: &Vector3<f64>, offset: f64, extent: f64) -> f64
     if ratios.is_empty() {
         return 0.0;
     }
-    let share = (on_plane / count).min(0.5);
+    // One more that does not lie on it, so that nothing is impossible.
+    let share = on_plane / (count + 1.0);
     let explained: f64 = (ratios.iter())
         .map(|(ends, ratio)| ((1.0 - share).powf(*ends) + share * ratio.exp()).ln())
         .sum();

@@ -11,7 +11,7 @@
 //!
 //! Where there are points of surfaces, planes are found that explain edges and points together
 //! (`explained_planes.rs`), and the parts of them that points say are surface (`sheets.rs`), also
-//! where edges are missing. Nothing else changes a solid.
+//! where edges are missing. Solids stay as they are.
 //!
 //! ```
 //! use neat_core::Wireframe3d;
@@ -82,7 +82,8 @@ use visibility::Sightings;
 ///   where others meet them.
 /// - `views`: cameras and 2D segments, in the same frame. Without any, only the wireframe speaks.
 /// - `points`: in the same frame; see [`surface_points`]. Where there are some, sheets are sought
-///   on the planes of the scene, and open faces that are hidden or seen through are left out.
+///   on the planes of the scene, and open faces that are hidden or seen through are left out. They
+///   say nothing without views, as nobody knows then what is hidden.
 ///
 /// The result does not depend on the number of threads.
 pub fn find_shells(
@@ -107,7 +108,7 @@ pub fn find_shells(
     let chosen = selection::select(&curves, &faces, &against);
     let chosen = chosen.into_iter().map(|face| faces[face].clone()).collect();
     let shells = shells::shells(graph, &curves, chosen, views);
-    if points.is_empty() {
+    if points.is_empty() || views.is_empty() {
         return shells;
     }
     let (mut shells, open): (Vec<Shell>, Vec<Shell>) =
@@ -119,11 +120,11 @@ pub fn find_shells(
     let mut open: Vec<_> = (open.into_iter().flat_map(|shell| shell.faces))
         .filter_map(|face| Some((face.clone(), region(&face)?)))
         .collect();
-    let mut witnesses = point_evidence::witnesses(points, curves.junction_floor());
+    let witnesses = point_evidence::witnesses(points, curves.junction_floor());
     let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
-    let mut faces = sheets::sheets(&curves, &solid, &mut open, &cameras, &mut witnesses);
+    let mut faces = sheets::sheets(&curves, &solid, &mut open, &cameras, &witnesses);
     faces.extend(open.into_iter().map(|(face, _)| face));
-    // What only inferred lines close is no solid.
+    // Inferred lines may close them, but what is inside nobody has asked.
     let sheets = shells::shells(graph, &curves, faces, views).into_iter();
     shells.extend(sheets.map(|shell| Shell {
         closed: false,

@@ -15,8 +15,6 @@ use nalgebra::{Matrix3, Vector3};
 pub(super) struct Witness<'a> {
     pub measured: Measured,
     seen_from: &'a [Vector3<f64>],
-    /// Whether it lies on a face that was found.
-    pub taken: bool,
 }
 
 /// All of them; none where there are no points.
@@ -27,13 +25,12 @@ pub(super) fn witnesses(points: &[SurfacePoint], floor: Matrix3<f64>) -> Vec<Wit
         .map(|point| Witness {
             measured: witness(point),
             seen_from: &point.seen_from,
-            taken: false,
         })
         .collect()
 }
 
 /// What a point says of the place in a plane where it lies, or where it is seen through it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Sign {
     On,
     Beside,
@@ -53,9 +50,7 @@ pub(super) fn for_each_sign(
     let (point, covariance) = &witness.measured;
     let distance = plane.relative_distance(point, covariance);
     if distance <= 1.0 {
-        if !witness.taken {
-            say(*point, Sign::On);
-        }
+        say(*point, Sign::On);
         return;
     }
     if distance <= SLAB {
@@ -112,6 +107,14 @@ impl Densities {
 }
 
 impl PointEvidence {
+    /// Where no point says anything.
+    pub fn of_area(area: f64) -> Self {
+        Self {
+            area,
+            ..Self::default()
+        }
+    }
+
     /// How much more likely the points are with a surface than without, in nats.
     pub fn log_ratio(&self, densities: &Densities) -> f64 {
         let Densities { surface, chance } = densities;

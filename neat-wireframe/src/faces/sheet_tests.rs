@@ -95,7 +95,18 @@ fn points_close_a_wall_that_lacks_an_edge_around_what_they_see_through() {
     // What no edge bounds is inferred.
     assert!(steps().any(|step| step.curve == CurveIndex::Smooth([2, 3])));
     // The window alone is a loop of edges, but points are seen through it.
-    assert_eq!(shells_of(&wall, &[]).len(), 1);
+    let window = shells_of(&wall, &[]);
+    assert_eq!(window.len(), 1);
+    // Nobody knows what is hidden where there are no views.
+    let graph = MeasuredGraph {
+        wireframe: &wall,
+        arcs: &[],
+        covariances: &[],
+    };
+    assert_eq!(
+        find_shells(&graph, &[], &points),
+        find_shells(&graph, &[], &[])
+    );
 }
 
 #[test]

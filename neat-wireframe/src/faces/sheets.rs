@@ -6,7 +6,7 @@ use super::explained_planes::explained_planes;
 use super::face::{Face, Surface};
 use super::groups::groups;
 use super::min_cut::chosen;
-use super::plane_fit::{CHI_SQUARE, FittedPlane, PlaneFit};
+use super::plane_fit::{CHI_SQUARE, FittedPlane};
 use super::plane_mesh::PlaneMesh;
 use super::point_evidence::{
     Densities, PointEvidence, Sign, Witness, for_each_sign, log_ratio_of_sight,
@@ -15,24 +15,27 @@ use super::region::Region;
 use super::selection::{MISSING_FACE, MOST_AGAINST};
 use nalgebra::Vector3;
 use neat_core::Camera;
-use std::collections::{BTreeMap, BTreeSet};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// What hides what is asked so often: the first time nothing hides anything yet.
 const ROUNDS: usize = 3;
 /// As everything here is told by two views at least, what fewer can see is not known.
 const VIEWS: usize = 2;
 
-/// A plane with its triangles.
-struct Sheet<'a> {
-    plane: FittedPlane<'a>,
+/// A plane with its triangles, and what points say of them.
+struct Sheet {
+    plane: (Vector3<f64>, f64),
     mesh: PlaneMesh,
+    said: Vec<Said>,
 }
 
-/// Of the triangles of a plane, what points say.
-struct Told {
-    of_triangles: BTreeMap<usize, PointEvidence>,
-    /// Points beside the plane over or under a triangle.
-    beside: usize,
+/// What a witness, by its place, says of a triangle.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Said {
+    witness: usize,
+    triangle: usize,
+    sign: Sign,
 }
 
 /// A face with its extent.
@@ -80,13 +83,12 @@ impl Sight<'_> {
         &self,
         camera: &Camera,
         place: &Vector3<f64>,
-        hiding: impl Iterator<Item = &'r Region>,
+        mut hiding: impl Iterator<Item = &'r Region>,
     ) -> bool {
         let center = &camera.center_in_world;
         let hides = |region: &Region| {
             region.distance_to_surface(place) > self.margin && region.is_between(center, place)
         };
-        let mut hiding = hiding;
         camera.sees(place) && !hiding.any(hides)
     }
 }
@@ -98,25 +100,20 @@ pub(super) fn sheets(
     solid: &[Region],
     open: &mut Vec<Placed>,
     cameras: &[Camera],
-    witnesses: &mut [Witness],
+    witnesses: &[Witness],
 ) -> Vec<Face> {
     let measured: Vec<_> = witnesses.iter().map(|witness| witness.measured).collect();
     let planes = explained_planes(curves, &measured);
-    let solved = planes.iter().filter_map(PlaneFit::solved);
-    let sheets: Vec<Sheet> = solved
-        .filter_map(|plane| {
-            let mesh = PlaneMesh::new(curves, &plane)?;
-            Some(Sheet { plane, mesh })
-        })
+    let sheets: Vec<Sheet> = (planes.par_iter())
+        .filter_map(|plane| Sheet::new(curves, &plane.solved()?, witnesses))
         .collect();
     let margin = (CHI_SQUARE * curves.junction_floor()[0]).sqrt();
     let sight = Sight { cameras, margin };
     open.retain(|(_, region)| log_ratio_of_sight(region, witnesses, margin) >= -MOST_AGAINST);
     let mut placed: Vec<Vec<Placed>> = sheets.iter().map(|_| Vec::new()).collect();
     for round in 0..ROUNDS {
-        witnesses
-            .iter_mut()
-            .for_each(|witness| witness.taken = false);
+        // A point lies on one face: on that of the plane that explains most.
+        let mut taken = vec![false; witnesses.len()];
         for (place, sheet) in sheets.iter().enumerate() {
             let others = || {
                 let others = (placed.iter().enumerate()).filter(|(other, _)| *other != place);
@@ -128,7 +125,7 @@ pub(super) fn sheets(
                 known().all(|region| !region.is_near(place, margin))
                     && (round == 0 || sight.reaches(place, others()))
             };
-            placed[place] = sheet.faces(may_be, witnesses);
+            placed[place] = sheet.faces(may_be, &mut taken);
         }
         open.retain(|(_, region)| {
             let points = region.points();
@@ -140,56 +137,57 @@ pub(super) fn sheets(
     placed.into_iter().flatten().map(|(face, _)| face).collect()
 }
 
-impl Sheet<'_> {
-    fn told(&self, witnesses: &[Witness]) -> Told {
-        let Self { plane, mesh } = self;
-        let with_area = |area| PointEvidence {
-            area,
-            ..PointEvidence::default()
-        };
-        let mut of_triangles: BTreeMap<usize, PointEvidence> = (mesh.triangles())
-            .map(|(triangle, area, _)| (triangle, with_area(area)))
-            .collect();
-        let mut beside = 0;
-        for witness in witnesses {
-            let mut through = BTreeSet::new();
-            for_each_sign(witness, plane, |place, sign| {
-                let Some(triangle) = mesh.triangle_at(&place) else {
-                    return;
-                };
-                match sign {
-                    Sign::On => of_triangles.entry(triangle).or_default().on += 1,
-                    Sign::Beside => beside += 1,
-                    Sign::Through => {
-                        through.insert(triangle);
-                    }
-                }
+impl Sheet {
+    fn new(curves: &Curves, plane: &FittedPlane, witnesses: &[Witness]) -> Option<Self> {
+        let mesh = PlaneMesh::new(curves, plane)?;
+        let mut said = Vec::new();
+        for (place, witness) in witnesses.iter().enumerate() {
+            for_each_sign(witness, plane, |point, sign| {
+                said.extend(mesh.triangle_at(&point).map(|triangle| Said {
+                    witness: place,
+                    triangle,
+                    sign,
+                }));
             });
-            for triangle in through {
-                of_triangles.entry(triangle).or_default().through += 1;
-            }
         }
-        Told {
-            of_triangles,
-            beside,
-        }
+        // From however many views: once.
+        said.sort_unstable();
+        said.dedup();
+        Some(Self {
+            plane: plane.plane(),
+            mesh,
+            said,
+        })
     }
 
-    fn faces(
-        &self,
-        may_be: impl Fn(&Vector3<f64>) -> bool,
-        witnesses: &mut [Witness],
-    ) -> Vec<Placed> {
-        let told = self.told(witnesses);
-        let Some(densities) = Densities::of(told.of_triangles.values(), told.beside) else {
+    /// Of each triangle what points say that are not taken, and how many are beside the plane.
+    fn evidence(&self, taken: &[bool]) -> (BTreeMap<usize, PointEvidence>, usize) {
+        let mut of_triangles: BTreeMap<usize, PointEvidence> = (self.mesh.triangles())
+            .map(|(triangle, area, _)| (triangle, PointEvidence::of_area(area)))
+            .collect();
+        let mut beside = 0;
+        for said in &self.said {
+            let of_triangle = of_triangles.entry(said.triangle).or_default();
+            match said.sign {
+                Sign::On => of_triangle.on += usize::from(!taken[said.witness]),
+                Sign::Beside => beside += 1,
+                Sign::Through => of_triangle.through += 1,
+            }
+        }
+        (of_triangles, beside)
+    }
+
+    /// Takes the points on the faces that it finds.
+    fn faces(&self, may_be: impl Fn(&Vector3<f64>) -> bool, taken: &mut [bool]) -> Vec<Placed> {
+        let (of_triangles, beside) = self.evidence(taken);
+        let Some(densities) = Densities::of(of_triangles.values(), beside) else {
             return Vec::new();
         };
         let possible = (self.mesh.triangles()).filter(|(_, _, centroid)| may_be(centroid));
         let mut gains: BTreeMap<usize, f64> = possible
-            .map(|(triangle, _, _)| (triangle, told.of_triangles[&triangle].log_ratio(&densities)))
+            .map(|(triangle, _, _)| (triangle, of_triangles[&triangle].log_ratio(&densities)))
             .collect();
         let mut costs = BTreeMap::new();
-        let mut joined: Vec<Vec<usize>> = Vec::new();
         let sides = self.mesh.sides();
         for (pair, is_edge) in &sides {
             let cost = if *is_edge { 0.0 } else { MISSING_FACE };
@@ -206,21 +204,15 @@ impl Sheet<'_> {
             }
         }
         let kept = chosen(&gains, &costs);
-        for (pair, _) in &sides {
-            if pair.iter().all(|triangle| kept.contains(triangle)) {
-                joined.push(pair.to_vec());
-            }
-        }
+        let pairs = sides.iter().map(|(pair, _)| pair.to_vec());
+        let mut joined: Vec<Vec<usize>> = pairs
+            .filter(|pair| pair.iter().all(|triangle| kept.contains(triangle)))
+            .collect();
         joined.extend(kept.iter().map(|triangle| vec![*triangle]));
-        for witness in witnesses {
-            let mut taken = false;
-            for_each_sign(witness, &self.plane, |place, sign| {
-                let triangle = self.mesh.triangle_at(&place);
-                taken |= sign == Sign::On && triangle.is_some_and(|t| kept.contains(&t));
-            });
-            witness.taken |= taken;
+        for said in &self.said {
+            taken[said.witness] |= said.sign == Sign::On && kept.contains(&said.triangle);
         }
-        let (normal, offset) = self.plane.plane();
+        let (normal, offset) = self.plane;
         let face = |triangles: &Vec<usize>| {
             let loops = self.mesh.loops(&triangles.iter().copied().collect());
             let (loops, polygons) = loops.into_iter().unzip();
