@@ -2,16 +2,18 @@
 //! that the assembler makes; of rendered photographs in the latter only.
 //!
 //! ```text
-//! cargo run --release -p neat-eval --example measure_solids -- [--out DIR] [--kept DIR] SCENE…
+//! cargo run --release -p neat-eval --example measure_solids -- [--out DIR] [--kept DIR] [--planes] SCENE…
 //! ```
 //!
 //! `--out` keeps documents with their shells, `NAME/true.json` and `NAME/assembled.json`. With `--kept` wireframes and segments are those that `measure_assembler --out`
 //! has left there; a scene that it lacks is measured in the true wireframe only. A true wireframe
 //! gets no views: only its edges speak. Its curves that are no arcs of circles are left out.
-//! Faces are measured by the protocols `cad-faces` and `scene-faces`.
+//! Faces are measured by the protocols `cad-faces` and `scene-faces`. `--planes` lists the plane of
+//! each large face of rendered photographs, with how far it is from that of the surface.
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
 
+mod planes;
 #[path = "../measure_assembler/prepared.rs"]
 mod prepared;
 mod truth;
@@ -45,20 +47,35 @@ struct Input {
 }
 
 fn main() -> Result<()> {
-    let (mut scenes, mut out, mut kept) = (Vec::new(), None, None);
+    let (mut scenes, mut out, mut kept, mut planes) = (Vec::new(), None, None, false);
     let mut arguments = env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--out" => out = arguments.next().map(PathBuf::from),
             "--kept" => kept = arguments.next().map(PathBuf::from),
+            "--planes" => planes = true,
             _ => scenes.push(PathBuf::from(argument)),
         }
     }
     for dir in &scenes {
         let name = dir.file_name().unwrap_or_default().to_string_lossy();
+        let folder = out.as_ref().map(|out| out.join(&*name));
+        let keep = |kind: &str, input: &Input, shells: Vec<Shell>| -> Result<()> {
+            if let Some(folder) = &folder {
+                fs::create_dir_all(folder)?;
+                let document = input.document(shells);
+                write_json(&folder.join(format!("{kind}.json")), &document)?;
+            }
+            Ok(())
+        };
         if dir.join("truth").exists() {
             if let Some(input) = reconstructed(dir, &name, kept.as_deref())? {
-                println!("{name}: {}", scene_scores(&input, dir)?);
+                let start = Instant::now();
+                let shells = input.shells();
+                let seconds = start.elapsed().as_secs_f64();
+                let scores = scene_scores(&shells, &input, dir, planes)?;
+                println!("{name}: {seconds:.3} s, {scores}");
+                keep("assembled", &input, shells)?;
             }
             continue;
         }
@@ -77,7 +94,6 @@ fn main() -> Result<()> {
             truth.other_curves,
             truth.faces.len()
         );
-        let folder = out.as_ref().map(|out| out.join(&*name));
         let measure = |kind: &str, input: &Input| -> Result<()> {
             let start = Instant::now();
             let shells = input.shells();
@@ -86,12 +102,7 @@ fn main() -> Result<()> {
                 "  {kind:9} {}, {seconds:.3} s",
                 scores(&shells, input, &truth)
             );
-            if let Some(folder) = &folder {
-                fs::create_dir_all(folder)?;
-                let document = input.document(shells);
-                write_json(&folder.join(format!("{kind}.json")), &document)?;
-            }
-            Ok(())
+            keep(kind, input, shells)
         };
         measure("true", &of_truth)?;
         if let Some(input) = reconstructed(dir, &name, kept.as_deref())? {
@@ -207,18 +218,16 @@ fn scores(shells: &[Shell], input: &Input, truth: &Truth) -> String {
     text
 }
 
-/// The faces of a rendered scene against its surface, as text.
-fn scene_scores(input: &Input, dir: &Path) -> Result<String> {
-    let start = Instant::now();
-    let shells = input.shells();
-    let seconds = start.elapsed().as_secs_f64();
+/// The faces of a rendered scene against its surface, as text; on demand with each plane.
+fn scene_scores(shells: &[Shell], input: &Input, dir: &Path, planes: bool) -> Result<String> {
     let truth = SceneTruth {
         cameras: input.views.iter().map(|view| view.camera).collect(),
         ..SceneTruth::read(dir)?
     };
-    let scores = SceneFaces::default().evaluate(&faces_of(&shells, input), &truth)?;
+    let faces = faces_of(shells, input);
+    let scores = SceneFaces::default().evaluate(&faces, &truth)?;
     let mut text = format!(
-        "{} faces of area {:.2}, {:.2} of planar surface seen, {} closed shells, {seconds:.3} s",
+        "{} faces of area {:.2}, {:.2} of planar surface seen, {} closed shells",
         scores.faces,
         scores.found_area,
         scores.planar_area,
@@ -231,6 +240,9 @@ fn scene_scores(input: &Input, dir: &Path) -> Result<String> {
             shares.precision.unwrap_or(0.0),
             shares.recall.unwrap_or(0.0)
         );
+    }
+    if planes {
+        text += &planes::table(&faces, &truth)?;
     }
     Ok(text)
 }
