@@ -5,11 +5,13 @@
 //! cargo run --release -p neat-eval --example measure_solids -- [--out DIR] [--kept DIR] [--planes] SCENE…
 //! ```
 //!
-//! `--out` keeps documents with their shells, `NAME/true.json` and `NAME/assembled.json`. With `--kept` wireframes and segments are those that `measure_assembler --out`
-//! has left there; a scene that it lacks is measured in the true wireframe only. A true wireframe
-//! gets no views: only its edges speak. Its curves that are no arcs of circles are left out.
+//! `--out` keeps documents with their shells, `NAME/true.json` and `NAME/assembled.json`. With
+//! `--kept` wireframes and segments are those that `measure_assembler --out` has left there; a
+//! scene that it lacks is measured in the true wireframe only. A true wireframe gets no views: only
+//! its edges speak. Its curves that are no arcs of circles are left out.
 //! Faces are measured by the protocols `cad-faces` and `scene-faces`. `--planes` lists the plane of
-//! each large face of rendered photographs, with how far it is from that of the surface.
+//! each large face of rendered photographs, with how far it is from that of the surface, and
+//! measures faces once more with their corners moved onto their planes.
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
 
@@ -20,7 +22,7 @@ mod truth;
 
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{Camera, CircularArc, Scene, Wireframe3d};
-use neat_eval::{CadFaces, FoundFace, SceneFaces, SceneTruth};
+use neat_eval::{CadFaces, FaceShares, FoundFace, SceneFaceScores, SceneFaces, SceneTruth};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::confidence::{ConfidenceConfig, assess, transformed_covariance};
 use neat_wireframe::export::{WireframeDocument, read_json, write_json};
@@ -233,18 +235,26 @@ fn scene_scores(shells: &[Shell], input: &Input, dir: &Path, planes: bool) -> Re
         scores.planar_area,
         shells.iter().filter(|shell| shell.closed).count()
     );
-    for shares in &scores.thresholds {
-        text += &format!(
+    text += &shares_text(&scores);
+    if planes {
+        let flat: Vec<FoundFace> = faces.iter().map(planes::flattened).collect();
+        let scores = SceneFaces::default().evaluate(&flat, &truth)?;
+        text += &format!("\n  on their planes{}", shares_text(&scores));
+        text += &planes::table(&faces, &truth)?;
+    }
+    Ok(text)
+}
+
+fn shares_text(scores: &SceneFaceScores) -> String {
+    let of_threshold = |shares: &FaceShares| {
+        format!(
             "; within {:.4}: precision {:.3}, recall {:.3}",
             shares.threshold,
             shares.precision.unwrap_or(0.0),
             shares.recall.unwrap_or(0.0)
-        );
-    }
-    if planes {
-        text += &planes::table(&faces, &truth)?;
-    }
-    Ok(text)
+        )
+    };
+    scores.thresholds.iter().map(of_threshold).collect()
 }
 
 fn faces_of(shells: &[Shell], input: &Input) -> Vec<FoundFace> {

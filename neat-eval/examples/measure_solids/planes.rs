@@ -24,6 +24,20 @@ fn kind(normal: &Vector3<f64>) -> &'static str {
     }
 }
 
+/// A plane face with its corners moved onto its plane: they lie off it by the noise of junctions.
+pub fn flattened(face: &FoundFace) -> FoundFace {
+    let onto = |point: Vector3<f64>| match face.surface {
+        Surface::Plane { normal, offset } => point - normal * (normal.dot(&point) - offset),
+        Surface::Cylinder { .. } => point,
+    };
+    FoundFace {
+        triangles: (face.triangles.iter())
+            .map(|triangle| triangle.map(onto))
+            .collect(),
+        ..face.clone()
+    }
+}
+
 /// Scenes are in metres: a line for each large face, the largest first, and one for all of a kind.
 pub fn table(faces: &[FoundFace], truth: &SceneTruth) -> Result<String> {
     let offsets = SceneFaces::default().plane_offsets(faces, truth)?;
@@ -56,8 +70,8 @@ pub fn table(faces: &[FoundFace], truth: &SceneTruth) -> Result<String> {
             "\n  {kind:5}: {} of {} faces and {:.2} of {:.2} of their area within {} cm and {angle}°",
             right().count(),
             of_kind().count(),
-            right().map(|plane| plane.0).sum::<f64>(),
-            of_kind().map(|plane| plane.0).sum::<f64>(),
+            right().fold(0.0, |sum, plane| sum + plane.0),
+            of_kind().fold(0.0, |sum, plane| sum + plane.0),
             100.0 * goal
         )?;
     }

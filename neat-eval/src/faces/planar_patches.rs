@@ -17,6 +17,13 @@ pub(super) struct PlanarPatch {
     pub triangles: Vec<Triangle>,
 }
 
+impl PlanarPatch {
+    /// Of a point over the plane.
+    pub fn height(&self, point: &Vector3<f64>) -> f64 {
+        self.normal.dot(&(point - self.point))
+    }
+}
+
 /// Patches of at least `min_area`: connected triangles within `thickness` of the plane of the
 /// largest of them.
 pub(super) fn planar_patches(

@@ -1,7 +1,7 @@
 //! How far the planes of found faces are from those of the surface, and how they are turned.
 //!
 //! Source: ours, for rendered scenes with their exact mesh. A found face is compared with the
-//! planar part of the mesh along which most of it lies.
+//! plane along whose parts of the mesh most of it lies: between windows a wall is many parts.
 
 use super::area_samples::area_samples;
 use super::found_face::FoundFace;
@@ -34,7 +34,7 @@ pub struct PlaneOffset {
 
 impl SceneFaces {
     /// For each found face its plane beside that of the mesh; `None` for a face of a cylinder and
-    /// where less than half of its area lies along one planar part of the mesh.
+    /// where less than half of its area lies along the planar parts of the mesh in one plane.
     ///
     /// # Errors
     /// As those of [`Self::evaluate`].
@@ -63,7 +63,7 @@ impl SceneFaces {
         patches: &[(PlanarPatch, Mesh)],
         scale: f64,
     ) -> Option<PlaneOffset> {
-        let Surface::Plane { normal, .. } = face.surface else {
+        let Surface::Plane { normal, offset } = face.surface else {
             return None;
         };
         let cosine = self.max_angle.to_radians().cos();
@@ -82,16 +82,28 @@ impl SceneFaces {
                 along[place].push(sample.point);
             }
         }
-        let (patch, points) = (alike.into_iter().zip(along)).max_by_key(|(_, p)| p.len())?;
+        let in_plane = |plane: &PlanarPatch| {
+            let within = alike.iter().zip(&along).filter(|((other, _), _)| {
+                let mut corners = other.triangles.iter().flatten();
+                corners.all(|corner| plane.height(corner).abs() <= self.thickness * scale)
+            });
+            within
+                .flat_map(|(_, points)| points)
+                .collect::<Vec<&Vector3<f64>>>()
+        };
+        let planes = alike.iter().map(|(patch, _)| (patch, in_plane(patch)));
+        let (patch, points) = planes.max_by_key(|(_, points)| points.len())?;
         if points.is_empty() || 2 * points.len() < samples.len() {
             return None;
         }
-        let patch = &patch.0;
-        let heights = points.iter().map(|p| patch.normal.dot(&(p - patch.point)));
+        let coordinate = |axis: usize| total(points.iter().map(|p| p[axis])) / points.len() as f64;
+        let middle = Vector3::from([0, 1, 2].map(coordinate));
+        // Corners lie off the plane of the face by their noise.
+        let middle_of_plane = middle - normal * (normal.dot(&middle) - offset);
         Some(PlaneOffset {
             area: face.area,
             normal: patch.normal,
-            offset: (total(heights) / points.len() as f64).abs(),
+            offset: patch.height(&middle_of_plane).abs(),
             angle: (patch.normal.cross(&normal).norm().min(1.0))
                 .asin()
                 .to_degrees(),
