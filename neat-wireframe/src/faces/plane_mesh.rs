@@ -132,9 +132,10 @@ impl PlaneMesh {
                 let ends = [side.from(), side.to()].map(|corner| corner.data().junction);
                 steps.push(self.step(ends));
                 polygon.push(self.frame.coordinates(&side.from().data().point));
-                side = side.next();
-                while within(&side.rev()) {
-                    side = side.rev().next();
+                // Around what is outside, so that no loop comes to a corner twice.
+                side = side.rev().prev().rev();
+                while !within(&side) {
+                    side = side.prev().rev();
                 }
             }
             if !steps.is_empty() {
@@ -143,5 +144,43 @@ impl PlaneMesh {
         }
         loops.sort_by(|a, b| signed_area(&b.1).total_cmp(&signed_area(&a.1)));
         loops
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::curves::MeasuredGraph;
+    use super::super::plane_fit::PlaneFit;
+    use super::*;
+    use neat_core::Wireframe3d;
+
+    #[test]
+    fn a_hole_that_touches_the_rim_is_a_loop_of_its_own() {
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let wireframe = Wireframe3d {
+            junctions: (corners.into_iter().chain([[0.2, 0.6], [0.6, 0.2]]))
+                .map(|[x, y]| Vector3::new(x, y, 0.5))
+                .collect(),
+            edges: vec![[0, 1], [1, 2], [2, 3], [3, 0], [2, 4], [4, 5], [5, 2]],
+        };
+        let curves = Curves::new(&MeasuredGraph {
+            wireframe: &wireframe,
+            arcs: &[],
+            covariances: &[],
+        });
+        let points = curves.all.iter().flat_map(|curve| &curve.measured);
+        let fit = PlaneFit::through(points, curves.extent).unwrap();
+        let mesh = PlaneMesh::new(&curves, &fit.solved().unwrap()).unwrap();
+        let hole = mesh.triangle_at(&Vector3::new(0.6, 0.6, 0.5)).unwrap();
+        let of_hole = mesh.triangles().find(|(triangle, ..)| *triangle == hole);
+        assert!((of_hole.unwrap().1 - 0.24).abs() < 1e-9);
+        let others = mesh.triangles().map(|(triangle, ..)| triangle);
+        let loops = mesh.loops(&others.filter(|triangle| *triangle != hole).collect());
+        let areas: Vec<f64> = loops.iter().map(|(_, p)| signed_area(p)).collect();
+        assert!((areas[0] - 4.0).abs() < 1e-9 && (areas[1] + 0.24).abs() < 1e-9);
+        let counts: Vec<usize> = loops.iter().map(|(steps, _)| steps.len()).collect();
+        assert_eq!(counts, [4, 3]);
+        let is_edge = |step: &Step| matches!(step.curve, CurveIndex::Edge(_));
+        assert!(loops.iter().flat_map(|(steps, _)| steps).all(is_edge));
     }
 }
