@@ -232,3 +232,57 @@ fn fitted(items: &[Item], (normal, offset): (Vector3<f64>, f64), extent: f64) ->
     }
     PlaneFit::through(members.iter(), extent)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::curves::MeasuredGraph;
+    use super::*;
+    use crate::test_scenes::Noise;
+    use neat_core::Wireframe3d;
+
+    /// A corner of two walls, x = 0 and y = 0, with a loose edge and points on them and around.
+    #[test]
+    fn two_walls_are_two_planes_among_what_lies_anywhere() {
+        let junctions = [
+            [0.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [1.0, 0.0, 0.0],
+            [1.0, 0.0, 1.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 1.0, 1.0],
+            [0.3, 0.4, 0.2],
+            [0.8, 0.9, 0.7],
+        ];
+        let wireframe = Wireframe3d {
+            junctions: junctions.map(Vector3::from).to_vec(),
+            edges: vec![[0, 1], [0, 2], [1, 3], [0, 4], [1, 5], [6, 7]],
+        };
+        let curves = Curves::new(&MeasuredGraph {
+            wireframe: &wireframe,
+            arcs: &[],
+            covariances: &[],
+        });
+        let mut noise = Noise(3);
+        let sigma = 1e-3;
+        let covariance = Matrix3::identity() * f64::powi(sigma, 2) + curves.junction_floor();
+        let points: Vec<Measured> = (0..90)
+            .map(|k| {
+                let mut point = noise.vector().map(|x| 0.5 + 0.5 * x);
+                // A third on either wall, with errors of variance σ².
+                if k % 3 < 2 {
+                    point[k % 3] = sigma * noise.vector().sum();
+                }
+                (point, covariance)
+            })
+            .collect();
+        let planes = explained_planes(&curves, &points);
+        let mut found: Vec<(Vector3<f64>, f64)> = (planes.iter())
+            .map(|fit| fit.solved().unwrap().plane())
+            .collect();
+        found.sort_by(|a, b| b.0.x.abs().total_cmp(&a.0.x.abs()));
+        assert_eq!(found.len(), 2, "{found:?}");
+        for (axis, (normal, offset)) in found.into_iter().enumerate() {
+            assert!(normal[axis].abs() > 1.0 - 1e-5 && offset.abs() < sigma);
+        }
+    }
+}
