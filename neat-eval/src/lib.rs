@@ -90,8 +90,8 @@ pub use edge_points::{EdgeSampling, VoxelGrid};
 pub use edit_distance::{EditDistance, EditScores};
 pub use error::EvalError;
 pub use faces::{
-    CadFaceScores, CadFaces, FaceCounts, FaceShare, FaceShares, FoundFace, SceneFaceScores,
-    SceneFaces, TrueFace,
+    CadFaceScores, CadFaces, FaceCounts, FaceShare, FaceShares, FoundFace, PlaneOffset,
+    SceneFaceScores, SceneFaces, TrueFace,
 };
 pub use limap_length::{LengthRecall, LengthScores, LimapLength};
 pub use neat_abc::{GraphScores, NeatAbc, NeatAbcScores};

@@ -52,7 +52,7 @@ fn with_shells(wireframe: &Wireframe3d, covariances: &[Option<Matrix3<f64>>]) ->
         covariances,
     };
     WireframeDocument {
-        shells: find_shells(&graph, &[]),
+        shells: find_shells(&graph, &[], &[]),
         ..WireframeDocument::from(wireframe)
     }
 }

@@ -198,7 +198,7 @@ fn rounded() -> WireframeDocument {
         arcs: &document.arcs,
         covariances: &[],
     };
-    document.shells = find_shells(&graph, &[]);
+    document.shells = find_shells(&graph, &[], &[]);
     document
 }
 

@@ -8,7 +8,7 @@ use neat_wireframe::assemble::{
     AssembleConfig, Assembled, Photographs, Witnesses, assemble_with_progress,
 };
 use neat_wireframe::confidence::{ConfidenceConfig, assess};
-use neat_wireframe::faces::{MeasuredGraph, find_shells};
+use neat_wireframe::faces::{MeasuredGraph, find_shells, surface_points};
 use neat_wireframe::kinds::edge_kinds;
 use neat_wireframe::paper::NeatLine;
 use neat_wireframe::validity::WireframeFlaw;
@@ -140,7 +140,9 @@ impl Draft {
             arcs: &self.arcs,
             covariances: &covariances,
         };
-        let shells = find_shells(&graph, &views);
+        let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
+        let points = surface_points(&cameras, &scene.sparse_points);
+        let shells = find_shells(&graph, &views, &points);
         Ok(Distilled {
             wireframe: self.wireframe,
             arcs: self.arcs,

@@ -97,7 +97,7 @@ fn document(data: &SyntheticData) -> WireframeDocument {
         arcs: &[],
         covariances: &[],
     };
-    let shells = find_shells(&graph, &[]);
+    let shells = find_shells(&graph, &[], &[]);
     let mut wireframe = data.truth.clone();
     for (index, junction) in wireframe.junctions.iter_mut().enumerate() {
         *junction += wave(index as f64) * 0.002;

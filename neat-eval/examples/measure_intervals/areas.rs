@@ -80,7 +80,7 @@ pub fn faces_of_solids(wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Vec<Tru
         arcs,
         covariances: &[],
     };
-    let mut shells = find_shells(&graph, &[]);
+    let mut shells = find_shells(&graph, &[], &[]);
     shells.retain(|shell| shell.closed);
     let document = WireframeDocument {
         arcs: arcs.to_vec(),

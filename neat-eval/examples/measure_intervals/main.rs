@@ -38,7 +38,7 @@ use neat_eval::{NeatAbc, SceneTruth, SurfaceAndCreases, TrueFace, foreign};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::confidence::{ConfidenceConfig, assess, fill_arcs};
 use neat_wireframe::export::WireframeDocument;
-use neat_wireframe::faces::{MeasuredGraph, find_shells};
+use neat_wireframe::faces::{MeasuredGraph, find_shells, surface_points};
 use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
 use radii::Radii;
 use serde::Deserialize;
@@ -195,7 +195,9 @@ fn documented(mut scene: Scene) -> Result<WireframeDocument> {
         arcs: &built.arcs,
         covariances: &covariances,
     };
-    let shells = find_shells(&world, &views);
+    let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
+    let points = surface_points(&cameras, &scene.sparse_points);
+    let shells = find_shells(&world, &views, &points);
     document.shells = shells.iter().map(|shell| shell.map(original)).collect();
     Ok(document)
 }

@@ -2,27 +2,33 @@
 //! that the assembler makes; of rendered photographs in the latter only.
 //!
 //! ```text
-//! cargo run --release -p neat-eval --example measure_solids -- [--out DIR] [--kept DIR] SCENE…
+//! cargo run --release -p neat-eval --example measure_solids -- [--out DIR] [--kept DIR] [--planes] SCENE…
 //! ```
 //!
-//! `--out` keeps documents with their shells, `NAME/true.json` and `NAME/assembled.json`. With `--kept` wireframes and segments are those that `measure_assembler --out`
-//! has left there; a scene that it lacks is measured in the true wireframe only. A true wireframe
-//! gets no views: only its edges speak. Its curves that are no arcs of circles are left out.
-//! Faces are measured by the protocols `cad-faces` and `scene-faces`.
+//! `--out` keeps documents with their shells, `NAME/true.json` and `NAME/assembled.json`. With
+//! `--kept` wireframes and segments are those that `measure_assembler --out` has left there; a
+//! scene that it lacks is measured in the true wireframe only. A true wireframe gets no views: only
+//! its edges speak. Its curves that are no arcs of circles are left out.
+//! Faces are measured by the protocols `cad-faces` and `scene-faces`. `--planes` lists the plane of
+//! each large face of rendered photographs, with how far it is from that of the surface, and
+//! measures faces once more with their corners moved onto their planes.
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
 
+mod planes;
 #[path = "../measure_assembler/prepared.rs"]
 mod prepared;
 mod truth;
 
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{Camera, CircularArc, Scene, Wireframe3d};
-use neat_eval::{CadFaces, FoundFace, SceneFaces, SceneTruth};
+use neat_eval::{CadFaces, FaceShares, FoundFace, SceneFaceScores, SceneFaces, SceneTruth};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::confidence::{ConfidenceConfig, assess, transformed_covariance};
 use neat_wireframe::export::{WireframeDocument, read_json, write_json};
-use neat_wireframe::faces::{MeasuredGraph, Shell, ShellGeometry, find_shells};
+use neat_wireframe::faces::{
+    MeasuredGraph, Shell, ShellGeometry, SurfacePoint, find_shells, surface_points,
+};
 use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
 use std::env;
 use std::error::Error;
@@ -39,23 +45,39 @@ struct Input {
     arcs: Vec<CircularArc>,
     covariances: Vec<Option<Matrix3<f64>>>,
     views: Vec<ViewObservation>,
+    points: Vec<SurfacePoint>,
 }
 
 fn main() -> Result<()> {
-    let (mut scenes, mut out, mut kept) = (Vec::new(), None, None);
+    let (mut scenes, mut out, mut kept, mut planes) = (Vec::new(), None, None, false);
     let mut arguments = env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--out" => out = arguments.next().map(PathBuf::from),
             "--kept" => kept = arguments.next().map(PathBuf::from),
+            "--planes" => planes = true,
             _ => scenes.push(PathBuf::from(argument)),
         }
     }
     for dir in &scenes {
         let name = dir.file_name().unwrap_or_default().to_string_lossy();
+        let folder = out.as_ref().map(|out| out.join(&*name));
+        let keep = |kind: &str, input: &Input, shells: Vec<Shell>| -> Result<()> {
+            if let Some(folder) = &folder {
+                fs::create_dir_all(folder)?;
+                let document = input.document(shells);
+                write_json(&folder.join(format!("{kind}.json")), &document)?;
+            }
+            Ok(())
+        };
         if dir.join("truth").exists() {
             if let Some(input) = reconstructed(dir, &name, kept.as_deref())? {
-                println!("{name}: {}", scene_scores(&input, dir)?);
+                let start = Instant::now();
+                let shells = input.shells();
+                let seconds = start.elapsed().as_secs_f64();
+                let scores = scene_scores(&shells, &input, dir, planes)?;
+                println!("{name}: {seconds:.3} s, {scores}");
+                keep("assembled", &input, shells)?;
             }
             continue;
         }
@@ -65,6 +87,7 @@ fn main() -> Result<()> {
             arcs: truth.arcs.clone(),
             covariances: Vec::new(),
             views: Vec::new(),
+            points: Vec::new(),
         };
         println!(
             "{name}: {} edges, {} arcs, {} other curves, {} faces",
@@ -73,7 +96,6 @@ fn main() -> Result<()> {
             truth.other_curves,
             truth.faces.len()
         );
-        let folder = out.as_ref().map(|out| out.join(&*name));
         let measure = |kind: &str, input: &Input| -> Result<()> {
             let start = Instant::now();
             let shells = input.shells();
@@ -82,12 +104,7 @@ fn main() -> Result<()> {
                 "  {kind:9} {}, {seconds:.3} s",
                 scores(&shells, input, &truth)
             );
-            if let Some(folder) = &folder {
-                fs::create_dir_all(folder)?;
-                let document = input.document(shells);
-                write_json(&folder.join(format!("{kind}.json")), &document)?;
-            }
-            Ok(())
+            keep(kind, input, shells)
         };
         measure("true", &of_truth)?;
         if let Some(input) = reconstructed(dir, &name, kept.as_deref())? {
@@ -137,13 +154,20 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
         },
         ..view
     };
+    let views: Vec<_> = views.into_iter().map(in_original).collect();
+    let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
+    let mut points = scene.sparse_points.clone();
+    for point in &mut points {
+        point.position_in_world = original(&scene, &point.position_in_world);
+    }
     Ok(Some(Input {
         wireframe: wireframe.map(|p| original(&scene, p)),
         arcs,
         covariances: (confidence.junctions.iter())
             .map(|junction| junction.covariance.as_ref().map(covariance))
             .collect(),
-        views: views.into_iter().map(in_original).collect(),
+        points: surface_points(&cameras, &points),
+        views,
     }))
 }
 
@@ -154,7 +178,7 @@ impl Input {
             arcs: &self.arcs,
             covariances: &self.covariances,
         };
-        find_shells(&graph, &self.views)
+        find_shells(&graph, &self.views, &self.points)
     }
 
     fn document(&self, shells: Vec<Shell>) -> WireframeDocument {
@@ -196,32 +220,41 @@ fn scores(shells: &[Shell], input: &Input, truth: &Truth) -> String {
     text
 }
 
-/// The faces of a rendered scene against its surface, as text.
-fn scene_scores(input: &Input, dir: &Path) -> Result<String> {
-    let start = Instant::now();
-    let shells = input.shells();
-    let seconds = start.elapsed().as_secs_f64();
+/// The faces of a rendered scene against its surface, as text; on demand with each plane.
+fn scene_scores(shells: &[Shell], input: &Input, dir: &Path, planes: bool) -> Result<String> {
     let truth = SceneTruth {
         cameras: input.views.iter().map(|view| view.camera).collect(),
         ..SceneTruth::read(dir)?
     };
-    let scores = SceneFaces::default().evaluate(&faces_of(&shells, input), &truth)?;
+    let faces = faces_of(shells, input);
+    let scores = SceneFaces::default().evaluate(&faces, &truth)?;
     let mut text = format!(
-        "{} faces of area {:.2}, {:.2} of planar surface seen, {} closed shells, {seconds:.3} s",
+        "{} faces of area {:.2}, {:.2} of planar surface seen, {} closed shells",
         scores.faces,
         scores.found_area,
         scores.planar_area,
         shells.iter().filter(|shell| shell.closed).count()
     );
-    for shares in &scores.thresholds {
-        text += &format!(
+    text += &shares_text(&scores);
+    if planes {
+        let flat: Vec<FoundFace> = faces.iter().map(planes::flattened).collect();
+        let scores = SceneFaces::default().evaluate(&flat, &truth)?;
+        text += &format!("\n  on their planes{}", shares_text(&scores));
+        text += &planes::table(&faces, &truth)?;
+    }
+    Ok(text)
+}
+
+fn shares_text(scores: &SceneFaceScores) -> String {
+    let of_threshold = |shares: &FaceShares| {
+        format!(
             "; within {:.4}: precision {:.3}, recall {:.3}",
             shares.threshold,
             shares.precision.unwrap_or(0.0),
             shares.recall.unwrap_or(0.0)
-        );
-    }
-    Ok(text)
+        )
+    };
+    scores.thresholds.iter().map(of_threshold).collect()
 }
 
 fn faces_of(shells: &[Shell], input: &Input) -> Vec<FoundFace> {

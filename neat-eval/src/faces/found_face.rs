@@ -87,6 +87,7 @@ mod tests {
                 covariances: &[],
             },
             &[],
+            &[],
         );
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("wireframe.json");

@@ -8,13 +8,29 @@ use std::collections::BTreeMap;
 /// Cosine of the angle by which a triangle may be turned against its patch: 1°.
 const FLAT: f64 = 0.999_848;
 
-/// The triangles of patches of at least `min_area`: connected, and within `thickness` of the plane
-/// of their largest triangle.
-pub(super) fn planar_triangles(
+/// A planar part of a mesh.
+pub(super) struct PlanarPatch {
+    /// A point of its plane …
+    pub point: Vector3<f64>,
+    /// … and the normal of this, of length 1.
+    pub normal: Vector3<f64>,
+    pub triangles: Vec<Triangle>,
+}
+
+impl PlanarPatch {
+    /// Of a point over the plane.
+    pub fn height(&self, point: &Vector3<f64>) -> f64 {
+        self.normal.dot(&(point - self.point))
+    }
+}
+
+/// Patches of at least `min_area`: connected triangles within `thickness` of the plane of the
+/// largest of them.
+pub(super) fn planar_patches(
     triangles: &[Triangle],
     min_area: f64,
     thickness: f64,
-) -> Vec<Triangle> {
+) -> Vec<PlanarPatch> {
     let neighbours = neighbours(triangles);
     let mut order: Vec<usize> = (0..triangles.len()).collect();
     order.sort_by(|a, b| {
@@ -22,7 +38,7 @@ pub(super) fn planar_triangles(
         areas[1].total_cmp(&areas[0]).then(a.cmp(b))
     });
     let mut taken = vec![false; triangles.len()];
-    let mut planar = Vec::new();
+    let mut patches = Vec::new();
     for seed in order {
         let Some(up) = normal(&triangles[seed]).filter(|_| !taken[seed]) else {
             continue;
@@ -44,12 +60,18 @@ pub(super) fn planar_triangles(
             }
             next += 1;
         }
-        let patch = patch.into_iter().map(|triangle| triangles[triangle]);
-        if total(patch.clone().map(|triangle| area(&triangle))) >= min_area {
-            planar.extend(patch);
+        let patch: Vec<Triangle> = (patch.into_iter())
+            .map(|triangle| triangles[triangle])
+            .collect();
+        if total(patch.iter().map(area)) >= min_area {
+            patches.push(PlanarPatch {
+                point: triangles[seed][0],
+                normal: up,
+                triangles: patch,
+            });
         }
     }
-    planar
+    patches
 }
 
 /// For each triangle those that share a side with it. Corners in the same place are one: programs
@@ -83,8 +105,10 @@ mod tests {
     #[test]
     fn patches_end_where_the_surface_turns_and_small_ones_do_not_count() {
         let cube = cube().corners();
-        assert_eq!(planar_triangles(&cube, 0.99, 0.001).len(), 12);
-        assert!(planar_triangles(&cube, 1.01, 0.001).is_empty());
+        let patches = planar_patches(&cube, 0.99, 0.001);
+        assert_eq!(patches.len(), 6);
+        assert!(patches.iter().all(|patch| patch.triangles.len() == 2));
+        assert!(planar_patches(&cube, 1.01, 0.001).is_empty());
         // Turned by 6° at a time, a wall is not flat, whoever calls its pieces neighbours.
         let corner = |k: usize, z: f64| {
             let (sine, cosine) = (k as f64 * 6.0_f64.to_radians()).sin_cos();
@@ -99,7 +123,7 @@ mod tests {
                 .flat_map(|k| [[k, k + 1, k + 2], [k + 2, k + 1, k + 3]])
                 .collect(),
         };
-        assert!(planar_triangles(&bent.corners(), 0.2, 0.001).is_empty());
-        assert_eq!(planar_triangles(&bent.corners(), 0.1, 0.001).len(), 30);
+        assert!(planar_patches(&bent.corners(), 0.2, 0.001).is_empty());
+        assert_eq!(planar_patches(&bent.corners(), 0.1, 0.001).len(), 15);
     }
 }

@@ -8,7 +8,7 @@
 
 use super::area_samples::{AreaSample, area_samples};
 use super::found_face::{FoundFace, triangles_of};
-use super::planar_patches::planar_triangles;
+use super::planar_patches::{PlanarPatch, planar_patches};
 use crate::error::EvalError;
 use crate::surface_and_creases::SceneTruth;
 use crate::table::Table;
@@ -94,11 +94,8 @@ impl SceneFaces {
         let scale = truth.scale;
         let mesh = truth.surface.corners();
         let surface = Surface::of_triangles(mesh.clone());
-        let planar = planar_triangles(
-            &mesh,
-            self.min_patch * scale.powi(2),
-            self.thickness * scale,
-        );
+        let patches = self.patches(&mesh, scale).into_iter();
+        let planar: Vec<Triangle> = patches.flat_map(|patch| patch.triangles).collect();
         let thresholds: Vec<f64> = self.thresholds.iter().map(|t| t * scale).collect();
         let margin = thresholds.iter().copied().fold(f64::INFINITY, f64::min);
         let is_seen = |point: &Vector3<f64>| {
@@ -128,6 +125,12 @@ impl SceneFaces {
         })
     }
 
+    /// The planar parts of the mesh that count.
+    pub(super) fn patches(&self, mesh: &[Triangle], scale: f64) -> Vec<PlanarPatch> {
+        let min_area = self.min_patch * scale.powi(2);
+        planar_patches(mesh, min_area, self.thickness * scale)
+    }
+
     /// Of points on `triangles` that count: how far the nearest triangle of like direction is.
     fn distances(
         &self,
@@ -147,7 +150,7 @@ impl SceneFaces {
         counted.map(distance).collect()
     }
 
-    fn check(&self, found: &[Triangle], truth: &SceneTruth) -> Result<(), EvalError> {
+    pub(super) fn check(&self, found: &[Triangle], truth: &SceneTruth) -> Result<(), EvalError> {
         if truth.surface.triangles.is_empty() {
             return Err(EvalError::EmptyTruth {
                 protocol: "scene-faces",

@@ -295,7 +295,7 @@ fn cube_with_faces(sigma: f64) -> (WireframeDocument, Vec<Matrix3<f64>>) {
         arcs: &[],
         covariances: &[],
     };
-    document.shells = find_shells(&graph, &[]);
+    document.shells = find_shells(&graph, &[], &[]);
     (document, roots)
 }
 

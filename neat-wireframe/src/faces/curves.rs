@@ -128,6 +128,11 @@ impl Curves {
         found.ok().map(|found| &self.all[found])
     }
 
+    /// What is added to the covariances of junctions.
+    pub fn junction_floor(&self) -> Matrix3<f64> {
+        Matrix3::identity() * (JUNCTION_NOISE * self.extent).powi(2)
+    }
+
     /// Covariance of a point of an arc.
     pub fn arc_covariance(&self) -> Matrix3<f64> {
         Matrix3::identity() * self.arc_sigma().powi(2)

@@ -9,6 +9,10 @@
 //! together is a shell; it bounds a solid if each of its curves has a face on both sides
 //! (`shells.rs`).
 //!
+//! Where there are points of surfaces, planes are found that explain edges and points together
+//! (`explained_planes.rs`), and the parts of them that points say are surface (`sheets.rs`), also
+//! where edges are missing. Solids stay as they are.
+//!
 //! ```
 //! use neat_core::Wireframe3d;
 //! use neat_wireframe::faces::{MeasuredGraph, ShellGeometry, find_shells};
@@ -23,7 +27,7 @@
 //!         .collect(),
 //! };
 //! let graph = MeasuredGraph { wireframe: &cube, arcs: &[], covariances: &[] };
-//! let shells = find_shells(&graph, &[]);
+//! let shells = find_shells(&graph, &[], &[]);
 //! assert!(shells[0].closed && shells[0].faces.len() == 6);
 //! let geometry = ShellGeometry::new(&shells[0], &cube, &[]);
 //! assert!((geometry.volume(&shells[0]) - 1.0).abs() < 1e-9);
@@ -34,19 +38,27 @@ mod candidates;
 mod cells;
 mod chain;
 mod curves;
+mod explained_planes;
 mod face;
 mod geometry;
 mod groups;
+mod min_cut;
 mod plane_fit;
+mod plane_mesh;
 mod planes;
+mod point_evidence;
 mod polygon;
 mod region;
 mod selection;
+mod sheets;
 mod shells;
+mod surface_points;
 mod tangency;
 mod triangulation;
 mod visibility;
 
+#[cfg(test)]
+mod sheet_tests;
 #[cfg(test)]
 mod tests;
 
@@ -56,6 +68,7 @@ pub use face::{CurveIndex, Face, Shell, Step, Surface};
 pub(crate) use triangulation::triangles;
 
 pub use geometry::{ShellCurve, ShellGeometry};
+pub use surface_points::{SurfacePoint, surface_points};
 
 use crate::ViewObservation;
 use curves::Curves;
@@ -68,9 +81,16 @@ use visibility::Sightings;
 /// - `graph`: valid, see [`check_wireframe`](crate::validity::check_wireframe), with edges cut
 ///   where others meet them.
 /// - `views`: cameras and 2D segments, in the same frame. Without any, only the wireframe speaks.
+/// - `points`: in the same frame; see [`surface_points`]. Where there are some, sheets are sought
+///   on the planes of the scene, and open faces that are hidden or seen through are left out. They
+///   say nothing without views, as nobody knows then what is hidden.
 ///
 /// The result does not depend on the number of threads.
-pub fn find_shells(graph: &MeasuredGraph, views: &[ViewObservation]) -> Vec<Shell> {
+pub fn find_shells(
+    graph: &MeasuredGraph,
+    views: &[ViewObservation],
+    points: &[SurfacePoint],
+) -> Vec<Shell> {
     let observed = Curves::new(graph);
     let smooth = tangency::smooth_lines(&observed);
     let curves = observed.with_inferred(smooth);
@@ -87,5 +107,28 @@ pub fn find_shells(graph: &MeasuredGraph, views: &[ViewObservation]) -> Vec<Shel
         .collect();
     let chosen = selection::select(&curves, &faces, &against);
     let chosen = chosen.into_iter().map(|face| faces[face].clone()).collect();
-    shells::shells(graph, &curves, chosen, views)
+    let shells = shells::shells(graph, &curves, chosen, views);
+    if points.is_empty() || views.is_empty() {
+        return shells;
+    }
+    let (mut shells, open): (Vec<Shell>, Vec<Shell>) =
+        shells.into_iter().partition(|shell| shell.closed);
+    let region = |face: &Face| Region::new(&curves, face);
+    let solid: Vec<Region> = (shells.iter())
+        .flat_map(|shell| shell.faces.iter().filter_map(region))
+        .collect();
+    let mut open: Vec<_> = (open.into_iter().flat_map(|shell| shell.faces))
+        .filter_map(|face| Some((face.clone(), region(&face)?)))
+        .collect();
+    let witnesses = point_evidence::witnesses(points, curves.junction_floor());
+    let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
+    let mut faces = sheets::sheets(&curves, &solid, &mut open, &cameras, &witnesses);
+    faces.extend(open.into_iter().map(|(face, _)| face));
+    // Inferred lines may close them, but what is inside nobody has asked.
+    let sheets = shells::shells(graph, &curves, faces, views).into_iter();
+    shells.extend(sheets.map(|shell| Shell {
+        closed: false,
+        ..shell
+    }));
+    shells
 }

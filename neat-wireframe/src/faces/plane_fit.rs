@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 
 /// Square of the distance in standard deviations up to which a point belongs to a plane: exceeded
 /// by one point of a thousand (chi-square of one degree of freedom).
-const CHI_SQUARE: f64 = 10.83;
+pub(super) const CHI_SQUARE: f64 = 10.83;
 
 /// Weighted least squares for the height of a plane over a reference plane near it.
 #[derive(Clone, Debug)]
@@ -97,9 +97,19 @@ impl FittedPlane<'_> {
 
     /// Whether a point may lie in the plane.
     pub fn holds(&self, point: &Vector3<f64>, covariance: &Matrix3<f64>) -> bool {
-        let over = (point - self.fit.origin).dot(&self.fit.axes[2]);
-        let off = over - self.fit.row(point).dot(&self.height);
+        let off = self.height_of(point);
         off * off <= CHI_SQUARE * (self.variance(point) + self.fit.variance(covariance))
+    }
+
+    /// Distance of a point from the plane, by that up to which it may lie in it.
+    pub fn relative_distance(&self, point: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
+        let variance = self.variance(point) + self.fit.variance(covariance);
+        self.height_of(point).abs() / (CHI_SQUARE * variance).sqrt()
+    }
+
+    fn height_of(&self, point: &Vector3<f64>) -> f64 {
+        let over = (point - self.fit.origin).dot(&self.fit.axes[2]);
+        over - self.fit.row(point).dot(&self.height)
     }
 
     /// Normal and offset of the plane.
@@ -134,6 +144,10 @@ impl PlaneFrame {
             offset,
             axes,
         }
+    }
+
+    pub fn point(&self, coordinates: &Vector2<f64>) -> Vector3<f64> {
+        self.axes[0] * coordinates.x + self.axes[1] * coordinates.y + self.normal * self.offset
     }
 
     pub fn coordinates(&self, point: &Vector3<f64>) -> Vector2<f64> {

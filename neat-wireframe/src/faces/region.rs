@@ -8,6 +8,9 @@ use super::polygon::contains;
 use nalgebra::{Vector2, Vector3};
 use neat_core::CircularArc;
 
+/// A face is asked about on a grid of so many points to each side of the box around it.
+const GRID: usize = 8;
+
 /// A face with its extent.
 pub(super) enum Region {
     Plane {
@@ -87,6 +90,29 @@ impl Region {
                 })
             }
         }
+    }
+
+    /// Whether a straight line from one point to another passes through the face.
+    pub fn is_between(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
+        let hits = self.hits(from, &(to - from));
+        hits.iter().flatten().any(|t| (0.0..1.0).contains(t))
+    }
+
+    /// Points all over a plane face; none of a cylinder.
+    pub fn points(&self) -> Vec<Vector3<f64>> {
+        let Self::Plane { frame, polygons } = self else {
+            return Vec::new();
+        };
+        let corners = || polygons.iter().flatten();
+        let low = corners().fold(Vector2::repeat(f64::MAX), |low, corner| low.inf(corner));
+        let high = corners().fold(Vector2::repeat(f64::MIN), |high, corner| high.sup(corner));
+        let at = |k: usize| {
+            let share = [k % GRID, k / GRID].map(|k| (k as f64 + 0.5) / GRID as f64);
+            low + (high - low).component_mul(&Vector2::from(share))
+        };
+        let inside = |p: &Vector2<f64>| polygons.iter().filter(|q| contains(q, p)).count() % 2 == 1;
+        let points = (0..GRID * GRID).map(at).filter(inside);
+        points.map(|point| frame.point(&point)).collect()
     }
 
     /// Distance of a point from the surface of which the face is a part.

@@ -15,13 +15,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Edges of a solid have two faces: that one lacks one is as likely as that a line of the
 /// wireframe is paint, 1 in 20.
-const MISSING_FACE: f64 = 3.0;
+pub(super) const MISSING_FACE: f64 = 3.0;
 /// More than a face can win by one curve: a circle on a face is a hole before it is a lid.
 const FLAT: f64 = 2.0 * MISSING_FACE;
 /// Faces against which images speak more than this are out whatever they would close.
-const MOST_AGAINST: f64 = 3.0;
+pub(super) const MOST_AGAINST: f64 = 3.0;
 /// Cosine of the angle of two faces that go on as one plane, or lie on each other: 3°.
-const SAME_PLANE: f64 = 0.9986;
+pub(super) const SAME_PLANE: f64 = 0.9986;
 /// States that are looked at for one set of faces that exclude each other. What was best by then
 /// is taken.
 const MOST_STATES: usize = 20_000;

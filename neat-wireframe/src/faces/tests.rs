@@ -55,7 +55,7 @@ impl Model {
             arcs: &self.arcs,
             covariances: &[],
         };
-        find_shells(&graph, &[])
+        find_shells(&graph, &[], &[])
     }
 
     /// Number of faces and volume of the one shell, which is closed.

@@ -115,9 +115,8 @@ impl Sightings {
     }
 
     fn is_behind(&self, region: &Region, center: &Vector3<f64>, sample: &Sample) -> bool {
-        let hits = region.hits(center, &(sample.point - center));
-        let in_front = hits.iter().flatten().any(|t| (0.0..1.0).contains(t));
-        in_front && region.distance_to_surface(&sample.point) > self.behind
+        region.is_between(center, &sample.point)
+            && region.distance_to_surface(&sample.point) > self.behind
     }
 }
 
@@ -142,7 +141,7 @@ impl Bounds {
 }
 
 /// Of `seen` out of `asked`, with the face by without it.
-fn log_likelihood_ratio(seen: usize, asked: usize) -> f64 {
+pub(super) fn log_likelihood_ratio(seen: usize, asked: usize) -> f64 {
     let hidden = asked - seen;
     let with = seen as f64 * BY_CHANCE.ln() + hidden as f64 * (1.0 - BY_CHANCE).ln();
     // B(k + 1, n − k + 1) is 1 / ((n + 1) times the binomial coefficient).
