@@ -131,14 +131,13 @@ impl Images<'_> {
         outwards.par_iter().find_map_first(|outward| {
             let tube = Tube::touching(line, across, *outward);
             let cylinder = self.fit_tube(&tube, false, pixel)?;
-            // Beside a cone some cylinder is a little better than a line.
-            let found = seen(&cylinder)?;
-            if explains(&cylinder, &found) {
+            if seen(&cylinder).is_some_and(|found| explains(&cylinder, &found)) {
                 return Some(cylinder);
             }
             let cone = self.fit_tube(&cylinder, true, pixel)?;
-            let found = seen(&cone)?;
-            explains(&cone, &found).then_some(cone)
+            seen(&cone)
+                .is_some_and(|found| explains(&cone, &found))
+                .then_some(cone)
         })
     }
 
