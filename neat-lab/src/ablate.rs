@@ -14,7 +14,7 @@ use neat_pipeline::config::{Choice, Config, FieldUse, apply_overrides};
 use neat_pipeline::distill::distill;
 use neat_pipeline::error::PipelineError;
 use neat_pipeline::event::{Event, OnEvent, Stage, Warning, WarningKind};
-use neat_pipeline::reconstruct::{OpenedRun, RunOptions, open_run, reconstruct};
+use neat_pipeline::reconstruct::{OpenedRun, RunOptions, backend_for, open_run, reconstruct};
 use neat_pipeline::render::{every_nth_pixel, render_view};
 use neat_pipeline::resources::Resources;
 use neat_pipeline::run_dir::Existing;
@@ -64,11 +64,9 @@ pub fn ablate(
     cancelled: &AtomicBool,
     on_event: OnEvent<'_>,
 ) -> Result<Vec<Row>, LabError> {
+    let mut options = options.clone();
     // Once: looking for GPUs takes a while.
-    let mut options = RunOptions {
-        backend: options.backend.resolve(),
-        ..options.clone()
-    };
+    options.backend = backend_for(options.backend, &options.config);
     // What training brings is asked too.
     if options.config.distill.field == Choice::Auto {
         options.config.distill.field = Choice::Given(FieldUse::Trained);

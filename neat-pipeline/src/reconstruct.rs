@@ -8,6 +8,7 @@ mod results;
 mod session;
 mod training;
 
+pub use backend_choice::backend_for;
 pub use opened::{OpenedRun, open_run, software_warning};
 
 use crate::config::{Choice, Config, FieldUse};

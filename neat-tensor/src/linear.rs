@@ -140,8 +140,13 @@ impl Linear {
 
     /// `[N, in]` → `[N, out]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
-        x.matmul(self.effective_weight().transpose()) + self.bias.val().unsqueeze()
+        affine(x, self.effective_weight(), self.bias.val())
     }
+}
+
+/// `x Wᵀ + b` with `W` `[out, in]`.
+pub(crate) fn affine(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<1>) -> Tensor<2> {
+    x.matmul(weight.transpose()) + bias.unsqueeze()
 }
 
 /// Inputs and outputs of each layer.

@@ -4,7 +4,7 @@
 use crate::encoding::PositionalEncoding;
 use crate::grid_encoding::GridEncoding;
 use crate::kernels::cpu::KnownRows;
-use crate::linear::Linear;
+use crate::linear::{Linear, affine};
 use crate::sampling::{DrawNumbers, GridNumbers, RefineNumbers};
 use crate::softplus;
 use burn::tensor::Tensor;
@@ -37,7 +37,7 @@ pub trait NeatBackend: Debug + Send + Sync {
 
     /// `x Wᵀ + b` of `x` `[N, in]` and `W` `[out, in]`.
     fn affine(&self, x: Tensor<2>, weight: Tensor<2>, bias: Tensor<1>) -> Tensor<2> {
-        self.linear(x, weight.transpose()) + bias.unsqueeze()
+        affine(x, weight, bias)
     }
 
     /// `x M` of `x` `[N, k]` and `M` `[k, m]`.

@@ -8,6 +8,7 @@ pub mod comparison;
 pub mod finite_differences;
 #[path = "../data/golden/reader.rs"]
 pub mod golden;
+pub mod grids;
 pub mod named_gradients;
 pub mod published_names;
 pub mod tensors;

@@ -17,8 +17,8 @@ pub(super) fn is_too_little_for_a_gpu(config: &Config) -> bool {
     StepFlops::count(&config.model, &rows).total() < LEAST_FOR_A_GPU
 }
 
-/// The backend for a training by `config`, and for its field.
-pub(super) fn backend_for(asked: Backend, config: &Config) -> Backend {
+/// The backend for a training by `config`, and for its field: never [`Backend::Auto`].
+pub fn backend_for(asked: Backend, config: &Config) -> Backend {
     if asked == Backend::Auto && is_too_little_for_a_gpu(config) {
         asked.resolve_on_host()
     } else {

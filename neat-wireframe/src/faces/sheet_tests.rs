@@ -50,12 +50,20 @@ fn open_wall() -> Wireframe3d {
 }
 
 fn shells_of(wireframe: &Wireframe3d, points: &[SurfacePoint]) -> Vec<Shell> {
+    shells_in(wireframe, &views(), points)
+}
+
+fn shells_in(
+    wireframe: &Wireframe3d,
+    views: &[ViewObservation],
+    points: &[SurfacePoint],
+) -> Vec<Shell> {
     let graph = MeasuredGraph {
         wireframe,
         arcs: &[],
         covariances: &[],
     };
-    find_shells(&graph, &views(), points)
+    find_shells(&graph, views, points)
 }
 
 #[test]
@@ -95,18 +103,9 @@ fn points_close_a_wall_that_lacks_an_edge_around_what_they_see_through() {
     // What no edge bounds is inferred.
     assert!(steps().any(|step| step.curve == CurveIndex::Smooth([2, 3])));
     // The window alone is a loop of edges, but points are seen through it.
-    let window = shells_of(&wall, &[]);
-    assert_eq!(window.len(), 1);
+    assert_eq!(shells_of(&wall, &[]).len(), 1);
     // Nobody knows what is hidden where there are no views.
-    let graph = MeasuredGraph {
-        wireframe: &wall,
-        arcs: &[],
-        covariances: &[],
-    };
-    assert_eq!(
-        find_shells(&graph, &[], &points),
-        find_shells(&graph, &[], &[])
-    );
+    assert_eq!(shells_in(&wall, &[], &points), shells_in(&wall, &[], &[]));
 }
 
 #[test]

@@ -7,9 +7,10 @@ use burn::tensor::{DType, Device, Tensor, TensorData};
 use neat_tensor::adam::{Adam, AdamConfig};
 use neat_tensor::random::{Purpose, standard_normal, stream};
 use neat_tensor::softplus::{softplus, times_softplus_slope};
-use neat_tensor::{GridConfig, GridEncoding, Kernels, NeatBackend, Plain, PositionalEncoding};
+use neat_tensor::{GridEncoding, Kernels, NeatBackend, Plain, PositionalEncoding};
 use neat_tests::backends::{flex, on_each_gpu_backend};
 use neat_tests::comparison::assert_relatively_close;
+use neat_tests::grids::small_grids;
 use neat_tests::tensors::numbers;
 
 /// Rows of the tensors: no multiple of any group of units.
@@ -168,16 +169,7 @@ fn products_of_many_rows() {
 fn learned_grids_and_their_pull_back() {
     let kernels = Kernels::default();
     for features in [1, 2, 4, 8] {
-        let config = GridConfig {
-            levels: 3,
-            features,
-            log2_entries: 8,
-            coarsest: 2,
-            finest: 11,
-        };
-        let shape = config.shape(1.5);
-        let hashed = shape.levels.iter().filter(|level| level.mask.is_some());
-        assert_eq!(hashed.count(), 1, "{shape:?}");
+        let shape = small_grids(features);
         let grid = |table: Tensor<2>| GridEncoding {
             table: Param::from_tensor(table),
             shape: shape.clone(),

@@ -2,30 +2,21 @@
 
 use burn::module::Param;
 use burn::tensor::{Tensor, TensorData};
-use neat_tensor::{GridConfig, GridEncoding};
+use neat_tensor::GridEncoding;
 use neat_tests::backends::flex;
 use neat_tests::comparison::assert_relatively_close;
 use neat_tests::finite_differences::{
     STEP, assert_differentiates, central_differences, constant, normal,
 };
+use neat_tests::grids::small_grids;
 use neat_tests::tensors::{float64, numbers};
 
 const POINTS: usize = 7;
 
-/// Grids whose entries are of the size of their sums, two dense and one hashed. Some
-/// normally distributed points lie outside of their cube.
+/// Grids whose entries are of the size of their sums.
 pub fn random_grid(features: usize) -> GridEncoding {
-    let config = GridConfig {
-        levels: 3,
-        features,
-        log2_entries: 8,
-        coarsest: 2,
-        finest: 11,
-    };
-    let shape = config.shape(1.5);
+    let shape = small_grids(features);
     let size = [shape.entries(), features];
-    let hashed = shape.levels.iter().filter(|level| level.mask.is_some());
-    assert_eq!(hashed.count(), 1, "{shape:?}");
     let values: Vec<f32> = normal(size[0] * features, 31)
         .into_iter()
         .map(|x| x as f32)

@@ -34,7 +34,7 @@ fn reshaped(tensor: CubeTensor, shape: impl Into<Shape>) -> CubeTensor {
 }
 
 /// The sum over rows of `sum`, a function of matrices of as many rows, by parts: `stacked` does
-/// the same for `[parts, PART, columns]` each and gives one matrix `[1, …]` per part.
+/// the same for `[parts, PART, columns]` each and gives one matrix per part.
 fn sum_over_rows<const K: usize>(
     of: [CubeTensor; K],
     sum: impl Fn([CubeTensor; K]) -> CubeTensor,
@@ -65,18 +65,6 @@ fn sum_over_rows<const K: usize>(
     CubeBackend::float_add(total, rest)
 }
 
-/// `aᵀ b` of `a` `[N, k]` and `b` `[N, m]`.
-fn gram(a: CubeTensor, b: CubeTensor) -> CubeTensor {
-    let of = |[a, b]: [CubeTensor; 2]| product(transposed(a), b);
-    sum_over_rows([a, b], of, of)
-}
-
-/// The sum of the rows of `a` `[N, k]`, `[1, k]`.
-fn sum_of_rows(a: CubeTensor) -> CubeTensor {
-    let along = |dim: usize| move |[a]: [CubeTensor; 1]| CubeBackend::float_sum_dim(a, dim);
-    sum_over_rows([a], along(0), along(1))
-}
-
 /// `x w + b` of `x` `[N, k]`, `w` `[k, m]` and `b` `[1, m]`.
 pub(super) fn affine([x, w, b]: [CubeTensor; 3]) -> CubeTensor {
     CubeBackend::float_add(product(x, w), b)
@@ -92,12 +80,14 @@ pub(super) fn to_rows(a: CubeTensor, w: CubeTensor) -> CubeTensor {
     product(a, transposed(w))
 }
 
-/// The adjoint of `w` from that of `x w`.
+/// The adjoint of `w` from that of `x w`: `xᵀ a`.
 pub(super) fn to_matrix(a: CubeTensor, x: CubeTensor) -> CubeTensor {
-    gram(x, a)
+    let of = |[x, a]: [CubeTensor; 2]| product(transposed(x), a);
+    sum_over_rows([x, a], of, of)
 }
 
-/// The adjoint of the bias.
+/// The adjoint `[1, m]` of the bias: the sum of the rows of `a`.
 pub(super) fn to_bias(a: CubeTensor) -> CubeTensor {
-    sum_of_rows(a)
+    let along = |dim: usize| move |[a]: [CubeTensor; 1]| CubeBackend::float_sum_dim(a, dim);
+    sum_over_rows([a], along(0), along(1))
 }
