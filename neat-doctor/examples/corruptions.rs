@@ -54,7 +54,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("\n| right scene | what the doctor says |\n|---|---|");
     let (rights, mut refused) = (Right::all(), 0);
     for right in &rights {
-        let examination = right.examined(Depth::Full);
+        let [examination] = right.examined([Depth::Full]);
         refused += usize::from(examination.verdict == Verdict::NotReady);
         let judged = match right.judged(&examination) {
             Ok(()) if right.shows_little => "accepted, cannot tell of its poses",

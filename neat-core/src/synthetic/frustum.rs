@@ -120,14 +120,22 @@ impl Frustum {
     /// Lower and upper corner of the rectangle around the solid's image, in
     /// image coordinates. `None` unless all of it is in front of the camera.
     pub fn bounds_in_image(&self, camera: &Camera) -> Option<[Vector2<f64>; 2]> {
-        let empty = [f64::INFINITY, f64::NEG_INFINITY].map(|bound| Vector2::new(bound, bound));
-        self.wireframe
-            .junctions
-            .iter()
-            .map(|junction| camera.project(junction))
-            .try_fold(empty, |[lower, upper], projection| {
-                (projection.depth > 0.0)
-                    .then(|| [lower.inf(&projection.pixel), upper.sup(&projection.pixel)])
-            })
+        bounds_in_image(&self.wireframe.junctions, camera)
     }
+}
+
+/// Lower and upper corner of the rectangle around the images of points, in image
+/// coordinates. `None` unless all of them are in front of the camera.
+pub(super) fn bounds_in_image(
+    points: &[Vector3<f64>],
+    camera: &Camera,
+) -> Option<[Vector2<f64>; 2]> {
+    let empty = [f64::INFINITY, f64::NEG_INFINITY].map(|bound| Vector2::new(bound, bound));
+    (points.iter().map(|point| camera.project(point))).try_fold(
+        empty,
+        |[lower, upper], projection| {
+            (projection.depth > 0.0)
+                .then(|| [lower.inf(&projection.pixel), upper.sup(&projection.pixel)])
+        },
+    )
 }

@@ -1,10 +1,12 @@
 //! Ray-traced images of solids.
 
+use super::frustum::bounds_in_image;
 use super::{Frustum, PlanarFace};
 use crate::Camera;
 use image::RgbImage;
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Light that reaches every face. With it the darkest face keeps more than a
 /// quarter of full brightness, far from the black background.
@@ -24,28 +26,24 @@ pub fn render(solid: &Frustum, camera: &Camera, shading: bool) -> RgbImage {
     let mut image = RgbImage::new(camera.width, camera.height);
     let colors = face_colors(solid, shading);
     // The back of a face is never seen: the solid itself stands before it.
-    let front_faces: Vec<(&PlanarFace, Vector3<f64>)> = solid
-        .faces()
-        .iter()
-        .zip(colors)
+    let front_faces: Vec<SeenFace> = (solid.faces().iter().zip(colors))
         .filter(|(face, _)| face.plane_distance(&camera.center_in_world) > 0.0)
+        .map(|(face, color)| SeenFace::new(face, color, camera))
         .collect();
-    let [lower, upper] = solid
-        .bounds_in_image(camera)
-        .unwrap_or([Vector2::zeros(), Vector2::from_element(f64::INFINITY)]);
-    // Float-to-integer casts saturate, so bounds beyond the image clip to it.
-    let columns = lower.x as usize..(upper.x.ceil() as usize).min(camera.width as usize);
-    let rows = lower.y as usize..upper.y.ceil() as usize;
     image
         .par_chunks_exact_mut(3 * camera.width.max(1) as usize)
         .enumerate()
-        .filter(|(row, _)| rows.contains(row))
         .for_each(|(row, pixels)| {
-            for column in columns.clone() {
+            let of_row: Vec<&SeenFace> = (front_faces.iter())
+                .filter(|seen| seen.rows.contains(&row))
+                .collect();
+            let first = of_row.iter().map(|seen| seen.columns.start).min();
+            let last = of_row.iter().map(|seen| seen.columns.end).max();
+            for column in first.unwrap_or(0)..last.unwrap_or(0) {
                 let sum: Vector3<f64> = SAMPLES
                     .iter()
                     .map(|[x, y]| Vector2::new(column as f64 + x, row as f64 + y))
-                    .map(|sample| trace(&front_faces, camera, &sample))
+                    .map(|sample| trace(&of_row, column, camera, &sample))
                     .sum();
                 let color = sum * (255.0 / SAMPLES.len() as f64);
                 for channel in 0..3 {
@@ -56,16 +54,42 @@ pub fn render(solid: &Frustum, camera: &Camera, shading: bool) -> RgbImage {
     image
 }
 
-/// Colour of the nearest face behind a point of the image; black if none.
+/// A face, its colour, and the pixels that may show it.
+struct SeenFace<'f> {
+    face: &'f PlanarFace,
+    color: Vector3<f64>,
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
+impl<'f> SeenFace<'f> {
+    fn new(face: &'f PlanarFace, color: Vector3<f64>, camera: &Camera) -> Self {
+        let everywhere = [Vector2::zeros(), Vector2::from_element(f64::INFINITY)];
+        let [lower, upper] = bounds_in_image(&face.outline, camera).unwrap_or(everywhere);
+        // Float-to-integer casts saturate, so bounds beyond the image clip to it.
+        let within = |axis: usize, size: u32| {
+            lower[axis] as usize..(upper[axis].ceil() as usize).min(size as usize)
+        };
+        Self {
+            face,
+            color,
+            columns: within(0, camera.width),
+            rows: within(1, camera.height),
+        }
+    }
+}
+
+/// Colour of the nearest face behind a point of a pixel in a column; black if none.
 fn trace(
-    front_faces: &[(&PlanarFace, Vector3<f64>)],
+    faces: &[&SeenFace],
+    column: usize,
     camera: &Camera,
     point_in_image: &Vector2<f64>,
 ) -> Vector3<f64> {
     let ray = camera.ray_through(point_in_image);
-    front_faces
-        .iter()
-        .filter_map(|(face, color)| Some((face.intersect(&ray)?, *color)))
+    (faces.iter())
+        .filter(|seen| seen.columns.contains(&column))
+        .filter_map(|seen| Some((seen.face.intersect(&ray)?, seen.color)))
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map_or(Vector3::zeros(), |(_, color)| color)
 }
@@ -111,4 +135,39 @@ fn albedo(face: usize, face_count: usize) -> Vector3<f64> {
         let k = (channel + hue) % 6.0;
         value - value * saturation * k.min(4.0 - k).clamp(0.0, 1.0)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Ray;
+    use crate::synthetic::{Solid, viewpoints};
+
+    #[test]
+    fn faces_are_seen_wherever_rays_meet_them() {
+        // From afar, and from so near that corners lie behind the camera.
+        for (solid, distance) in [(Solid::LPrism, 2.5), (Solid::StairPrism, 0.8)] {
+            let solid = solid.frustum();
+            let colors = face_colors(&solid, true);
+            let seen_along = |ray: &Ray| {
+                (solid.faces().iter().zip(&colors))
+                    .filter_map(|(face, color)| Some((face.intersect(ray)?, *color)))
+                    .min_by(|a, b| a.0.total_cmp(&b.0))
+                    .map_or(Vector3::zeros(), |(_, color)| color)
+            };
+            for camera in viewpoints(6, distance, (40, 32), 0) {
+                assert!(!solid.contains(&camera.center_in_world));
+                for (column, row, pixel) in render(&solid, &camera, true).enumerate_pixels() {
+                    let corner = Vector2::new(f64::from(column), f64::from(row));
+                    let sum: Vector3<f64> = (SAMPLES.iter())
+                        .map(|sample| {
+                            seen_along(&camera.ray_through(&(corner + Vector2::from(*sample))))
+                        })
+                        .sum();
+                    let expected = (sum * (255.0 / 4.0)).map(|value| value.round() as u8);
+                    assert_eq!(pixel.0, <[u8; 3]>::from(expected), "{column} {row}");
+                }
+            }
+        }
+    }
 }

@@ -65,8 +65,8 @@ impl Right {
         self
     }
 
-    /// What is said of it.
-    pub fn examined(&self, depth: Depth) -> Examination {
+    /// What is said of it at each depth.
+    pub fn examined<const N: usize>(&self, depths: [Depth; N]) -> [Examination; N] {
         let mut data = generate(&self.scene).unwrap();
         let views = std::mem::take(&mut data.scene.views);
         for (index, mut view) in views.into_iter().enumerate() {
@@ -89,11 +89,14 @@ impl Right {
         let base = Base::new(scene).unwrap();
         let mut draft = Draft::new(&base);
         (self.draft)(&mut draft);
-        let options = ExamineOptions {
-            depth,
-            ..ExamineOptions::default()
-        };
-        examine_folder(draft.write().path(), &draft.load, &options)
+        let folder = draft.write();
+        depths.map(|depth| {
+            let options = ExamineOptions {
+                depth,
+                ..ExamineOptions::default()
+            };
+            examine_folder(folder.path(), &draft.load, &options)
+        })
     }
 
     /// Whether it is accepted, and its poses are found to be good.
