@@ -4,10 +4,12 @@
     scripts/measure_sensitivity.py OUT SCENE...                  all constants: a night
     scripts/measure_sensitivity.py OUT SCENE... --only NAME ...  some of them
 
-Every `const` of neat-wireframe/src/assemble that is a number, or an array of numbers, is changed
-in a copy of the last commit, the example `measure_assembler` is built there and run on the
-scenes. Numbers between 0 and 1 are changed by their odds, so that probabilities, shares and
-cosines stay what they are; all others by the factor itself; counts stay whole and above 0.
+Every `const` of neat-wireframe/src/assemble that is a number, or an array of numbers, is made a
+function in a copy of the last commit, which reads its value from the environment: the example
+`measure_assembler` is built once, and run on the scenes with one value changed after the other.
+The few that other constants are made of are changed in the source, with a build each. Numbers
+between 0 and 1 are changed by their odds, so that probabilities, shares and cosines stay what
+they are; all others by the factor itself; counts stay whole and above 0.
 
 Scores are grouped by the folders that scenes lie in, as classes. The table says, for each
 constant, by how much the mean F of each class changes (segments of objects at 0.01; creases of
@@ -27,13 +29,34 @@ import re
 import statistics
 import subprocess
 import sys
+import typing
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-SOURCES = "neat-wireframe/src/assemble"
+CRATE = pathlib.Path("neat-wireframe/src")
 NUMBER = r"-?[0-9][0-9_]*(?:\.[0-9_]*)?(?:e-?[0-9]+)?"
 CONSTANT = re.compile(
-    rf"^const ([A-Z0-9_]+): (f64|usize|\[(?:f64|usize); \d+\]) = ({NUMBER}|\[[^\]]*\]);", re.M
+    rf"^((?:pub(?:\(\w+\))? )?)const ([A-Z0-9_]+): (f64|usize|\[(?:f64|usize); (\d+)\]) = "
+    rf"({NUMBER}|\[[^\]]*\]);",
+    re.M,
 )
+# Imports, comments and texts: no constant is read in them.
+NOT_READ = re.compile(r'^\s*(?:pub(?:\(\w+\))? )?use [^;]*;|//.*|"[^"\n]*"', re.M)
+# Where a value has to be known when the program is built.
+KNOWN_EARLY = re.compile(r"^.*\b(?:const|static) [A-Z_]+: ([^;=]*(?:;[^=]*)?= [^;]*)|; ([A-Z_0-9]+)\]", re.M)
+READ = """//! Values of constants, from the environment.
+
+/// Those of the constant that is changed.
+pub(crate) fn changed<T: std::str::FromStr + Copy, const N: usize>(name: &str, as_it_is: [T; N]) -> [T; N] {
+    if std::env::var("NEAT_CONSTANT").is_ok_and(|changed| changed == name) {
+        let values = std::env::var("NEAT_VALUES").unwrap();
+        let values: Vec<T> = values.split(' ').filter_map(|value| value.parse().ok()).collect();
+        return values.try_into().ok().unwrap();
+    }
+    as_it_is
+}
+"""
+TESTS = "#[cfg(test)]\nmod tests"
+FAILED = {"failed": True}
 OBJECT = re.compile(r"^(\S+) +segments [\d.]+/[\d.]+/([\d.]+)")
 PHOTOGRAPHS = re.compile(r"^(\S+) +P/R/F((?: [\d.]+/[\d.]+/[\d.]+)+)")
 
@@ -46,17 +69,31 @@ def main():
     if not copy.exists():
         git("worktree", "add", "--detach", copy, "HEAD")
     known = json.loads(results.read_text()) if results.exists() else {}
-    wanted = [("as it is", None, None, None)]
-    for path in sorted((copy / SOURCES).glob("*.rs")):
-        for found in CONSTANT.finditer(path.read_text()):
-            if not arguments.only or found[1] in arguments.only:
-                wanted += [(f"{path.name} {found[1]}", path, found, f) for f in (0.5, 2.0)]
-    for number, (name, path, found, factor) in enumerate(wanted, 1):
-        key = name if factor is None else f"{name} × {factor}"
+    git("checkout", "--quiet", ".", where=copy)
+    constants = [found for found in defined(copy) if found.name in (arguments.only or [found.name])]
+    early = known_early(copy)
+    made_functions(copy, [found for found in constants if found.name not in early])
+    wanted = [("as it is", None, None)]
+    # Those that need a build each come last, in the source as it is.
+    constants.sort(key=lambda found: found.name in early)
+    wanted += [(f"{found.key} × {factor}", found, factor) for found in constants for factor in (0.5, 2.0)]
+    binary, built = None, None
+    for number, (key, found, factor) in enumerate(wanted, 1):
         if key in known:
             continue
         print(f"{number} of {len(wanted)}: {key}", file=sys.stderr, flush=True)
-        known[key] = measured(arguments.scenes, copy, out, path, found, factor)
+        environment, source = {}, None
+        if found and found.name in early:
+            git("checkout", "--quiet", ".", where=copy)
+            text = found.path.read_text()
+            source = text.replace(found.text, found.text.replace(found.value, changed(found.value, factor)))
+            found.path.write_text(source)
+        elif found:
+            values = re.findall(NUMBER, changed(found.value, factor))
+            environment = {"NEAT_CONSTANT": found.key, "NEAT_VALUES": " ".join(values)}
+        if binary is None or source != built:
+            binary, built = build(copy, out), source
+        known[key] = measured(binary, arguments.scenes, out, environment) if binary else FAILED
         results.write_text(json.dumps(known, indent=1))
     git("worktree", "remove", "--force", copy)
     print(table(known, arguments.scenes))
@@ -72,8 +109,101 @@ def parsed():
     return parser.parse_args()
 
 
-def git(*words):
-    subprocess.run(["git", *map(str, words)], cwd=ROOT, check=True, capture_output=True)
+def git(*words, where=ROOT):
+    subprocess.run(["git", *map(str, words)], cwd=where, check=True, capture_output=True)
+
+
+class Constant(typing.NamedTuple):
+    path: pathlib.Path
+    text: str
+    visibility: str
+    name: str
+    kind: str
+    value: str
+
+    @property
+    def key(self):
+        return f"{self.path.relative_to(self.path.parents[1]).as_posix()} {self.name}"
+
+
+def sources(copy):
+    """Those of the assembler, without what only tests are made of."""
+    every = sorted((copy / CRATE / "assemble").rglob("*.rs"))
+    return [path for path in every if not path.name.startswith("test_")]
+
+
+def defined(copy):
+    """The constants of the assembler."""
+    return [
+        Constant(path, found[0], *found.groups()[:3], found[5])
+        for path in sources(copy)
+        for found in CONSTANT.finditer(path.read_text().split(TESTS)[0])
+    ]
+
+
+def known_early(copy):
+    """Names whose values are needed when the program is built, or that two modules share."""
+    names = set()
+    for path in sources(copy):
+        for found in KNOWN_EARLY.finditer(path.read_text()):
+            names |= set(re.findall(r"\b[A-Z][A-Z0-9_]+\b", found[1] or found[2]))
+    shared = collections.Counter(found.name for found in defined(copy) if found.visibility)
+    return names | {name for name, count in shared.items() if count > 1}
+
+
+def made_functions(copy, constants):
+    """Constants as functions, and calls of them where they are read."""
+    (copy / CRATE / "changed_constants.rs").write_text(READ)
+    root = copy / CRATE / "lib.rs"
+    root.write_text(root.read_text() + "\nmod changed_constants;\n")
+    of_file = collections.defaultdict(set)
+    for found in constants:
+        of_file[found.path].add(found.name)
+    public = {found.name for found in constants if found.visibility}
+    own = collections.defaultdict(set)
+    for found in defined(copy):
+        own[found.path].add(found.name)
+    for path in sources(copy):
+        text = path.read_text().split(TESTS)[0]
+        for found in constants:
+            if found.path == path:
+                text = text.replace(found.text, function(found))
+        path.write_text(calls(text, of_file[path] | (public - own[path])))
+
+
+def function(found):
+    count = re.findall(NUMBER, found.value)
+    kind = re.search("f64|usize", found.kind)[0]
+    array = found.kind.startswith("[")
+    values = f"static VALUES: std::sync::OnceLock<[{kind}; {len(count)}]> = std::sync::OnceLock::new();"
+    first = found.value if array else f"[{found.value}]"
+    read = f'VALUES.get_or_init(|| crate::changed_constants::changed("{found.key}", {first}))'
+    return (
+        f"#[allow(non_snake_case)] {found.visibility}fn {found.name}() -> "
+        f"{found.kind if array else kind} {{ {values} {'*' + read if array else read + '[0]'} }}"
+    )
+
+
+def calls(text, names):
+    if not names:
+        return text
+    name = re.compile(rf"\b({'|'.join(sorted(names))})\b(?!\()")
+    parts, end = [], 0
+    for skipped in NOT_READ.finditer(text):
+        parts += [name.sub(r"\1()", text[end : skipped.start()]), skipped[0]]
+        end = skipped.end()
+    return "".join([*parts, name.sub(r"\1()", text[end:])])
+
+
+def build(copy, out):
+    """The example; None where it cannot be built."""
+    command = ["cargo", "build", "--locked", "--release", "--quiet", "-p", "neat-eval"]
+    command += ["--example", "measure_assembler"]
+    target = out / "target"
+    done = subprocess.run(
+        command, cwd=copy, env={**os.environ, "CARGO_TARGET_DIR": str(target), "RUSTFLAGS": "-Awarnings"}
+    )
+    return target / "release/examples/measure_assembler" if done.returncode == 0 else None
 
 
 def changed(text, factor):
@@ -94,27 +224,13 @@ def changed(text, factor):
     return re.sub(NUMBER, one, text)
 
 
-def measured(scenes, copy, out, path, found, factor):
-    """F of each scene with one constant changed; a reason where there is none."""
-    original = path.read_text() if path else None
-    if path:
-        begin, end = found.span(3)
-        path.write_text(original[:begin] + changed(found[3], factor) + original[end:])
-    command = ["cargo", "run", "--locked", "--release", "--quiet", "-p", "neat-eval"]
-    command += ["--example", "measure_assembler", "--", "--out", out / "scenes"]
-    command += [scene.resolve() for scene in scenes]
-    try:
-        done = subprocess.run(
-            [*map(str, command)],
-            cwd=copy, capture_output=True, text=True,
-            env={**os.environ, "CARGO_TARGET_DIR": str(out / "target")},
-        )  # fmt: skip
-    finally:
-        if path:
-            path.write_text(original)
-    if done.returncode != 0:
-        return {"failed": done.stderr.strip().splitlines()[-1:]}
-    return scores(done.stdout)
+def measured(binary, scenes, out, environment):
+    """F of each scene; that there is none, where the assembler gives up."""
+    command = [binary, "--out", out / "scenes", *(scene.resolve() for scene in scenes)]
+    done = subprocess.run(
+        [*map(str, command)], capture_output=True, text=True, env={**os.environ, **environment}
+    )
+    return scores(done.stdout) if done.returncode == 0 else FAILED
 
 
 def scores(text):
