@@ -36,13 +36,17 @@ CRATE = pathlib.Path("neat-wireframe/src")
 NUMBER = r"-?[0-9][0-9_]*(?:\.[0-9_]*)?(?:e-?[0-9]+)?"
 CONSTANT = re.compile(
     rf"^((?:pub(?:\(\w+\))? )?)const ([A-Z0-9_]+): (f64|usize|\[(?:f64|usize); (\d+)\]) = "
-    rf"({NUMBER}|\[[^\]]*\]);",
+    rf"({NUMBER}|\[(?:\s*{NUMBER},?)+\s*\]);",
     re.M,
 )
 # Imports, comments and texts: no constant is read in them.
 NOT_READ = re.compile(r'^\s*(?:pub(?:\(\w+\))? )?use [^;]*;|//.*|"[^"\n]*"', re.M)
 # Where a value has to be known when the program is built.
-KNOWN_EARLY = re.compile(r"^.*\b(?:const|static) [A-Z_]+: ([^;=]*(?:;[^=]*)?= [^;]*)|; ([A-Z_0-9]+)\]", re.M)
+KNOWN_EARLY = re.compile(
+    r"^.*\b(?:const|static) [A-Z_]+: (?P<item>[^;=]*(?:;[^=]*)?= [^;]*)"
+    r"|; (?P<length>[A-Z_0-9]+)\b|(?P<pattern>[A-Z_0-9]+)(?:\.\.)? =>",
+    re.M,
+)
 READ = """//! Values of constants, from the environment.
 
 /// Those of the constant that is changed.
@@ -146,7 +150,7 @@ def known_early(copy):
     names = set()
     for path in sources(copy):
         for found in KNOWN_EARLY.finditer(path.read_text()):
-            names |= set(re.findall(r"\b[A-Z][A-Z0-9_]+\b", found[1] or found[2]))
+            names |= set(re.findall(r"\b[A-Z][A-Z0-9_]+\b", " ".join(filter(None, found.groups()))))
     shared = collections.Counter(found.name for found in defined(copy) if found.visibility)
     return names | {name for name, count in shared.items() if count > 1}
 
