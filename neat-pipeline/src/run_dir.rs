@@ -22,11 +22,18 @@
 //! steps that a resumed run takes again. The folder holds a run once `manifest.json`
 //! is there.
 
+mod checkpoints;
+mod error;
+
+pub use checkpoints::UsableCheckpoint;
+pub use error::RunDirError;
+pub(crate) use error::{malformed, read_error, write_error};
+
 use crate::config::Config;
 use crate::manifest::Manifest;
 use crate::plan::{Plan, PlanError};
+use error::ignore_missing;
 use neat_core::{SceneError, file};
-use neat_tensor::checkpoint::{Checkpoint, CheckpointError};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -63,77 +70,6 @@ pub enum Existing {
     Resume,
 }
 
-/// Why a run folder cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum RunDirError {
-    /// A new run would mix with what is there.
-    #[error(
-        "{0} is not empty: choose another folder, or pass --overwrite to replace the run in it"
-    )]
-    NotEmpty(PathBuf),
-    /// The path leads to something else.
-    #[error("{0} is not a folder: choose another path for the run")]
-    NotAFolder(PathBuf),
-    /// No run has been here.
-    #[error("{0} is not the folder of a run: it has no config.toml")]
-    NotARun(PathBuf),
-    /// A run that has lost a file that says what it is.
-    #[error(
-        "{path} has checkpoints but no {missing}: put it back, or begin again with --overwrite"
-    )]
-    Incomplete {
-        /// The folder.
-        path: PathBuf,
-        /// Name of the file.
-        missing: &'static str,
-    },
-    /// Another process is at work in the folder.
-    #[error("another process works on the run in {0}: wait for it, or choose another folder")]
-    InUse(PathBuf),
-    /// Every checkpoint is damaged.
-    #[error(
-        "none of the checkpoints in {path} can be read: put one back, or train again with --overwrite"
-    )]
-    NoUsableCheckpoint {
-        /// The folder of the run.
-        path: PathBuf,
-        /// What is wrong with the last one.
-        source: Box<CheckpointError>,
-    },
-    /// A run without a field, or that ended before its first checkpoint.
-    #[error("{0} holds no trained field: reconstruct again with --train and --overwrite")]
-    NoField(PathBuf),
-    /// `config.toml`, `plan.toml` or `manifest.json` does not parse.
-    #[error(
-        "{path} cannot be understood: {reason}; if another version of neat wrote it, use that one, else correct it or train again with --overwrite"
-    )]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// The configuration has no TOML form.
-    #[error("the configuration cannot be written as TOML")]
-    Serialize(#[from] toml::ser::Error),
-    /// The folder cannot hold a run.
-    #[error(
-        "no run can be written to {path}: check the permissions and the space on the disk, or choose another folder"
-    )]
-    Unwritable {
-        /// The folder.
-        path: PathBuf,
-        /// What the system said.
-        source: SceneError,
-    },
-    /// A file or folder could not be read or written.
-    #[error(transparent)]
-    File(#[from] SceneError),
-    /// A checkpoint could not be read or written.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
-}
-
 /// The folder of one run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunDir {
@@ -144,17 +80,6 @@ pub struct RunDir {
 #[derive(Debug)]
 pub struct RunLock {
     _file: File,
-}
-
-/// The last checkpoint that can be read.
-#[derive(Debug)]
-pub struct UsableCheckpoint {
-    /// Its file.
-    pub path: PathBuf,
-    /// What is in it.
-    pub checkpoint: Checkpoint,
-    /// Later ones, which cannot be read, with what is wrong with them.
-    pub damaged: Vec<(PathBuf, CheckpointError)>,
 }
 
 impl RunDir {
@@ -414,106 +339,6 @@ impl RunDir {
     pub fn failure(&self) -> PathBuf {
         self.root.join(FAILURE)
     }
-
-    /// Writes the checkpoint of a step and removes all but the last `kept`. None stays for
-    /// its loss: what a run weighs changes with its steps, and losses of different steps do
-    /// not compare.
-    ///
-    /// # Errors
-    /// If the disk is full or the folder cannot be written; earlier checkpoints
-    /// are then untouched.
-    pub fn write_checkpoint(
-        &self,
-        iteration: u64,
-        checkpoint: &Checkpoint,
-        kept: usize,
-    ) -> Result<PathBuf, RunDirError> {
-        let dir = self.root.join(CHECKPOINTS);
-        match fs::create_dir(&dir) {
-            // Not those above it: a run folder that is lost in between is an error.
-            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
-                return Err(write_error(&dir, error).into());
-            }
-            _ => {}
-        }
-        let path = dir.join(format!("step-{iteration:08}.safetensors"));
-        checkpoint.write(&path)?;
-        let mut old = self.checkpoints()?;
-        old.truncate(old.len().saturating_sub(kept.max(1)));
-        for (_, path) in old {
-            ignore_missing(fs::remove_file(&path), &path)?;
-        }
-        Ok(path)
-    }
-
-    /// Reads the last checkpoint that is not damaged; `None` if there is no
-    /// checkpoint.
-    ///
-    /// # Errors
-    /// If all are damaged, or the folder cannot be read.
-    pub fn usable_checkpoint(&self) -> Result<Option<UsableCheckpoint>, RunDirError> {
-        let mut damaged = Vec::new();
-        for (_, path) in self.checkpoints()?.into_iter().rev() {
-            match Checkpoint::read(&path) {
-                Ok(checkpoint) => {
-                    return Ok(Some(UsableCheckpoint {
-                        path,
-                        checkpoint,
-                        damaged,
-                    }));
-                }
-                Err(error) => damaged.push((path, error)),
-            }
-        }
-        match damaged.into_iter().next() {
-            None => Ok(None),
-            Some((_, source)) => Err(RunDirError::NoUsableCheckpoint {
-                path: self.root.clone(),
-                source: Box::new(source),
-            }),
-        }
-    }
-
-    /// Renames a checkpoint, so that it is one no more.
-    ///
-    /// # Errors
-    /// If the system refuses.
-    pub fn set_aside(&self, checkpoint: &Path) -> Result<(), RunDirError> {
-        let mut aside = checkpoint.as_os_str().to_owned();
-        aside.push(".damaged");
-        let renamed = fs::rename(checkpoint, &aside);
-        Ok(renamed.map_err(|error| write_error(checkpoint, error))?)
-    }
-
-    /// The last checkpoint's file.
-    ///
-    /// # Errors
-    /// If there is none, or the folder cannot be read.
-    pub fn latest_checkpoint(&self) -> Result<PathBuf, RunDirError> {
-        self.checkpoints()?
-            .pop()
-            .map(|(_, path)| path)
-            .ok_or_else(|| RunDirError::NoField(self.root.clone()))
-    }
-
-    /// All checkpoints with their steps, in the order of these.
-    fn checkpoints(&self) -> Result<Vec<(u64, PathBuf)>, SceneError> {
-        let dir = self.root.join(CHECKPOINTS);
-        let entries = match fs::read_dir(&dir) {
-            Ok(entries) => entries,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-            Err(error) => return Err(read_error(&dir, error)),
-        };
-        let mut checkpoints = Vec::new();
-        for entry in entries {
-            let path = entry.map_err(|error| read_error(&dir, error))?.path();
-            if let Some(iteration) = checkpoint_iteration(&path) {
-                checkpoints.push((iteration, path));
-            }
-        }
-        checkpoints.sort();
-        Ok(checkpoints)
-    }
 }
 
 /// Reads a configuration file.
@@ -545,44 +370,10 @@ fn entries(root: &Path) -> Result<Vec<PathBuf>, RunDirError> {
     paths.map_err(|error| read_error(root, error).into())
 }
 
-/// The step in the name of a checkpoint.
-fn checkpoint_iteration(path: &Path) -> Option<u64> {
-    let name = path.file_name()?.to_str()?;
-    let digits = name.strip_prefix("step-")?.strip_suffix(".safetensors")?;
-    digits.parse().ok()
-}
-
-pub(crate) fn malformed(path: &Path, error: &dyn std::error::Error) -> RunDirError {
-    RunDirError::Malformed {
-        path: path.into(),
-        reason: error.to_string().trim_end().to_owned(),
-    }
-}
-
-pub(crate) fn read_error(path: &Path, source: io::Error) -> SceneError {
-    SceneError::Read {
-        path: path.into(),
-        source,
-    }
-}
-
-pub(crate) fn write_error(path: &Path, source: io::Error) -> SceneError {
-    SceneError::Write {
-        path: path.into(),
-        source,
-    }
-}
-
-fn ignore_missing(result: io::Result<()>, path: &Path) -> Result<(), SceneError> {
-    match result {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(write_error(path, error)),
-        _ => Ok(()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use neat_tensor::checkpoint::Checkpoint;
 
     #[test]
     fn a_folder_with_something_in_it_is_refused_unless_told_otherwise() {
@@ -655,47 +446,6 @@ mod tests {
         assert!(matches!(
             RunDir::to_resume(&other),
             Err(RunDirError::NotARun(_))
-        ));
-    }
-
-    #[test]
-    fn the_last_checkpoints_stay_whatever_their_losses_are() {
-        let dir = tempfile::tempdir().unwrap();
-        let (run, _lock) = RunDir::create(dir.path(), Existing::Refuse).unwrap();
-        assert!(matches!(
-            run.latest_checkpoint(),
-            Err(RunDirError::NoField(_))
-        ));
-        assert!(run.usable_checkpoint().unwrap().is_none());
-        let losses = [(5, 3.0), (50, 0.5), (500, 2.0), (100_000_000, 1.0)];
-        for (iteration, loss) in losses {
-            let mut checkpoint = Checkpoint::default();
-            let metadata = &mut checkpoint.metadata;
-            metadata.insert("average_loss".to_owned(), loss.to_string());
-            let path = run.write_checkpoint(iteration, &checkpoint, 2).unwrap();
-            assert_eq!(run.latest_checkpoint().unwrap(), path);
-        }
-        let kept: Vec<u64> = run.checkpoints().unwrap().iter().map(|c| c.0).collect();
-        assert_eq!(kept, [500, 100_000_000]);
-    }
-
-    #[test]
-    fn a_damaged_checkpoint_gives_way_to_the_one_before() {
-        let dir = tempfile::tempdir().unwrap();
-        let (run, _lock) = RunDir::create(dir.path(), Existing::Refuse).unwrap();
-        let [first, second] =
-            [1, 2].map(|i| run.write_checkpoint(i, &Checkpoint::default(), 2).unwrap());
-        fs::write(&second, "half").unwrap();
-        let usable = run.usable_checkpoint().unwrap().unwrap();
-        assert_eq!(usable.path, first);
-        assert_eq!(usable.damaged[0].0, second);
-        run.set_aside(&second).unwrap();
-        assert_eq!(run.latest_checkpoint().unwrap(), first);
-
-        fs::write(&first, "").unwrap();
-        assert!(matches!(
-            run.usable_checkpoint(),
-            Err(RunDirError::NoUsableCheckpoint { .. })
         ));
     }
 }
