@@ -333,7 +333,7 @@ mod tests {
                         noise: 1.0,
                     };
                     let of_view = move |profile: &LightProfile<4>| profile.view == view as usize;
-                    let from_other_side = |mut profile: LightProfile<4>| {
+                    let from_other_side = move |mut profile: LightProfile<4>| {
                         if view % 2 == 1 {
                             profile.by_shift = -profile.by_shift;
                             profile.light.iter_mut().for_each(|light| light.reverse());
