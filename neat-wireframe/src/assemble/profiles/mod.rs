@@ -6,7 +6,8 @@
 //! are asked once more: the light across a curve, in all views at once, is explained by steps
 //! whose places are the same in space and whose heights are free in each view. The step nearest
 //! to a curve is where it is. Others are edges beside it, if they explain enough and both halves
-//! of the views put them at the same place.
+//! of the views put them at the same place. A line whose step moves aside as that of
+//! a fillet does is no edge.
 
 mod bundle;
 mod circular;
@@ -109,8 +110,8 @@ impl<const N: usize, C: Curve<N>> Profiled<N, C> {
     }
 }
 
-/// Moves lines and arcs to where the light changes, and adds lines beside lines. Those that the
-/// images tell nothing of stay.
+/// Moves lines and arcs to where the light changes, adds lines beside lines, and leaves out the
+/// middles of rounded edges. Those that the images tell nothing of stay.
 pub(super) fn place_curves(
     images: &Images,
     photographs: Photographs<'_>,

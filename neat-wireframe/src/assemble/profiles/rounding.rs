@@ -21,7 +21,7 @@ const FAR: f64 = 1.6;
 /// It must lower the loss of a profile by this, as for steps beside lines.
 const LEAST_GAIN: f64 = 0.3;
 /// A view that shows the fillet from in front shows a wide step, anywhere on it: it is wide if a
-/// blur so many times the scene's explains it better, which is half way to twice of it and more.
+/// blur so many times the scene's explains it better, judged.
 const WIDE: f64 = 3.0;
 /// A view's step is off by so much, in pixels: .02 to .05 on renderings, .13 on photographs; with
 /// .15 a quarter fewer fillets are told.
