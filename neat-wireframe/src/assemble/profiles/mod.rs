@@ -6,7 +6,8 @@
 //! are asked once more: the light across a curve, in all views at once, is explained by steps
 //! whose places are the same in space and whose heights are free in each view. The step nearest
 //! to a curve is where it is. Others are edges beside it, if they explain enough and both halves
-//! of the views put them at the same place.
+//! of the views put them at the same place. A line whose step moves aside as that of
+//! a fillet does is no edge.
 
 mod bundle;
 mod circular;
@@ -18,6 +19,7 @@ mod placed_arcs;
 mod profile;
 mod pursuit;
 mod response;
+mod rounding;
 mod step_fit;
 mod step_model;
 mod straight;
@@ -27,6 +29,7 @@ mod test_profiles;
 use super::circle_fitting::FoundArc;
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
+use super::outlines::MIN_REACHES;
 use super::progress::{OnProgress, part};
 use bundle::Bundle;
 use circular::Circular;
@@ -39,6 +42,7 @@ use placed_arcs::{PlacedArc, move_arcs};
 use profile::{Profile, profiles};
 use rayon::prelude::*;
 use response::response_of;
+use rounding::{Widths, is_rounded};
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 use straight::Straight;
@@ -85,7 +89,7 @@ impl<const N: usize, C: Curve<N>> Profiled<N, C> {
     fn explained<T: Send>(
         &self,
         response: Response,
-        make: impl Fn(&C, &Bundle<'_, N>) -> T + Sync,
+        make: impl Fn(&C, &[LightProfile<N>], &Bundle<'_, N>) -> T + Sync,
         progress: OnProgress<'_>,
     ) -> ControlFlow<(), Vec<Option<T>>> {
         let count = self.curves.len();
@@ -97,7 +101,7 @@ impl<const N: usize, C: Curve<N>> Profiled<N, C> {
             let of_curve = |(curve, profiles): (&C, &Vec<Profile<N>>)| {
                 let in_light = |profile| LightProfile::new(profile, response.exponent);
                 let light: Vec<LightProfile<N>> = profiles.iter().map(in_light).collect();
-                Bundle::new(curve, &light, response.blur).map(|bundle| make(curve, &bundle))
+                Bundle::new(curve, &light, response.blur).map(|bundle| make(curve, &light, &bundle))
             };
             made.par_extend(some.zip(&self.profiles[from..to]).map(of_curve));
             progress(to as f64 / count as f64)?;
@@ -106,8 +110,8 @@ impl<const N: usize, C: Curve<N>> Profiled<N, C> {
     }
 }
 
-/// Moves lines and arcs to where the light changes, and adds lines beside lines. Those that the
-/// images tell nothing of stay.
+/// Moves lines and arcs to where the light changes, adds lines beside lines, and leaves out the
+/// middles of rounded edges. Those that the images tell nothing of stay.
 pub(super) fn place_curves(
     images: &Images,
     photographs: Photographs<'_>,
@@ -143,24 +147,40 @@ pub(super) fn place_curves(
         let progress = &mut part(progress, [LOOKED, ROUND]);
         move_arcs(
             arcs,
-            circular.explained(response, PlacedArc::new, progress)?,
+            circular.explained(
+                response,
+                |arc, _, bundle| PlacedArc::new(arc, bundle),
+                progress,
+            )?,
         )
     };
     let placed = {
         let progress = &mut part(progress, [ROUND, 1.0]);
-        straight.explained(response, PlacedLine::new, progress)?
+        let widths = Widths::new(response.blur);
+        let least_radius = MIN_REACHES * images.reach;
+        let of_line = |straight: &Straight, light: &[LightProfile<4>], bundle: &Bundle<'_, 4>| {
+            (!is_rounded(light, &widths, response.blur, least_radius))
+                .then(|| PlacedLine::new(straight, bundle))
+        };
+        straight.explained(response, of_line, progress)?
     };
+    let rounded: Vec<usize> = (indices.iter().zip(&placed))
+        .filter_map(|(index, line)| matches!(line, Some(None)).then_some(*index))
+        .collect();
     let placed: Vec<(usize, PlacedLine)> = (indices.into_iter().zip(placed))
-        .filter_map(|(index, line)| Some((index, line?)))
+        .filter_map(|(index, line)| Some((index, line??)))
         .collect();
     let (before, moved) = (lines.len(), move_lines(lines, &placed));
     add_beside(images, lines, placed);
     let beside = lines.len() - before;
+    let mut index = 0..;
+    lines.retain(|_| index.next().is_none_or(|index| !rounded.contains(&index)));
     tracing::debug!(
         ?response,
         moved,
         beside,
         moved_arcs,
+        rounded = rounded.len(),
         "curves are placed by profiles"
     );
     ControlFlow::Continue(())

@@ -9,7 +9,7 @@ use super::step_model::{NOISE_SQUARES, StepModel, loss, offset, step_column};
 use nalgebra::Vector2;
 
 /// Pixels between the places beside the curve where a step is tried: half the blur.
-const TRIED: f64 = 0.25;
+pub(super) const TRIED: f64 = 0.25;
 const OFFSETS: usize = (2.0 * REACH / TRIED) as usize + 1;
 /// Pixels between the places in space.
 const CELL: f64 = 0.4;
@@ -24,7 +24,7 @@ const LEAST_COLUMN: f64 = 1e-6;
 type Gains = [f64; OFFSETS];
 
 /// Places where a step is tried, as columns.
-pub(super) struct Columns([[f64; PLACES]; OFFSETS]);
+pub(super) struct Columns(pub(super) [[f64; PLACES]; OFFSETS]);
 
 impl Columns {
     pub(super) fn new(blur: f64) -> Self {
@@ -34,17 +34,36 @@ impl Columns {
     }
 }
 
-fn gains<const N: usize>(
-    profile: &LightProfile<N>,
-    steps: &[Step<N>],
-    columns: &Columns,
-    blur: f64,
-) -> Gains {
-    let model = StepModel::new(profile, steps, blur);
-    let rests = profile.light.map(|light| model.rest(&light).0);
-    let squares: f64 = rests.iter().map(|rest| model.product(rest, rest)).sum();
-    std::array::from_fn(|k| {
-        let (new, _) = model.rest(&columns.0[k]);
+/// What one more step explains of a profile.
+pub(super) struct OneStep {
+    model: StepModel,
+    rests: [[f64; PLACES]; 3],
+    squares: f64,
+}
+
+impl OneStep {
+    pub(super) fn new<const N: usize>(
+        profile: &LightProfile<N>,
+        steps: &[Step<N>],
+        blur: f64,
+    ) -> Self {
+        let model = StepModel::new(profile, steps, blur);
+        let rests = profile.light.map(|light| model.rest(&light).0);
+        Self {
+            squares: rests.iter().map(|rest| model.product(rest, rest)).sum(),
+            model,
+            rests,
+        }
+    }
+
+    /// By how much a step that is this column lowers the loss.
+    pub(super) fn gain(&self, column: &[f64; PLACES]) -> f64 {
+        let Self {
+            model,
+            rests,
+            squares,
+        } = self;
+        let (new, _) = model.rest(column);
         let own = model.product(&new, &new);
         if own < LEAST_COLUMN {
             return 0.0;
@@ -52,7 +71,17 @@ fn gains<const N: usize>(
         let explained = rests.iter().map(|rest| model.product(&new, rest).powi(2));
         let left = (squares - explained.sum::<f64>() / own).max(0.0);
         loss(squares / NOISE_SQUARES) - loss(left / NOISE_SQUARES)
-    })
+    }
+}
+
+fn gains<const N: usize>(
+    profile: &LightProfile<N>,
+    steps: &[Step<N>],
+    columns: &Columns,
+    blur: f64,
+) -> Gains {
+    let step = OneStep::new(profile, steps, blur);
+    std::array::from_fn(|k| step.gain(&columns.0[k]))
 }
 
 /// How far a shift of the curve moves it in the images, in pixels: root mean square.
