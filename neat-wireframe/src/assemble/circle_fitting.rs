@@ -4,12 +4,12 @@
 //! and hides its back. It grows by sectors that speak for it, at most to three times its length in
 //! a round, and is fitted to the edgels beside them, until it grows no more.
 
+use super::claimed_edgels::{CLAIM_DENSITY, take_beside};
 use super::curve_samples::{SPACING, distance_of_curve};
 use super::edge_samples::{Images, Sample};
 use super::line_evidence::{LineEvidence, Showing};
 use super::line_extent::{best_stretch, gain_of_sample};
 use super::line_fitting::change_by_edgels;
-use super::line_selection::{CLAIM_DENSITY, take_beside};
 use crate::statistics::upper_median;
 use nalgebra::{Matrix4, SVector, Unit, UnitQuaternion, Vector3};
 use neat_core::CircularArc;

@@ -1,10 +1,11 @@
 //! The arcs of which lines are chords, each found once.
 
 use super::circle_fitting::FoundArc;
+use super::claimed_edgels::claim_edgels;
 use super::config::AssembleConfig;
 use super::curve_pieces::curve_pieces;
 use super::edge_samples::Images;
-use super::line_selection::{Chord, Selection, claim_edgels, select_chords};
+use super::line_selection::{Chord, Selection, select_chords};
 use super::progress::OnProgress;
 use super::proposals;
 use super::view_segments::PreparedView;

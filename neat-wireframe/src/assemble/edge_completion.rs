@@ -1,9 +1,9 @@
 //! Edges that no pair of views can place, since all cameras lie in one plane with them, or
 //! nearly: where 2D segments run from corner to corner, corners that other edges have placed.
 
+use super::claimed_edgels::claim_edgels;
 use super::corners::{Corners, MAX_GAP};
 use super::edge_samples::Images;
-use super::line_selection::claim_edgels;
 use crate::projection::project_in_front;
 use neat_core::LineSegment3;
 use rayon::prelude::*;

@@ -1,9 +1,10 @@
 //! Lines followed beyond their ends to what they would meet there: the views that show most
 //! of an edge are not those that show its rest.
 
+use super::claimed_edgels::claim_edgels;
 use super::corners::{MAX_GAP, beyond_end, nearest_points};
 use super::edge_samples::Images;
-use super::line_selection::{ChosenLine, claim_edgels};
+use super::line_selection::ChosenLine;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 

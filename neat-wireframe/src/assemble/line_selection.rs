@@ -2,16 +2,17 @@
 //! before it has.
 
 use super::candidate_queue::CandidateQueue;
+use super::claimed_edgels::claim_edgels;
 use super::config::AssembleConfig;
-use super::edge_samples::{Images, Sample, project_segment};
+use super::edge_samples::{Images, project_segment};
 use super::hypothesis_scoring::Alternatives;
 use super::line_evidence::LineEvidence;
-use super::outlines::Tube;
+use super::line_kind::{Kind, curve_or_straight, kind};
 use super::progress::OnProgress;
 use super::projected_line::ProjectedLine;
 use super::view_segments::SegmentId;
 use crate::statistics::{SIGMA_BY_MEDIAN, upper_median};
-use neat_core::{CircularArc, EdgelMap, LineSegment2, LineSegment3};
+use neat_core::{CircularArc, LineSegment2, LineSegment3};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
@@ -42,10 +43,6 @@ const FITTING_REACHES: [f64; 3] = [1.3, 1.0, 1.0];
 const MIN_SHOWING: usize = 3;
 /// An evidence that others have lowered by more goes back into the queue, in nats.
 const STALE: f64 = 0.5;
-/// A line has the edgels beside it whose normals have this cosine to its own …
-const CLAIM_COSINE: f64 = 0.8;
-/// … at so many samples for each of its pixels.
-pub(super) const CLAIM_DENSITY: f64 = 2.0;
 /// 2D segments whose ends lie within so many reaches of a line are its own: they propose
 /// nothing else.
 const SEGMENT_REACHES: f64 = 2.0;
@@ -190,38 +187,6 @@ fn noise_of_edgels(images: &Images, lines: &[ChosenLine]) -> f64 {
     }
 }
 
-/// What a line that the images show stands for.
-enum Kind {
-    Straight,
-    /// The arc through it, if it is one.
-    Curve(Option<CircularArc>),
-    Outline(Tube),
-}
-
-fn kind(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
-    let ChosenLine { line, evidence, .. } = found;
-    match curve_or_straight(images, found, noise) {
-        Kind::Straight => images
-            .tube(line, evidence)
-            .map_or(Kind::Straight, Kind::Outline),
-        curve => curve,
-    }
-}
-
-/// Likewise, where nobody wants to know of outlines.
-fn curve_or_straight(images: &Images, found: &ChosenLine, noise: f64) -> Kind {
-    let ChosenLine { line, evidence, .. } = found;
-    let bend = images.bend(line, evidence);
-    let bow = bend.bow.as_ref();
-    if images.is_curved(line, &bend, noise) {
-        Kind::Curve(bow.and_then(|bow| images.arc_of_bow(line, evidence, bow)))
-    } else if let Some(arc) = images.arc_of_chord(line, evidence, bow, noise) {
-        Kind::Curve(Some(arc))
-    } else {
-        Kind::Straight
-    }
-}
-
 /// Which lines are chosen.
 struct Wanted {
     min_evidence: f64,
@@ -230,7 +195,7 @@ struct Wanted {
     /// The standard deviation of an edgel, in pixels.
     noise: f64,
     /// What tells what one stands for.
-    kind: fn(&Images, &ChosenLine, f64) -> Kind,
+    kind: fn(&Images, &LineSegment3, &LineEvidence, f64) -> Kind,
 }
 
 fn choose<'a>(
@@ -275,7 +240,8 @@ fn choose<'a>(
         }
         let mut kinds: Vec<Kind> = Vec::with_capacity(found.len());
         for some in found.chunks(LINES_AT_ONCE) {
-            kinds.par_extend(some.par_iter().map(|line| kind(&images, line, noise)));
+            let kind = |found: &ChosenLine| kind(&images, &found.line, &found.evidence, noise);
+            kinds.par_extend(some.par_iter().map(kind));
             progress(FOUND + (1.0 - FOUND) * kinds.len() as f64 / found.len() as f64)?;
         }
         for (line, kind) in found.into_iter().zip(kinds) {
@@ -381,36 +347,6 @@ impl Chooser<'_> {
                 }
             }
         }
-    }
-}
-
-/// Takes the edgels beside a line, in all views: where something hides the middle of an edge,
-/// its ends are still its own.
-pub(super) fn claim_edgels(images: &Images, line: &LineSegment3, taken: &mut [Vec<bool>]) {
-    let views = images.views.par_iter().zip(images.maps).zip(taken);
-    views
-        .enumerate()
-        .for_each(|(view, ((prepared, map), taken))| {
-            let Some(projected) = project_segment(prepared, line) else {
-                return;
-            };
-            let count = (CLAIM_DENSITY * projected.length())
-                .ceil()
-                .clamp(8.0, 4000.0);
-            let Some(samples) = images.samples(view, line, [0.0, 1.0], Some(count as usize)) else {
-                return;
-            };
-            take_beside(map, &samples, images.reach, taken);
-        });
-}
-
-/// Takes the edgels of a view beside samples of a line or a curve.
-pub(super) fn take_beside(map: &EdgelMap, samples: &[Sample], reach: f64, taken: &mut [bool]) {
-    for Sample { pixel, normal, .. } in samples {
-        map.visit(pixel, normal, reach, CLAIM_COSINE, |_, edgel| {
-            taken[edgel] = true;
-            ControlFlow::Continue(())
-        });
     }
 }
 

@@ -112,8 +112,8 @@ fn others_at(count: usize, pairs: &[[usize; 2]]) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assemble::claimed_edgels::claim_edgels;
     use crate::assemble::corners::find_corners;
-    use crate::assemble::line_selection::claim_edgels;
     use crate::assemble::test_views::{TestViews, chosen};
     use crate::assemble::view_segments::PreparedView;
     use crate::test_scenes::{cameras_on_sphere, views_of_edges};
