@@ -14,6 +14,7 @@ mod circular;
 mod covariance;
 mod curve;
 mod light;
+mod normal_distribution;
 mod pixels;
 mod placed_arcs;
 mod profile;

@@ -2,9 +2,9 @@
 
 use super::curve::Step;
 use super::light::LightProfile;
+use super::normal_distribution::{FLAT, density, shares_below};
 use super::profile::{PLACES, REACH, places};
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
-use std::f64::consts::{PI, SQRT_2};
 
 /// So many steps at most: with one, two and four of them F1 at the least threshold is .419, .476
 /// and .491 for a house (.482), .170, .249 and .274 for a façade (.271), .785, .784 and .764 for a
@@ -16,8 +16,6 @@ const COLUMNS: usize = 2 + MAX_STEPS;
 pub(super) const NOISE: f64 = 3.0;
 /// Sum of the squares of as much noise over a profile.
 pub(super) const NOISE_SQUARES: f64 = 3.0 * PLACES as f64 * NOISE * NOISE;
-/// A step has ended after so many times its blur, but for the last digit.
-const FLAT: f64 = 8.0;
 /// Keeps heights finite where steps cannot be told apart.
 const RIDGE: f64 = 1e-7;
 
@@ -28,23 +26,15 @@ pub(super) fn offset<const N: usize>(profile: &LightProfile<N>, step: &Step<N>) 
 
 /// A step of height 1, blurred by `blur` pixels.
 pub(super) fn step_column(offset: f64, blur: f64) -> [f64; PLACES] {
-    places().map(|place| {
-        let z = (place - offset) / blur;
-        if z.abs() < FLAT {
-            0.5 * libm::erfc(-z / SQRT_2)
-        } else {
-            f64::from(z > 0.0)
-        }
-    })
+    shares_below(places().map(|place| (place - offset) / blur))
 }
 
 /// Its derivative by its offset.
 pub(super) fn step_derivative(offset: f64, blur: f64) -> [f64; PLACES] {
-    let height = -(blur * (2.0 * PI).sqrt()).recip();
     places().map(|place| {
         let z = (place - offset) / blur;
         if z.abs() < FLAT {
-            height * (-0.5 * z * z).exp()
+            -density(z) / blur
         } else {
             0.0
         }
