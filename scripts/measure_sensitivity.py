@@ -35,7 +35,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 CRATE = pathlib.Path("neat-wireframe/src")
 NUMBER = r"-?[0-9][0-9_]*(?:\.[0-9_]*)?(?:e-?[0-9]+)?"
 CONSTANT = re.compile(
-    rf"^((?:pub(?:\(\w+\))? )?)const ([A-Z0-9_]+): (f64|usize|\[(?:f64|usize); (\d+)\]) = "
+    rf"^((?:pub(?:\(\w+\))? )?)const ([A-Z0-9_]+): (f64|usize|\[(?:f64|usize); \d+\]) = "
     rf"({NUMBER}|\[(?:\s*{NUMBER},?)+\s*\]);",
     re.M,
 )
@@ -89,8 +89,7 @@ def main():
         environment, source = {}, None
         if found and found.name in early:
             git("checkout", "--quiet", ".", where=copy)
-            text = found.path.read_text()
-            source = text.replace(found.text, found.text.replace(found.value, changed(found.value, factor)))
+            source = with_value(found, changed(found.value, factor))
             found.path.write_text(source)
         elif found:
             values = re.findall(NUMBER, changed(found.value, factor))
@@ -139,7 +138,7 @@ def sources(copy):
 def defined(copy):
     """The constants of the assembler."""
     return [
-        Constant(path, found[0], *found.groups()[:3], found[5])
+        Constant(path, found[0], *found.groups())
         for path in sources(copy)
         for found in CONSTANT.finditer(path.read_text().split(TESTS)[0])
     ]
@@ -173,6 +172,12 @@ def made_functions(copy, constants):
             if found.path == path:
                 text = text.replace(found.text, function(found))
         path.write_text(calls(text, of_file[path] | (public - own[path])))
+
+
+def with_value(found, value):
+    """The source of a constant's file with another value of it."""
+    definition = f"{found.text.removesuffix(found.value + ';')}{value};"
+    return found.path.read_text().replace(found.text, definition)
 
 
 def function(found):
