@@ -46,8 +46,7 @@ pub(super) fn shares_below<const N: usize>(places: [f64; N]) -> [f64; N] {
     })
 }
 
-/// The density of the standard normal distribution.
-pub(super) fn density(z: f64) -> f64 {
+fn density(z: f64) -> f64 {
     (-0.5 * z * z).exp() / (2.0 * PI).sqrt()
 }
 
