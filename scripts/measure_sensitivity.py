@@ -3,6 +3,7 @@
 
     scripts/measure_sensitivity.py OUT SCENE...                  all constants: a night
     scripts/measure_sensitivity.py OUT SCENE... --only NAME ...  some of them
+    scripts/measure_sensitivity.py OUT SCENE... --jobs 16        so many values at once
 
 Every `const` of neat-wireframe/src/assemble that is a number, or an array of numbers, is made a
 function in a copy of the last commit, which reads its value from the environment: the example
@@ -14,13 +15,15 @@ they are; all others by the factor itself; counts stay whole and above 0.
 Scores are grouped by the folders that scenes lie in, as classes. The table says, for each
 constant, by how much the mean F of each class changes (segments of objects at 0.01; creases of
 photographs, the mean of the three thresholds), the worst first. OUT/results.json keeps what has
-been measured: the same command goes on after an interrupt.
+been measured: the same command goes on after an interrupt. With several jobs each has one thread,
+which is more work in the same time than one job with all of them.
 
 Needs Python 3.9, git and cargo.
 """
 
 import argparse
 import collections
+import concurrent.futures
 import json
 import math
 import os
@@ -77,27 +80,40 @@ def main():
     constants = [found for found in defined(copy) if found.name in (arguments.only or [found.name])]
     early = known_early(copy)
     made_functions(copy, [found for found in constants if found.name not in early])
-    wanted = [("as it is", None, None)]
-    # Those that need a build each come last, in the source as it is.
-    constants.sort(key=lambda found: found.name in early)
-    wanted += [(f"{found.key} × {factor}", found, factor) for found in constants for factor in (0.5, 2.0)]
-    binary, built = None, None
-    for number, (key, found, factor) in enumerate(wanted, 1):
-        if key in known:
-            continue
-        print(f"{number} of {len(wanted)}: {key}", file=sys.stderr, flush=True)
-        environment, source = {}, None
-        if found and found.name in early:
-            git("checkout", "--quiet", ".", where=copy)
-            source = with_value(found, changed(found.value, factor))
-            found.path.write_text(source)
-        elif found:
-            values = re.findall(NUMBER, changed(found.value, factor))
-            environment = {"NEAT_CONSTANT": found.key, "NEAT_VALUES": " ".join(values)}
-        if binary is None or source != built:
-            binary, built = build(copy, out), source
-        known[key] = measured(binary, arguments.scenes, out, environment) if binary else FAILED
+    changes = [
+        (key, found, factor)
+        for found in constants
+        for factor in (0.5, 2.0)
+        if (key := f"{found.key} × {factor}") not in known
+    ]
+    at_once = [change for change in changes if change[1].name not in early]
+
+    def measure(key, binary, environment):
+        print(f"{len(known)} done: {key}", file=sys.stderr, flush=True)
+        return key, measured(binary, arguments, environment) if binary else FAILED
+
+    def keep(key, scores):
+        known[key] = scores
         results.write_text(json.dumps(known, indent=1))
+
+    if "as it is" not in known or at_once:
+        binary = build(copy, out)
+        # Alone: it leaves the 2D segments that the others read.
+        if "as it is" not in known:
+            keep(*measure("as it is", binary, {}))
+        with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+            measures = [
+                pool.submit(measure, key, binary, of_environment(found, factor))
+                for key, found, factor in at_once
+            ]
+            for done in concurrent.futures.as_completed(measures):
+                keep(*done.result())
+    # Those that need a build each, in the source as it is.
+    for key, found, factor in changes:
+        if found.name in early:
+            git("checkout", "--quiet", ".", where=copy)
+            found.path.write_text(with_value(found, changed(found.value, factor)))
+            keep(*measure(key, build(copy, out), {}))
     git("worktree", "remove", "--force", copy)
     print(table(known, arguments.scenes))
 
@@ -109,6 +125,7 @@ def parsed():
     parser.add_argument("out", type=pathlib.Path, help="folder for the results")
     parser.add_argument("scenes", type=pathlib.Path, nargs="+", help="scenes with truth")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these constants")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="measure so many values at once")
     return parser.parse_args()
 
 
@@ -233,12 +250,18 @@ def changed(text, factor):
     return re.sub(NUMBER, one, text)
 
 
-def measured(binary, scenes, out, environment):
+def of_environment(found, factor):
+    values = re.findall(NUMBER, changed(found.value, factor))
+    return {"NEAT_CONSTANT": found.key, "NEAT_VALUES": " ".join(values)}
+
+
+def measured(binary, arguments, environment):
     """F of each scene; that there is none, where the assembler gives up."""
-    command = [binary, "--out", out / "scenes", *(scene.resolve() for scene in scenes)]
-    done = subprocess.run(
-        [*map(str, command)], capture_output=True, text=True, env={**os.environ, **environment}
-    )
+    command = [binary, "--out", arguments.out / "scenes", *(scene.resolve() for scene in arguments.scenes)]
+    environment = {**os.environ, **environment}
+    if arguments.jobs > 1:
+        environment["RAYON_NUM_THREADS"] = "1"
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, env=environment)
     return scores(done.stdout) if done.returncode == 0 else FAILED
 
 
