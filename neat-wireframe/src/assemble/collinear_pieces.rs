@@ -7,7 +7,7 @@ use neat_core::LineSegment3;
 /// Pieces of one line lie within so many reaches of it …
 const REACHES: f64 = 3.0;
 /// … and no farther apart along it than this, in pixels.
-const MAX_GAP: f64 = 8.0;
+pub(super) const MAX_GAP: f64 = 8.0;
 
 /// Merges pieces, those that most views show first.
 pub(super) fn merge_pieces(images: &Images, mut lines: Vec<ChosenLine>) -> Vec<ChosenLine> {

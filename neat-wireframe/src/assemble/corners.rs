@@ -14,11 +14,14 @@ use rayon::prelude::*;
 pub(super) const MAX_GAP: f64 = 2.0;
 /// An end may be off along its line by so many pixels, since corners are round and hidden;
 /// with 8 or 24 F1 of photographs with truth is the same …
-const WINDOW_IN_PIXELS: f64 = 16.0;
+pub(super) const WINDOW_IN_PIXELS: f64 = 16.0;
 /// … or by this share of the line, whose ends grow uncertain with its depth …
 const WINDOW_SHARE: f64 = 0.1;
 /// … but never by so much of it that its other end would be meant.
 const MAX_WINDOW_SHARE: f64 = 0.4;
+/// The edgels of edges nearer to each other are neither the one's nor the other's, in pixels: so far
+/// do profiles tell edges apart that edgels do not.
+const TOGETHER: f64 = 3.0;
 /// Squared sine of the least angle under which lines meet in a point, about 4°: faces that bend
 /// away from each other by 6° end in slivers like that.
 const MIN_SQUARED_SINE: f64 = 0.005;
@@ -82,6 +85,7 @@ impl Corners {
 }
 
 /// Two lines that come near each other within their lengths.
+#[derive(Clone, Copy)]
 pub(super) struct Meeting {
     pub lines: [usize; 2],
     /// Parameters of the nearest points.
@@ -113,6 +117,28 @@ pub(super) fn beyond_end(place: f64, length: f64) -> (f64, usize) {
     } else {
         (-place * length, 0)
     }
+}
+
+/// Where a line and another end in a sliver: the place on the line where they meet beyond its end,
+/// and that end. Before it the edgels are those of both, so that ends are known even less well
+/// than others.
+pub(super) fn sliver_end(
+    images: &Images,
+    line: &LineSegment3,
+    other: &LineSegment3,
+    pixel: f64,
+) -> Option<(f64, usize)> {
+    let ([place, on_other], gap) = nearest_points(line, other)?;
+    let [u, v] = [line, other].map(|line| (line.end - line.start).normalize());
+    let window = TOGETHER * pixel / u.cross(&v).norm();
+    let (beyond, end) = beyond_end(place, line.length());
+    let (other_beyond, _) = beyond_end(on_other, other.length());
+    let is_sliver = window > WINDOW_IN_PIXELS * pixel
+        && window < MAX_WINDOW_SHARE * line.length().min(other.length());
+    let meets = gap <= MAX_GAP * images.reach * pixel
+        && (0.0..=window).contains(&beyond)
+        && other_beyond.abs() <= window;
+    (is_sliver && meets).then_some((place, end))
 }
 
 /// Joins the ends of lines.
@@ -289,6 +315,7 @@ impl<'a> Joining<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assemble::test_views::TestViews;
 
     #[test]
     fn nearest_points_of_crossing_lines() {
@@ -304,5 +331,21 @@ mod tests {
         let sliver = line([2.0, 0.0, 0.0], [0.0, 0.2, 0.0]);
         let ([s, t], gap) = nearest_points(&a, &sliver).unwrap();
         assert!((s - 1.0).abs() < 1e-9 && t.abs() < 1e-9 && gap < 1e-9);
+    }
+
+    #[test]
+    fn lines_that_run_into_each_other_end_in_a_sliver() {
+        let cube = TestViews::of_cube(4);
+        let images = cube.images();
+        let line = |a: [f64; 3], b: [f64; 3]| LineSegment3::new(a.into(), b.into());
+        // Under 6°, to half a unit before they meet at 10: there they are 0.05 apart.
+        let long = line([0.0; 3], [9.5, 0.0, 0.0]);
+        let other = line([10.0 - 9.5, 0.95, 0.0], [10.0 - 0.5, 0.05, 0.0]);
+        let (place, end) = sliver_end(&images, &long, &other, 0.02).unwrap();
+        assert!((place - 10.0 / 9.5).abs() < 1e-9 && end == 1);
+        // Too far apart where it ends, in smaller pixels; another edge across is no sliver.
+        assert!(sliver_end(&images, &long, &other, 0.01).is_none());
+        let across = line([10.0, -5.0, 0.0], [10.0, 0.0, 0.0]);
+        assert!(sliver_end(&images, &long, &across, 0.02).is_none());
     }
 }

@@ -1,6 +1,6 @@
 //! Edges are cut where corners and free ends lie on them, and where they cross.
 
-use super::corners::{Corners, beyond_end, nearest_points};
+use super::corners::{Corners, Meeting, beyond_end, nearest_points};
 use super::edge_samples::Images;
 use neat_core::Wireframe3d;
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,46 +27,44 @@ pub(super) fn cut_edges(
     }
     // For each line where it is cut, and by which junction.
     let mut cuts: Vec<Vec<(f64, usize)>> = vec![Vec::new(); count];
-    for meeting in &corners.meetings {
-        for side in 0..2 {
-            let [stem, bar] = [meeting.lines[side], meeting.lines[1 - side]];
-            let [stem_line, bar_line] = [stem, bar].map(|line| corners.edge(line));
-            let (beyond, end) = beyond_end(meeting.places[side], stem_line.length());
-            let junction = corners.ends[stem][end];
-            let is_end = beyond.abs() <= corners.windows[stem];
-            if !is_end
-                || corners.ends[bar].contains(&junction)
-                || cuts[bar].iter().any(|(_, other)| *other == junction)
-            {
-                continue;
-            }
-            let place = if degrees[junction] > 1 {
-                bar_line.line_parameter(&corners.junctions[junction])
-            } else {
-                let Some(([_, place], _)) = nearest_points(&stem_line, &bar_line) else {
-                    continue;
-                };
-                place
-            };
-            let pixel = corners.pixels[stem].max(corners.pixels[bar]);
-            let margin = (MARGIN_IN_PIXELS * pixel / bar_line.length()).min(MAX_MARGIN);
-            let foot = bar_line.point_at(place);
-            let from = if degrees[junction] > 1 {
-                corners.junctions[junction]
-            } else {
-                stem_line.point_at(stem_line.line_parameter(&foot))
-            };
-            let near = (from - foot).norm() <= MAX_GAP * images.reach * pixel;
-            if !(near && margin < place && place < 1.0 - margin) {
-                continue;
-            }
-            if degrees[junction] == 1 {
-                // The end of the stem comes to the bar, which stays straight.
-                corners.junctions[junction] = foot;
-                degrees[junction] += 2;
-            }
-            cuts[bar].push((place, junction));
+    for (meeting, side) in nearest_first(&corners) {
+        let [stem, bar] = [meeting.lines[side], meeting.lines[1 - side]];
+        let [stem_line, bar_line] = [stem, bar].map(|line| corners.edge(line));
+        let (beyond, end) = beyond_end(meeting.places[side], stem_line.length());
+        let junction = corners.ends[stem][end];
+        let is_end = beyond.abs() <= corners.windows[stem];
+        if !is_end
+            || corners.ends[bar].contains(&junction)
+            || cuts[bar].iter().any(|(_, other)| *other == junction)
+        {
+            continue;
         }
+        let place = if degrees[junction] > 1 {
+            bar_line.line_parameter(&corners.junctions[junction])
+        } else {
+            let Some(([_, place], _)) = nearest_points(&stem_line, &bar_line) else {
+                continue;
+            };
+            place
+        };
+        let pixel = corners.pixels[stem].max(corners.pixels[bar]);
+        let margin = (MARGIN_IN_PIXELS * pixel / bar_line.length()).min(MAX_MARGIN);
+        let foot = bar_line.point_at(place);
+        let from = if degrees[junction] > 1 {
+            corners.junctions[junction]
+        } else {
+            stem_line.point_at(stem_line.line_parameter(&foot))
+        };
+        let near = (from - foot).norm() <= MAX_GAP * images.reach * pixel;
+        if !(near && margin < place && place < 1.0 - margin) {
+            continue;
+        }
+        if degrees[junction] == 1 {
+            // The end of the stem comes to the bar, which stays straight.
+            corners.junctions[junction] = foot;
+            degrees[junction] += 2;
+        }
+        cuts[bar].push((place, junction));
     }
     cut_crossings(images, &mut corners, &mut cuts);
     let mut edges = BTreeMap::new();
@@ -88,6 +86,22 @@ pub(super) fn cut_edges(
     let (edges, sources) = edges.into_iter().unzip();
     let junctions = corners.junctions;
     (Wireframe3d { junctions, edges }, sources)
+}
+
+/// Both sides of all meetings, those that lie nearest to the end of their line first: of two edges
+/// that an end could come to, the nearer one is its own.
+fn nearest_first(corners: &Corners) -> Vec<(Meeting, usize)> {
+    let mut sides: Vec<(f64, Meeting, usize)> = (corners.meetings.iter())
+        .flat_map(|meeting| [0, 1].map(|side| (meeting, side)))
+        .map(|(meeting, side)| {
+            let line = meeting.lines[side];
+            let (beyond, _) = beyond_end(meeting.places[side], corners.edge(line).length());
+            (beyond.abs() / corners.pixels[line], *meeting, side)
+        })
+        .collect();
+    sides.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
+    let in_order = sides.into_iter().map(|(_, meeting, side)| (meeting, side));
+    in_order.collect()
 }
 
 /// Cuts edges where they cross each other: there is a junction, though none of them ends.
@@ -153,27 +167,43 @@ mod tests {
     use crate::assemble::test_views::TestViews;
     use neat_core::LineSegment3;
 
-    #[test]
-    fn lines_that_cross_have_a_junction_there_and_those_that_pass_have_none() {
+    fn graph_of(lines: &[[[f64; 3]; 2]]) -> Wireframe3d {
         let cube = TestViews::of_cube(4);
         let images = cube.images();
+        let chosen = |[a, b]: &[[f64; 3]; 2]| ChosenLine {
+            line: LineSegment3::new((*a).into(), (*b).into()),
+            placed: false,
+            evidence: LineEvidence {
+                gain: 9.0,
+                showing: vec![Showing {
+                    view: 0,
+                    chance: 0.1,
+                }],
+            },
+        };
+        let lines: Vec<ChosenLine> = lines.iter().map(chosen).collect();
+        in_order(&cut_edges(&images, find_corners(&images, &lines)).0)
+    }
+
+    #[test]
+    fn of_two_edges_a_free_end_comes_to_the_nearer_one() {
+        let bar = |y: f64| [[-0.4, y, 0.0], [0.6, y, 0.0]];
+        let stem = [[0.1, -0.5, 0.0], [0.1, -0.04, 0.0]];
+        for bars in [[0.0, -0.03], [-0.03, 0.0]] {
+            let graph = graph_of(&[bar(bars[0]), bar(bars[1]), stem]);
+            assert_eq!([graph.junctions.len(), graph.edges.len()], [6, 4]);
+            let corner = nalgebra::Vector3::new(0.1, -0.03, 0.0);
+            assert!(graph.junctions.iter().any(|j| (j - corner).norm() < 1e-9));
+        }
+    }
+
+    #[test]
+    fn lines_that_cross_have_a_junction_there_and_those_that_pass_have_none() {
         let graph = |height: f64| {
-            let lines = [
+            graph_of(&[
                 [[-0.4, 0.0, 0.0], [0.6, 0.0, 0.0]],
                 [[0.1, -0.5, height], [0.1, 0.3, height]],
-            ];
-            let lines = lines.map(|[a, b]| ChosenLine {
-                line: LineSegment3::new(a.into(), b.into()),
-                placed: false,
-                evidence: LineEvidence {
-                    gain: 9.0,
-                    showing: vec![Showing {
-                        view: 0,
-                        chance: 0.1,
-                    }],
-                },
-            });
-            in_order(&cut_edges(&images, find_corners(&images, &lines)).0)
+            ])
         };
         let crossing = graph(0.0);
         assert_eq!([crossing.junctions.len(), crossing.edges.len()], [5, 4]);

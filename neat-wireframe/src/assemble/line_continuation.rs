@@ -2,8 +2,9 @@
 //! of an edge are not those that show its rest.
 
 use super::claimed_edgels::claim_edgels;
-use super::corners::{MAX_GAP, beyond_end, nearest_points};
+use super::corners::{MAX_GAP, WINDOW_IN_PIXELS, beyond_end, nearest_points, sliver_end};
 use super::edge_samples::Images;
+use super::line_evidence::LineEvidence;
 use super::line_selection::ChosenLine;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -37,14 +38,66 @@ pub(super) fn continue_lines(
                 let stretch = LineSegment3::new(line.point_at(*reached), line.point_at(place));
                 let evidence = images.evidence(&stretch, Some(taken), min_evidence);
                 if evidence.gain > min_evidence {
+                    let shown = shown_until(images, &stretch, &evidence);
+                    let stretch = LineSegment3::new(stretch.start, stretch.point_at(shown));
                     claim_edgels(images, &stretch, taken);
-                    *reached = place;
+                    *reached += shown * (place - *reached);
+                    if shown < 1.0 {
+                        break;
+                    }
                 }
             }
         }
         if reached != [0.0, 1.0] {
             let whole = LineSegment3::new(line.point_at(reached[0]), line.point_at(reached[1]));
             chosen.line = images.fit(&whole, chosen.evidence.views(), images.reach);
+        }
+    }
+}
+
+/// How far along a stretch the images show it: all of it unless they speak against the part after
+/// which the views that show most of it do not.
+fn shown_until(images: &Images, stretch: &LineSegment3, evidence: &LineEvidence) -> f64 {
+    let Some(shown) = images.extent(stretch, &evidence.showing) else {
+        return 1.0;
+    };
+    let ends = shown.ends().map(|end| stretch.line_parameter(&end));
+    let until = ends.into_iter().fold(0.0, f64::max);
+    let rest = LineSegment3::new(stretch.point_at(until), stretch.end);
+    let pixels = images.projected_length(&rest, evidence.views());
+    let is_known = until < 1.0 && pixels > WINDOW_IN_PIXELS;
+    if is_known && images.evidence(&rest, None, f64::NEG_INFINITY).gain < 0.0 {
+        until
+    } else {
+        1.0
+    }
+}
+
+/// Lengthens lines to where they end in slivers.
+pub(super) fn meet_in_slivers(images: &Images, lines: &mut [ChosenLine]) {
+    let pixels: Vec<f64> = (lines.iter())
+        .map(|line| images.pixel_size(&line.line, line.evidence.views()))
+        .collect();
+    let before: Vec<LineSegment3> = lines.iter().map(|chosen| chosen.line).collect();
+    let ends_of = |k: usize| {
+        let mut reached = [0.0, 1.0];
+        let others = before.iter().zip(&pixels);
+        let slivers = others.filter_map(|(other, pixel)| {
+            sliver_end(images, &before[k], other, pixel.max(pixels[k]))
+        });
+        for (place, end) in slivers {
+            let farther = |place: f64| (place - 0.5).abs();
+            if reached[end] == [0.0, 1.0][end] || farther(place) < farther(reached[end]) {
+                reached[end] = place;
+            }
+        }
+        reached
+    };
+    let reached: Vec<[f64; 2]> = (0..lines.len()).into_par_iter().map(ends_of).collect();
+    for (chosen, [low, high]) in lines.iter_mut().zip(reached) {
+        if [low, high] != [0.0, 1.0] {
+            let line = chosen.line;
+            chosen.line = LineSegment3::new(line.point_at(low), line.point_at(high));
         }
     }
 }
@@ -113,6 +166,22 @@ mod tests {
         assert!(end_distance(&grown(none), &edge) < 0.01);
         // Others have the edgels.
         assert!(end_distance(&grown(all), &piece) < 1e-9);
+    }
+
+    #[test]
+    fn what_the_images_speak_against_is_not_followed() {
+        let cube = TestViews::of_cube(20);
+        let images = cube.images();
+        let edge = cube_edge(0);
+        let until = |from: f64, to: f64| {
+            let stretch = LineSegment3::new(edge.point_at(from), edge.point_at(to));
+            let evidence = images.evidence(&stretch, None, 0.0);
+            shown_until(&images, &stretch, &evidence)
+        };
+        assert_eq!(until(0.3, 1.0), 1.0);
+        // Two thirds of it are edge.
+        let found = until(0.4, 1.3);
+        assert!((found - 0.6 / 0.9).abs() < 0.05, "{found}");
     }
 
     #[test]

@@ -35,6 +35,7 @@ mod edge_samples;
 mod epipolar_matching;
 mod field_partners;
 mod free_ends;
+mod gaps;
 mod graph_fitting;
 mod graph_segmentation;
 mod hypothesis_scoring;
@@ -80,9 +81,10 @@ use edge_cutting::{cut_edges, in_order};
 use edge_samples::Images;
 use field_partners::FieldLines;
 use free_ends::move_free_ends;
+use gaps::drop_gaps;
 use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Alternatives, Scoring, score_hypotheses};
-use line_continuation::continue_lines;
+use line_continuation::{continue_lines, meet_in_slivers};
 use line_selection::{Selection, select_lines, sure_lines};
 use nalgebra::Matrix4;
 use neat_core::{CircularArc, EdgelMap, LineSegment2};
@@ -90,7 +92,7 @@ use pose_fitting::fit_poses;
 use profiles::place_curves;
 use progress::part;
 use rayon::prelude::*;
-use slab_ends::close_slabs;
+use slab_ends::{close_slabs, close_wedges};
 use std::ops::ControlFlow;
 use tangent_ends::cut_tangent_ends;
 use view_segments::PreparedView;
@@ -311,18 +313,26 @@ fn graph_of(
     lines = merge_pieces(&images, lines);
     progress(CONTINUED)?;
     report.merged_pieces = report.lines - lines.len();
+    let mut response = None;
     if let Some(photographs) = photographs {
         let progress = &mut part(progress, [CONTINUED, PLACED]);
-        place_curves(&images, photographs, &mut lines, arcs, progress)?;
+        response = place_curves(&images, photographs, &mut lines, arcs, progress)?;
     }
     progress(PLACED)?;
+    meet_in_slivers(&images, &mut lines);
     let mut corners = find_corners(&images, &lines);
     report.ends = corners.junctions.len();
     fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
     move_free_ends(&images, &lines, &mut corners);
     report.completed_edges = complete_edges(&images, &mut corners, taken, least);
     report.completed_edges += close_slabs(&images, &mut corners, taken, least);
-    let (mut wireframe, sources) = cut_edges(&images, corners);
+    if let Some(light) = photographs.zip(response) {
+        report.completed_edges += close_wedges(&images, light, &mut corners);
+    }
+    let (mut wireframe, mut sources) = cut_edges(&images, corners);
+    if let Some(light) = photographs.zip(response) {
+        drop_gaps(&images, light, &lines, &mut wireframe, &mut sources);
+    }
     fit_edges(&images, &lines, &sources, &mut wireframe);
     ControlFlow::Continue(in_order(&wireframe))
 }

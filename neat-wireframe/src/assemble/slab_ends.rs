@@ -1,10 +1,13 @@
 //! Short edges across the ends of thin slabs: too short for a detector of segments, but where
 //! two edges run side by side and end together, one is expected, and a few views are enough.
 
-use super::corners::Corners;
+use super::corners::{Corners, WINDOW_IN_PIXELS};
 use super::edge_completion::supported;
 use super::edge_samples::Images;
+use super::profiles::{Asked, Photographs, Response, light_across};
+use crate::statistics::upper_median;
 use nalgebra::Vector3;
+use neat_core::LineSegment3;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -24,6 +27,11 @@ const MIN_COSINE_ALONG: f64 = 0.985;
 const MAX_COSINE_ACROSS: f64 = 0.35;
 /// A slab is as wide at its other end, up to this factor, judged.
 const MAX_TAPER: f64 = 1.5;
+/// The light must speak for an edge across a wedge by so much, in nats, as for outlines: views beside
+/// each other see much the same.
+const BY_LIGHT: f64 = 12.0;
+/// Edges that are longer have edgels of their own, in pixels: as far as ends are uncertain.
+const MAX_WIDTH: f64 = WINDOW_IN_PIXELS;
 /// An edge across that turns by less than this into the next one, 35° (cosine), is a chord of the
 /// rim of a round surface, judged: its slabs are rulings.
 const MIN_COSINE_ON: f64 = 0.82;
@@ -41,14 +49,39 @@ pub(super) fn close_slabs(
         rounding: ROUNDING,
         ..*images
     };
-    let pairs = without_chords(&corners.junctions, slab_ends(corners));
+    let pairs = without_chords(&corners.junctions, slab_ends(corners, MAX_TAPER));
     let found = supported(&images, corners, pairs, taken, min_evidence - EXPECTED);
     corners.add(&found);
     found.len()
 }
 
+/// Adds the edges of a few pixels across what ends like a slab and is none, as its sides do not end
+/// together at the other end, where the light of all views speaks for them; returns how many.
+pub(super) fn close_wedges(
+    images: &Images,
+    (photographs, response): (Photographs<'_>, Response),
+    corners: &mut Corners,
+) -> usize {
+    let views: Vec<usize> = (0..images.views.len()).collect();
+    let asked = |[a, b]: &[usize; 2]| Asked {
+        piece: LineSegment3::new(corners.junctions[*a], corners.junctions[*b]),
+        views: views.clone(),
+    };
+    let pixel = upper_median(&mut corners.pixels.clone());
+    let mut pairs = without_chords(&corners.junctions, slab_ends(corners, f64::INFINITY));
+    pairs.retain(|pair| asked(pair).piece.length() <= MAX_WIDTH * pixel);
+    let pieces: Vec<Asked> = pairs.iter().map(asked).collect();
+    let lights = light_across(images, photographs, response, &pieces);
+    let found = pairs.into_iter().zip(lights);
+    let found: Vec<([usize; 2], f64)> = (found.filter(|(_, light)| light.for_edge() > BY_LIGHT))
+        .map(|(pair, _)| (pair, pixel))
+        .collect();
+    corners.add(&found);
+    found.len()
+}
+
 /// Pairs of junctions, ascending, at which two edges that run side by side end together.
-fn slab_ends(corners: &Corners) -> Vec<[usize; 2]> {
+fn slab_ends(corners: &Corners, max_taper: f64) -> Vec<[usize; 2]> {
     let junctions = &corners.junctions;
     let others = others_at(junctions.len(), &corners.ends);
     let known: BTreeSet<[usize; 2]> = corners.pairs().collect();
@@ -66,7 +99,7 @@ fn slab_ends(corners: &Corners) -> Vec<[usize; 2]> {
             let (u, v) = (from(a, c), from(b, d));
             width < u.norm().min(v.norm())
                 && u.dot(&v) > MIN_COSINE_ALONG * u.norm() * v.norm()
-                && from(c, d).norm() <= MAX_TAPER * width
+                && from(c, d).norm() <= max_taper * width
         };
         (others[a].iter()).any(|c| others[b].iter().any(|d| beside(*c, *d)))
             && (others[a].iter()).all(|c| is_across(from(a, *c)))
@@ -114,10 +147,11 @@ mod tests {
     use super::*;
     use crate::assemble::claimed_edgels::claim_edgels;
     use crate::assemble::corners::find_corners;
+    use crate::assemble::line_evidence::LineEvidence;
+    use crate::assemble::line_selection::ChosenLine;
     use crate::assemble::test_views::{TestViews, chosen};
     use crate::assemble::view_segments::PreparedView;
     use crate::test_scenes::{cameras_on_sphere, views_of_edges};
-    use neat_core::LineSegment3;
     use std::f64::consts::TAU;
 
     /// Half the length of a bar, and about a pixel, in the world.
@@ -202,6 +236,23 @@ mod tests {
         assert_eq!(closed(&bar, smoothed), 8);
         let elsewhere = |side: &LineSegment3| side.map(|end| 0.5 * end);
         assert_eq!(closed(&bar, elsewhere), 0);
+    }
+
+    #[test]
+    fn sides_of_a_wedge_end_together_at_one_end() {
+        let along = [1.0, 0.5].map(|length| {
+            let at = |y: f64| Vector3::new(0.0, y, 10.0 * PIXEL * length);
+            LineSegment3::new(at(0.0), at(length))
+        });
+        let cube = TestViews::of(Vec::new());
+        let lines = along.map(|line| ChosenLine {
+            line,
+            evidence: LineEvidence::default(),
+            placed: true,
+        });
+        let corners = find_corners(&cube.images(), &lines);
+        assert_eq!(slab_ends(&corners, MAX_TAPER), [[0usize; 2]; 0]);
+        assert_eq!(slab_ends(&corners, f64::INFINITY), [[0, 2]]);
     }
 
     #[test]

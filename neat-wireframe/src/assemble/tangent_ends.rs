@@ -3,6 +3,7 @@
 //! Edgels of the arc stay within the noise for long. But noise averages out over all views,
 //! station by station along the line: a parabola that leaves the line at its end is asked for.
 
+use super::corners::sliver_end;
 use super::edge_samples::Images;
 use super::line_evidence::LineEvidence;
 use super::line_fitting::directions_across;
@@ -35,12 +36,30 @@ struct Station {
 /// Takes the arcs at their ends away from lines. `noise` is the standard deviation of an edgel,
 /// in pixels.
 pub(super) fn cut_tangent_ends(images: &Images, lines: &mut [ChosenLine], noise: f64) {
-    lines.par_iter_mut().for_each(|chosen| {
-        let line = images.without_tangent_ends(&chosen.line, &chosen.evidence, noise);
-        if line != chosen.line {
-            chosen.line = images.fit(&line, chosen.evidence.views(), images.reach);
-        }
-    });
+    let before: Vec<LineSegment3> = lines.iter().map(|chosen| chosen.line).collect();
+    lines
+        .par_iter_mut()
+        .enumerate()
+        .for_each(|(index, chosen)| {
+            let mut line = images.without_tangent_ends(&chosen.line, &chosen.evidence, noise);
+            if line == chosen.line {
+                return;
+            }
+            // Edgels of another edge that it ends with in a sliver are no arc.
+            let pixel = images.pixel_size(&line, chosen.evidence.views());
+            let others = (0..before.len()).filter(|other| *other != index);
+            for (_, end) in
+                others.filter_map(|k| sliver_end(images, &chosen.line, &before[k], pixel))
+            {
+                match end {
+                    0 => line.start = chosen.line.start,
+                    _ => line.end = chosen.line.end,
+                }
+            }
+            if line != chosen.line {
+                chosen.line = images.fit(&line, chosen.evidence.views(), images.reach);
+            }
+        });
 }
 
 impl Images<'_> {

@@ -11,7 +11,7 @@ const DARKEST: f64 = 6.0;
 
 /// What files make of light.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Response {
+pub(in crate::assemble) struct Response {
     /// Light is this power of the value in the file.
     pub exponent: f64,
     /// Standard deviation of the blur in pixels.

@@ -21,6 +21,7 @@ mod profile;
 mod pursuit;
 mod response;
 mod rounding;
+mod short_pieces;
 mod step_fit;
 mod step_model;
 mod straight;
@@ -36,7 +37,8 @@ use bundle::Bundle;
 use circular::Circular;
 use curve::Curve;
 use image::RgbImage;
-use light::{LightProfile, Response};
+use light::LightProfile;
+pub(super) use light::Response;
 use neat_core::{Camera, LineSegment3};
 use pixels::Pixels;
 use placed_arcs::{PlacedArc, move_arcs};
@@ -44,6 +46,7 @@ use profile::{Profile, profiles};
 use rayon::prelude::*;
 use response::response_of;
 use rounding::{Widths, is_rounded};
+pub(super) use short_pieces::{Asked, light_across};
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 use straight::Straight;
@@ -119,7 +122,7 @@ pub(super) fn place_curves(
     lines: &mut Vec<ChosenLine>,
     arcs: &mut [FoundArc],
     progress: OnProgress<'_>,
-) -> ControlFlow<()> {
+) -> ControlFlow<(), Option<Response>> {
     let of_line = |(index, chosen): (usize, &ChosenLine)| {
         Straight::new(&chosen.line).map(|straight| (index, straight))
     };
@@ -142,7 +145,7 @@ pub(super) fn place_curves(
         progress(LOOKED * (view + 1) as f64 / images.views.len() as f64)?;
     }
     let Some(response) = response_of(&straight.profiles, &circular.profiles) else {
-        return ControlFlow::Continue(());
+        return ControlFlow::Continue(None);
     };
     let moved_arcs = {
         let progress = &mut part(progress, [LOOKED, ROUND]);
@@ -184,7 +187,7 @@ pub(super) fn place_curves(
         rounded = rounded.len(),
         "curves are placed by profiles"
     );
-    ControlFlow::Continue(())
+    ControlFlow::Continue(Some(response))
 }
 
 /// What profiles tell of a line.
@@ -263,7 +266,7 @@ pub(super) mod tests {
     /// Two bright bars in the plane z = 0, of 28 and 3 pixels, as they reach along x.
     const BARS: [[f64; 2]; 2] = [[-0.3, -0.2], [0.2, 0.211]];
 
-    pub(super) fn cameras() -> Vec<Camera> {
+    pub(in crate::assemble) fn cameras() -> Vec<Camera> {
         let place = |k: u32| {
             let (sin, cos) = (0.9 * f64::from(k)).sin_cos();
             2.5 * Vector3::new(0.7 * cos, 0.5 * sin, 1.0).normalize()
@@ -274,7 +277,7 @@ pub(super) mod tests {
     }
 
     /// The bars, which reach beyond the image: each pixel is the root of the light that falls on it.
-    fn photograph(camera: &Camera) -> RgbImage {
+    pub(in crate::assemble) fn photograph(camera: &Camera) -> RgbImage {
         RgbImage::from_fn(camera.width, camera.height, |x, y| {
             let mut light = 0.0;
             for k in 0..16 {
