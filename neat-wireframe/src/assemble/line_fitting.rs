@@ -30,6 +30,28 @@ impl Images<'_> {
         views: impl Iterator<Item = usize>,
         reach: f64,
     ) -> LineSegment3 {
+        self.problem(line, views, reach)
+            .map_or(*line, |problem| minimise(&problem, *line, &OPTIONS).0)
+    }
+
+    /// Two directions across a line, and what the edgels beside it in `views` know of the places
+    /// of its start and its end along both: the inverse of their covariance, times the variance of
+    /// an edgel in square pixels. `None` if there are too few.
+    pub(super) fn information(
+        &self,
+        line: &LineSegment3,
+        views: impl Iterator<Item = usize>,
+    ) -> Option<(Matrix3x2<f64>, Matrix4<f64>)> {
+        let equations = self.problem(line, views, self.reach)?.linearise(line)?;
+        Some((equations.across, equations.hessian))
+    }
+
+    fn problem(
+        &self,
+        line: &LineSegment3,
+        views: impl Iterator<Item = usize>,
+        reach: f64,
+    ) -> Option<LineProblem<'_>> {
         let mut observations = Vec::new();
         for view in views {
             let edgels = self.edgels_beside(view, line, reach);
@@ -42,17 +64,13 @@ impl Images<'_> {
             });
             observations.extend(observed);
         }
-        if observations.len() < MIN_EDGELS {
-            return *line;
-        }
-        let problem = LineProblem {
+        (observations.len() >= MIN_EDGELS).then_some(LineProblem {
             views: self.views,
             observations,
             loss: Cauchy {
                 scale: LOSS_SCALE * self.reach,
             },
-        };
-        minimise(&problem, *line, &OPTIONS).0
+        })
     }
 }
 

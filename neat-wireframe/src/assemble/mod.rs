@@ -24,6 +24,7 @@ mod candidate_queue;
 mod circle_fitting;
 mod claimed_edgels;
 mod collinear_pieces;
+mod common_directions;
 mod config;
 mod corners;
 mod curve_pieces;
@@ -74,6 +75,7 @@ use crate::paper::NeatLine;
 use crate::{ViewObservation, Wireframe3d};
 use circle_fitting::FoundArc;
 use collinear_pieces::merge_pieces;
+use common_directions::turn_to_common_directions;
 use corners::find_corners;
 use curves::find_arcs;
 use edge_completion::complete_edges;
@@ -307,6 +309,7 @@ fn graph_of(
     let images = selection.images;
     cut_tangent_ends(&images, &mut selection.lines, selection.noise);
     progress(ENDED)?;
+    turn_to_common_directions(&images, selection.noise, &mut selection.lines);
     let mut lines = merge_pieces(&images, selection.lines);
     let (taken, least) = (&mut selection.taken, config.min_evidence);
     continue_lines(&images, &mut lines, taken, least);
@@ -319,6 +322,7 @@ fn graph_of(
         response = place_curves(&images, photographs, &mut lines, arcs, progress)?;
     }
     progress(PLACED)?;
+    report.common_directions = turn_to_common_directions(&images, selection.noise, &mut lines);
     meet_in_slivers(&images, &mut lines);
     let mut corners = find_corners(&images, &lines);
     report.ends = corners.junctions.len();

@@ -49,6 +49,8 @@ pub struct AssembleReport {
     pub outlines: usize,
     /// Lines that were pieces of others.
     pub merged_pieces: usize,
+    /// Directions that several lines have, and were turned to.
+    pub common_directions: usize,
     /// Places where lines end, alone or together.
     pub ends: usize,
     /// Edges between corners that no pair of views could place.
