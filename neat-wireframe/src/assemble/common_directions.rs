@@ -284,13 +284,13 @@ mod tests {
     fn measured(direction: Vector3<f64>, noise: &mut Noise) -> Measured {
         let start = noise.vector();
         let line = LineSegment3::new(start, start + direction.normalize());
-        let across = directions_across(&line).unwrap();
         // The sum of three uniform numbers has variance 1.
         let mut off = || {
             let [x, y, z] = [SIGMAS[0], SIGMAS[1], SIGMAS[0]].map(|s| s * noise.vector().sum());
             Vector3::new(x, y, z)
         };
         let moved = LineSegment3::new(line.start + off(), line.end + off());
+        let across = directions_across(&moved).unwrap();
         let squares = Vector3::new(SIGMAS[0], SIGMAS[1], SIGMAS[0]).map(|s| s * s);
         let of_end = across.transpose() * Matrix3::from_diagonal(&squares) * across;
         let mut covariance = Matrix4::zeros();
