@@ -19,6 +19,7 @@ use super::line_selection::ChosenLine;
 use nalgebra::{Matrix2, Matrix2x4, Matrix3, Matrix3x2, Matrix4, Vector2, Vector3, Vector4};
 use neat_core::LineSegment3;
 use rayon::prelude::*;
+use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::f64::consts::TAU;
 
@@ -159,19 +160,21 @@ impl Measured {
 /// the one that is worth most first.
 fn common_directions(lines: &[&Measured]) -> Vec<CommonDirection> {
     let mut open = vec![true; lines.len()];
-    let proposals: Vec<Proposal> = (lines.par_iter().enumerate())
-        .map(|(line, measured)| Proposal(gain(lines, &open, &measured.direction, 0.0), line))
-        .filter(|proposal| proposal.0 > 0.0)
+    // Numbers above 0 are in the order of their bits.
+    let proposal = |gain: f64, line: usize| (gain > 0.0).then_some((gain.to_bits(), Reverse(line)));
+    let worth = |open: &[bool], line: usize| gain(lines, open, &lines[line].direction, 0.0);
+    let proposals: Vec<(u64, Reverse<usize>)> = (0..lines.len())
+        .into_par_iter()
+        .filter_map(|line| proposal(worth(&open, line), line))
         .collect();
     let mut queue = BinaryHeap::from(proposals);
     let mut directions = Vec::new();
-    while let Some(Proposal(_, line)) = queue.pop() {
+    while let Some((_, Reverse(line))) = queue.pop() {
         // Gains fall as others take lines.
-        let now = gain(lines, &open, &lines[line].direction, 0.0);
-        if now <= 0.0 || queue.peek().is_some_and(|next| next.0 > now) {
-            if now > 0.0 {
-                queue.push(Proposal(now, line));
-            }
+        let now = proposal(worth(&open, line), line);
+        let is_first = |now: &(u64, Reverse<usize>)| queue.peek().is_none_or(|next| next <= now);
+        if !now.as_ref().is_some_and(is_first) {
+            queue.extend(now);
             continue;
         }
         let (direction, scatter) = fitted(lines, &open, lines[line].direction);
@@ -194,29 +197,6 @@ fn common_directions(lines: &[&Measured]) -> Vec<CommonDirection> {
     }
     directions
 }
-
-/// What a direction is worth, and the line that proposes it.
-struct Proposal(f64, usize);
-
-impl Ord for Proposal {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.0.total_cmp(&other.0).then(other.1.cmp(&self.1))
-    }
-}
-
-impl PartialOrd for Proposal {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Proposal {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Proposal {}
 
 /// Deviations of the open lines that may run in a direction.
 fn members<'a>(
