@@ -21,7 +21,6 @@ use neat_core::LineSegment3;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::f64::consts::TAU;
 
 /// Squared distance in standard deviations up to which a line may run in a direction: exceeded by
 /// one of a thousand (chi-square of two degrees of freedom).
@@ -128,14 +127,12 @@ impl Measured {
         let covariance = self.covariance_of_turn + Matrix2::identity() * scatter;
         let information = covariance.try_inverse()?;
         let squared = angles.dot(&(information * angles));
-        // One over the area of the half sphere.
-        let anywhere = -TAU.ln();
-        let here = -TAU.ln() - 0.5 * (covariance.determinant().ln() + squared);
         (squared <= CHI_SQUARE).then_some(Deviation {
             angles,
             information,
             squared,
-            log_ratio: here - anywhere,
+            // The density's 2π is the area of the half sphere.
+            log_ratio: -0.5 * (covariance.determinant().ln() + squared),
         })
     }
 

@@ -68,8 +68,6 @@ mod tests {
     use crate::assemble::line_evidence::{LineEvidence, Showing};
     use crate::assemble::profiles::tests::{cameras, photograph};
     use crate::assemble::test_views::TestViews;
-    use crate::assemble::view_segments::PreparedView;
-    use crate::test_scenes::views_of_edges;
     use nalgebra::Vector3;
     use std::borrow::Cow;
 
@@ -80,11 +78,7 @@ mod tests {
         let beside = [1, 2].map(|k| junctions[k] + Vector3::x());
         let junctions = [&junctions[..], &beside].concat();
         let edges = vec![[0, 1], [1, 2], [2, 3], [1, 4], [2, 5]];
-        let observations = views_of_edges(&cameras, &junctions, &edges);
-        let prepared = observations
-            .iter()
-            .map(|view| PreparedView::new(view, 1.0, 1.0));
-        let views = TestViews::of(prepared.collect());
+        let views = TestViews::of_edges(&cameras, &junctions, &edges);
         let photographs = Photographs {
             image_of: &|view| Some(Cow::Owned(photograph(&cameras[view]))),
             pixel_center: 0.5,

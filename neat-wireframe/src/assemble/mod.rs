@@ -8,9 +8,9 @@
 //! and the next one is chosen by those that are left. Lines that bend are chords of curves, of
 //! which arcs are followed, and those that move aside from view to view are outlines of round
 //! things. Where photographs are at hand, lines are placed where the light changes, and edges
-//! that run beside them are added. Ends that meet become corners, all corners are fitted to the
-//! edgels together, and edges are cut where others end on them or cross them; the pieces, each
-//! by what shows it, are fitted once more.
+//! that run beside them are added. Lines turn to the directions that many have. Ends that meet
+//! become corners, all corners are fitted to the edgels together, and edges are cut where others
+//! end on them or cross them; the pieces, each by what shows it, are fitted once more.
 //!
 //! Edgels are so noisy as the scene's poses and images make them, which the first lines tell;
 //! how near to a line is near are multiples of that. Along edges, ends have windows in

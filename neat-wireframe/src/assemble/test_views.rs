@@ -4,7 +4,8 @@ use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
 use super::view_segments::PreparedView;
 use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
-use neat_core::{EdgelMap, LineSegment3};
+use nalgebra::Vector3;
+use neat_core::{Camera, EdgelMap, LineSegment3};
 
 /// Views whose edgels are their segments.
 pub(super) struct TestViews {
@@ -16,12 +17,20 @@ impl TestViews {
     /// Of all edges of the cube of half side 0.5; segment e shows edge e.
     pub(super) fn of_cube(count: usize) -> Self {
         let (junctions, edges) = cube();
-        let views: Vec<PreparedView> =
-            views_of_edges(&cameras_on_sphere(count), &junctions, &edges)
-                .iter()
-                .map(|observation| PreparedView::new(observation, 1.0, 1.0))
-                .collect();
-        Self::of(views)
+        Self::of_edges(&cameras_on_sphere(count), &junctions, &edges)
+    }
+
+    /// Of all edges between junctions; segment e shows edge e.
+    pub(super) fn of_edges(
+        cameras: &[Camera],
+        junctions: &[Vector3<f64>],
+        edges: &[[usize; 2]],
+    ) -> Self {
+        let observations = views_of_edges(cameras, junctions, edges);
+        let prepared = observations
+            .iter()
+            .map(|observation| PreparedView::new(observation, 1.0, 1.0));
+        Self::of(prepared.collect())
     }
 
     pub(super) fn of(views: Vec<PreparedView>) -> Self {

@@ -257,8 +257,7 @@ fn runs_along(other: &LineSegment3, line: &LineSegment3, gap: f64) -> bool {
 pub(super) mod tests {
     use super::*;
     use crate::assemble::test_views::{TestViews, chosen, end_distance};
-    use crate::assemble::view_segments::PreparedView;
-    use crate::test_scenes::{camera_looking_at_origin, views_of_edges};
+    use crate::test_scenes::camera_looking_at_origin;
     use image::Rgb;
     use nalgebra::{Vector2, Vector3};
     use neat_core::Camera;
@@ -302,11 +301,7 @@ pub(super) mod tests {
         // The last edge was missed; pixels are 0.0036 wide.
         let seen = [-0.297, -0.203, 0.2035].map(edge);
         let junctions: Vec<Vector3<f64>> = seen.iter().flat_map(LineSegment3::ends).collect();
-        let observations = views_of_edges(&cameras, &junctions, &[[0, 1], [2, 3], [4, 5]]);
-        let prepared = observations
-            .iter()
-            .map(|view| PreparedView::new(view, 1.0, 1.0));
-        let views = TestViews::of(prepared.collect());
+        let views = TestViews::of_edges(&cameras, &junctions, &[[0, 1], [2, 3], [4, 5]]);
         let images = views.images();
         let mut lines: Vec<ChosenLine> = seen.iter().map(|line| chosen(&images, line)).collect();
         let photographs: Vec<RgbImage> = cameras.iter().map(photograph).collect();
@@ -330,11 +325,7 @@ pub(super) mod tests {
     fn lines_stay_where_no_image_can_be_had_or_tells() {
         let cameras = cameras();
         let junctions = edge(-0.3).ends();
-        let observations = views_of_edges(&cameras, &junctions, &[[0, 1]]);
-        let prepared = observations
-            .iter()
-            .map(|view| PreparedView::new(view, 1.0, 1.0));
-        let views = TestViews::of(prepared.collect());
+        let views = TestViews::of_edges(&cameras, &junctions, &[[0, 1]]);
         let images = views.images();
         let before = [chosen(&images, &edge(-0.3))];
         for image in [

@@ -25,7 +25,7 @@ const SAMPLES: usize = 5;
 const MIN_LENGTH: f64 = 2.5;
 /// A step may lie so far beside the piece to both sides, in pixels.
 const ASIDE: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
-/// A view shows a step that explains this share of what is there …
+/// A view shows a step that explains this share of what is there, judged …
 const EXPLAINED: f64 = 0.85;
 /// … and none where less is there than this, by usual noise: about a value at each place.
 const FLAT: f64 = 0.08;
@@ -157,19 +157,13 @@ mod tests {
     use super::*;
     use crate::assemble::profiles::tests::{cameras, photograph};
     use crate::assemble::test_views::TestViews;
-    use crate::assemble::view_segments::PreparedView;
-    use crate::test_scenes::views_of_edges;
     use nalgebra::Vector3;
     use std::borrow::Cow;
 
     #[test]
     fn light_tells_pieces_of_four_pixels_from_gaps() {
         let cameras = cameras();
-        let observations = views_of_edges(&cameras, &[Vector3::zeros(), Vector3::y()], &[[0, 1]]);
-        let prepared = observations
-            .iter()
-            .map(|view| PreparedView::new(view, 1.0, 1.0));
-        let views = TestViews::of(prepared.collect());
+        let views = TestViews::of_edges(&cameras, &[Vector3::zeros(), Vector3::y()], &[[0, 1]]);
         let photographs = Photographs {
             image_of: &|view| Some(Cow::Owned(photograph(&cameras[view]))),
             pixel_center: 0.5,
