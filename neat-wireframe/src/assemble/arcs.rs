@@ -142,6 +142,11 @@ impl Images<'_> {
         let found = starts.par_iter().find_map_first(|(start, range)| {
             self.fit_arc(start, evidence, *range, pixel)
                 .filter(|arc| self.goes_on(arc, &straight, evidence, *range, noise))
+                .filter(|arc| {
+                    // A line that lies a little off is left by edgels, too, but not for an arc.
+                    let refitted = self.fit_arc(&straight, evidence, *range, pixel);
+                    refitted.is_none_or(|line| self.bends(arc, &line, evidence, *range, noise))
+                })
         });
         found?.circular()
     }
@@ -188,6 +193,23 @@ impl Images<'_> {
             && one.outer + other.outer > OUTER_ADVANTAGE
             && one.outer.min(other.outer) > 0.0
             && seen as f64 > SEEN * samples as f64
+    }
+
+    /// Whether an arc explains edgels better than the line that explains them best.
+    fn bends(
+        &self,
+        arc: &Arc,
+        line: &Arc,
+        evidence: &LineEvidence,
+        range: [f64; 2],
+        noise: f64,
+    ) -> bool {
+        let nats = |arc: &Arc| -> f64 {
+            (evidence.views())
+                .map(|view| self.cost(arc, view, range, noise).nats)
+                .sum()
+        };
+        nats(line) - nats(arc) > INNER_ADVANTAGE
     }
 
     /// The arc through the edgels beside another one, in the views that show the line.
@@ -257,6 +279,8 @@ impl Images<'_> {
             let [start, end] = found.by_points;
             let [u, v] = arc.across.tr_mul(&(start + end)).into();
             let (place, rise) = (sample.place, arc.rise(sample.place));
+            // What is straight stays so.
+            let rise = if arc.bend == Vector2::zeros() { 0.0 } else { rise };
             let row = [u, v, u * place, v * place, u * rise, v * rise];
             Some((SVector::from(row), -found.distance))
         };
