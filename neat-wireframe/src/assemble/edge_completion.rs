@@ -4,6 +4,8 @@
 use super::claimed_edgels::claim_edgels;
 use super::corners::{Corners, MAX_GAP};
 use super::edge_samples::Images;
+use super::known_tubes::is_of_tubes;
+use super::outlines::Tube;
 use crate::projection::project_in_front;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -20,12 +22,12 @@ pub(super) fn complete_edges(
     images: &Images,
     corners: &mut Corners,
     taken: &mut [Vec<bool>],
-    min_evidence: f64,
+    (min_evidence, tubes): (f64, &[Tube]),
 ) -> usize {
     let known: BTreeSet<[usize; 2]> = corners.pairs().collect();
     let mut pairs = drawn_pairs(images, corners);
     pairs.retain(|pair| !known.contains(pair));
-    let found = supported(images, corners, pairs, taken, min_evidence);
+    let found = supported(images, corners, pairs, taken, (min_evidence, tubes));
     drop_pieces(images, corners, &found);
     corners.add(&found);
     found.len()
@@ -38,13 +40,13 @@ pub(super) fn supported(
     corners: &Corners,
     pairs: Vec<[usize; 2]>,
     taken: &mut [Vec<bool>],
-    least: f64,
+    (least, tubes): (f64, &[Tube]),
 ) -> Vec<([usize; 2], f64)> {
     let junctions = &corners.junctions;
     let line = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
     let mut weighed: Vec<(f64, [usize; 2])> = (pairs.into_par_iter())
         .map(|pair| (images.evidence(&line(pair), Some(taken), least).gain, pair))
-        .filter(|(gain, _)| *gain > least)
+        .filter(|(gain, pair)| *gain > least && !is_of_tubes(images, &line(*pair), tubes, least))
         .collect();
     weighed.sort_by(|(a, i), (b, j)| b.total_cmp(a).then(i.cmp(j)));
     let mut found = Vec::new();
@@ -150,9 +152,9 @@ mod tests {
         let images = cube.images();
         let (mut corners, mut taken) = without(&images, 7);
         assert_eq!(corners.junctions.len(), 8);
-        assert_eq!(complete_edges(&images, &mut corners, &mut taken, 3.0), 1);
+        assert_eq!(complete_edges(&images, &mut corners, &mut taken, (3.0, &[])), 1);
         assert_eq!(corners.ends.len(), 12);
-        assert_eq!(complete_edges(&images, &mut corners, &mut taken, 3.0), 0);
+        assert_eq!(complete_edges(&images, &mut corners, &mut taken, (3.0, &[])), 0);
     }
 
     #[test]

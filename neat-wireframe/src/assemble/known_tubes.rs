@@ -4,6 +4,7 @@
 //! seen by too few to tell a tube by, and lie off its surface, where the tangent planes of these
 //! views meet. But the tube is known by then, and need not be fitted.
 
+use super::claimed_edgels::claim_edgels_of;
 use super::edge_samples::Images;
 use super::line_evidence::LineEvidence;
 use super::line_fitting::directions_across;
@@ -78,6 +79,27 @@ impl Images<'_> {
             found.gain > of_line + ADVANTAGE && shows_as_well(&found, evidence)
         })
     }
+}
+
+/// Of `tubes` that are known without a line, whether a line that touches some has less than
+/// `least` to speak for it that is no outline of theirs.
+pub(super) fn is_of_tubes(images: &Images, line: &LineSegment3, tubes: &[Tube], least: f64) -> bool {
+    let gap = GAP * images.reach * images.pixel_size(line, 0..images.views.len());
+    let touched: Vec<Tube> = (tubes.iter())
+        .filter_map(|tube| tube.touched_by(line, gap))
+        .collect();
+    if touched.is_empty() {
+        return false;
+    }
+    let wide = Images {
+        reach: GAP * images.reach,
+        ..*images
+    };
+    let mut taken = images.nothing_taken();
+    for tube in &touched {
+        claim_edgels_of(&wide, |view| Some(tube.outline(images, view)?.0), &mut taken);
+    }
+    images.evidence(line, Some(&taken), least).gain <= least
 }
 
 #[cfg(test)]

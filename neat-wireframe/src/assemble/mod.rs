@@ -19,6 +19,7 @@
 //! All steps work in a world whose scene ball is the unit ball around the origin.
 
 mod arc_covariance;
+mod arc_tubes;
 mod arcs;
 mod candidate_queue;
 mod circle_fitting;
@@ -73,6 +74,7 @@ pub use report::{AssembleReport, Assembled};
 
 use crate::paper::NeatLine;
 use crate::{ViewObservation, Wireframe3d};
+use arc_tubes::tubes_between;
 use circle_fitting::FoundArc;
 use collinear_pieces::merge_pieces;
 use common_directions::turn_to_common_directions;
@@ -86,10 +88,12 @@ use free_ends::move_free_ends;
 use gaps::drop_gaps;
 use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Alternatives, Scoring, score_hypotheses};
+use known_tubes::is_of_tubes;
 use line_continuation::{continue_lines, meet_in_slivers};
 use line_selection::{Selection, select_lines, sure_lines};
 use nalgebra::Matrix4;
 use neat_core::{CircularArc, EdgelMap, LineSegment2};
+use outlines::Tube;
 use pose_fitting::fit_poses;
 use profiles::place_curves;
 use progress::part;
@@ -202,7 +206,7 @@ pub fn assemble_with_progress(
         report.poses_moved_in_pixels = poses.pixels;
         report.pose_reliability = poses.reliability;
     }
-    let selection = {
+    let mut selection = {
         let progress = &mut part(progress, [SURE, SELECTED]);
         select_lines(images, &alternatives, &sure, config, progress)?
     };
@@ -217,9 +221,20 @@ pub fn assemble_with_progress(
         &mut part(progress, [SELECTED, FOLLOWED]),
     )?;
     report.arcs = arcs.len();
+    let tubes = tubes_between(arcs);
+    let least = config.min_evidence;
+    (selection.lines).retain(|found| !is_of_tubes(&selection.images, &found.line, &tubes, least));
+    report.outlines += report.lines - selection.lines.len();
     let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
-    let wireframe = graph_of(selection, arcs, photographs, config, &mut report, progress)?;
+    let wireframe = graph_of(
+        selection,
+        (arcs, &tubes),
+        photographs,
+        config,
+        &mut report,
+        progress,
+    )?;
     let arc_covariances = covariances_of_arcs(&images, arcs, scene_radius);
     let wireframe = wireframe.map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
@@ -300,7 +315,7 @@ fn proposals(
 /// From lines to a graph: merged, continued, joined at corners, completed, cut and fitted.
 fn graph_of(
     mut selection: Selection<'_>,
-    arcs: &mut [FoundArc],
+    (arcs, tubes): (&mut [FoundArc], &[Tube]),
     photographs: Option<Photographs<'_>>,
     config: &AssembleConfig,
     report: &mut AssembleReport,
@@ -328,8 +343,8 @@ fn graph_of(
     report.ends = corners.junctions.len();
     fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
     move_free_ends(&images, &lines, &mut corners);
-    report.completed_edges = complete_edges(&images, &mut corners, taken, least);
-    report.completed_edges += close_slabs(&images, &mut corners, taken, least);
+    report.completed_edges = complete_edges(&images, &mut corners, taken, (least, tubes));
+    report.completed_edges += close_slabs(&images, &mut corners, taken, (least, tubes));
     if let Some(light) = photographs.zip(response) {
         report.completed_edges += close_wedges(&images, light, &mut corners);
     }
