@@ -21,6 +21,10 @@ const MAX_BEYOND: f64 = 0.15;
 /// … if it has this cosine to the axis, 15°, judged: lines of a cone are as oblique as it is.
 const MIN_COSINE: f64 = 0.966;
 
+/// An outline leaves at most this share of a line's evidence, judged: what a tube is fitted to
+/// does not lie on it exactly.
+const MOST_LEFT: f64 = 0.5;
+
 impl Tube {
     /// The same tube as one of another line; `None` unless they touch, within `gap`.
     fn touched_by(&self, line: &LineSegment3, gap: f64) -> Option<Self> {
@@ -50,6 +54,26 @@ impl Tube {
 }
 
 impl Images<'_> {
+    /// What speaks for a line where the outlines of tubes that it touches have their edgels, as
+    /// good as nothing where it cannot be more than `least`.
+    pub(super) fn beside_outlines(&self, line: &LineSegment3, tubes: &[Tube], least: f64) -> f64 {
+        let wide = Images {
+            reach: GAP * self.reach,
+            ..*self
+        };
+        let mut taken = self.nothing_taken();
+        for tube in tubes {
+            claim_edgels_of(&wide, |view| Some(tube.outline(self, view)?.0), &mut taken);
+        }
+        self.evidence(line, Some(&taken), least).gain
+    }
+
+    /// Whether most of what speaks for a line, `of_line`, are outlines of a tube.
+    pub(super) fn explains_away(&self, tube: &Tube, line: &LineSegment3, of_line: f64) -> bool {
+        let most = MOST_LEFT * of_line.max(0.0);
+        self.beside_outlines(line, &[*tube], most) <= most
+    }
+
     /// The lines that are no outlines of some tubes.
     pub(super) fn without_outlines(
         &self,
@@ -76,30 +100,21 @@ impl Images<'_> {
         touched.any(|tube| {
             let in_view = |view| Some(tube.outline(self, view)?.0);
             let found = self.evidence_of(line, in_view, None, of_line, FREE_VIEWS);
-            found.gain > of_line + ADVANTAGE && shows_as_well(&found, evidence)
+            found.gain > of_line + ADVANTAGE
+                && shows_as_well(&found, evidence)
+                && self.explains_away(&tube, line, of_line)
         })
     }
 }
 
-/// Of `tubes` that are known without a line, whether a line that touches some has less than
-/// `least` to speak for it that is no outline of theirs.
+/// Of `tubes` that are known without a line, whether a line that touches some is nothing but
+/// outlines of theirs.
 pub(super) fn is_of_tubes(images: &Images, line: &LineSegment3, tubes: &[Tube], least: f64) -> bool {
     let gap = GAP * images.reach * images.pixel_size(line, 0..images.views.len());
     let touched: Vec<Tube> = (tubes.iter())
         .filter_map(|tube| tube.touched_by(line, gap))
         .collect();
-    if touched.is_empty() {
-        return false;
-    }
-    let wide = Images {
-        reach: GAP * images.reach,
-        ..*images
-    };
-    let mut taken = images.nothing_taken();
-    for tube in &touched {
-        claim_edgels_of(&wide, |view| Some(tube.outline(images, view)?.0), &mut taken);
-    }
-    images.evidence(line, Some(&taken), least).gain <= least
+    !touched.is_empty() && images.beside_outlines(line, &touched, least) <= least
 }
 
 #[cfg(test)]

@@ -119,7 +119,10 @@ impl Images<'_> {
                 .filter(|found| found.gain > of_line)
         };
         let explains = |tube: &Tube, found: &LineEvidence| {
-            if found.gain <= of_line + ADVANTAGE || !shows_as_well(found, evidence) {
+            if found.gain <= of_line + ADVANTAGE
+                || !shows_as_well(found, evidence)
+                || !self.explains_away(tube, line, of_line)
+            {
                 return false;
             }
             // It may stand for another line.
