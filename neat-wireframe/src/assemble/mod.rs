@@ -60,6 +60,7 @@ mod slab_ends;
 mod straightness;
 mod swept_tubes;
 mod tangent_ends;
+mod tangent_joints;
 mod view_segments;
 mod wander;
 
@@ -101,6 +102,7 @@ use rayon::prelude::*;
 use slab_ends::{close_slabs, close_wedges};
 use std::ops::ControlFlow;
 use tangent_ends::cut_tangent_ends;
+use tangent_joints::join_tangents;
 use view_segments::PreparedView;
 
 /// Views that must agree on a position for it to be proposed; the images decide.
@@ -338,6 +340,7 @@ fn graph_of(
     }
     progress(PLACED)?;
     report.common_directions = turn_to_common_directions(&images, selection.noise, &mut lines);
+    join_tangents(&images, &mut lines, arcs);
     meet_in_slivers(&images, &mut lines);
     let mut corners = find_corners(&images, &lines);
     report.ends = corners.junctions.len();

@@ -1,0 +1,95 @@
+//! Where a straight edge runs into an arc that has been found, both end at the point of tangency.
+//!
+//! Beside that point line and arc lie within the noise of each other for long, over √(2 r δ): no
+//! edgel tells where one becomes the other. But the circle and the line do, each fitted to all of
+//! its edgels: it is the foot of the centre on the line.
+
+use super::circle_fitting::FoundArc;
+use super::corners::MAX_GAP;
+use super::edge_samples::Images;
+use super::line_selection::ChosenLine;
+use nalgebra::Vector3;
+use neat_core::LineSegment3;
+use rayon::prelude::*;
+
+/// Line and arc end within so many lengths over which they cannot be told apart of where they
+/// touch, judged: each may stop short or go on by one.
+const WITHIN: f64 = 2.0;
+
+/// A tangency of an end of a line with an end of an arc.
+struct Joint {
+    /// Of all tangencies of this end the nearest counts.
+    distance: f64,
+    line_end: usize,
+    arc: usize,
+    arc_end: usize,
+    point: Vector3<f64>,
+}
+
+/// Moves the ends of lines and arcs that run into each other to where they touch.
+pub(super) fn join_tangents(images: &Images, lines: &mut [ChosenLine], arcs: &mut [FoundArc]) {
+    let joints: Vec<Vec<Joint>> = (lines.par_iter())
+        .map(|chosen| {
+            let joint = |(index, found): (usize, &FoundArc)| {
+                tangency(&chosen.line, found, MAX_GAP * images.reach * found.pixel, index)
+            };
+            arcs.iter().enumerate().filter_map(joint).collect()
+        })
+        .collect();
+    for (chosen, joints) in lines.iter_mut().zip(joints) {
+        for end in 0..2 {
+            let nearest = (joints.iter().filter(|joint| joint.line_end == end))
+                .min_by(|a, b| a.distance.total_cmp(&b.distance));
+            let Some(joint) = nearest else { continue };
+            match end {
+                0 => chosen.line.start = joint.point,
+                _ => chosen.line.end = joint.point,
+            }
+            let arc = &mut arcs[joint.arc].arc;
+            let angle = arc.angles[joint.arc_end];
+            arc.angles[joint.arc_end] += wrapped(arc.angle_of(&joint.point) - angle);
+        }
+    }
+}
+
+/// The tangency of a line with an arc, where they are at most `gap` apart.
+fn tangency(line: &LineSegment3, found: &FoundArc, gap: f64, index: usize) -> Option<Joint> {
+    let arc = &found.arc;
+    if arc.is_closed() {
+        return None;
+    }
+    let place = line.line_parameter(&arc.center);
+    let point = line.point_at(place);
+    let length = line.length();
+    // The circle's plane holds the line, as far as both go beside each other.
+    let beside = length.min(arc.radius);
+    let out_of_plane = (line.end - line.start).dot(&arc.normal()).abs() / length * beside;
+    if arc.distance_to_circle(&point).max(out_of_plane) > gap {
+        return None;
+    }
+    let within = WITHIN * (2.0 * arc.radius * gap).sqrt();
+    let line_end = usize::from(place > 0.5);
+    let from_line_end = (point - line.ends()[line_end]).norm();
+    let outward = (line.end - line.start) * if line_end == 1 { 1.0 } else { -1.0 };
+    let at_end = |end: usize| {
+        let off = arc.radius * wrapped(arc.angle_of(&point) - arc.angles[end]).abs();
+        let into = arc.tangent_at(arc.angles[end]) * if end == 0 { 1.0 } else { -1.0 };
+        (off, end, into.dot(&outward) > 0.0)
+    };
+    let (from_arc_end, arc_end, goes_on) =
+        [at_end(0), at_end(1)].into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let distance = from_line_end.max(from_arc_end);
+    (goes_on && distance <= within && within < length).then_some(Joint {
+        distance,
+        line_end,
+        arc: index,
+        arc_end,
+        point,
+    })
+}
+
+/// An angle between -π and π.
+fn wrapped(angle: f64) -> f64 {
+    use std::f64::consts::{PI, TAU};
+    (angle + PI).rem_euclid(TAU) - PI
+}
