@@ -1,11 +1,10 @@
 //! Edges that no pair of views can place, since all cameras lie in one plane with them, or
 //! nearly: where 2D segments run from corner to corner, corners that other edges have placed.
 
+use super::arc_tubes::KnownArcs;
 use super::claimed_edgels::claim_edgels;
 use super::corners::{Corners, MAX_GAP};
 use super::edge_samples::Images;
-use super::known_tubes::is_of_tubes;
-use super::outlines::Tube;
 use crate::projection::project_in_front;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -22,12 +21,12 @@ pub(super) fn complete_edges(
     images: &Images,
     corners: &mut Corners,
     taken: &mut [Vec<bool>],
-    (min_evidence, tubes): (f64, &[Tube]),
+    (min_evidence, arcs): (f64, &KnownArcs),
 ) -> usize {
     let known: BTreeSet<[usize; 2]> = corners.pairs().collect();
     let mut pairs = drawn_pairs(images, corners);
     pairs.retain(|pair| !known.contains(pair));
-    let found = supported(images, corners, pairs, taken, (min_evidence, tubes));
+    let found = supported(images, corners, pairs, taken, (min_evidence, arcs));
     drop_pieces(images, corners, &found);
     corners.add(&found);
     found.len()
@@ -40,13 +39,13 @@ pub(super) fn supported(
     corners: &Corners,
     pairs: Vec<[usize; 2]>,
     taken: &mut [Vec<bool>],
-    (least, tubes): (f64, &[Tube]),
+    (least, arcs): (f64, &KnownArcs),
 ) -> Vec<([usize; 2], f64)> {
     let junctions = &corners.junctions;
     let line = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
     let mut weighed: Vec<(f64, [usize; 2])> = (pairs.into_par_iter())
         .map(|pair| (images.evidence(&line(pair), Some(taken), least).gain, pair))
-        .filter(|(gain, pair)| *gain > least && !is_of_tubes(images, &line(*pair), tubes, least))
+        .filter(|(gain, pair)| *gain > least && !arcs.explain(images, &line(*pair), least))
         .collect();
     weighed.sort_by(|(a, i), (b, j)| b.total_cmp(a).then(i.cmp(j)));
     let mut found = Vec::new();
@@ -152,9 +151,9 @@ mod tests {
         let images = cube.images();
         let (mut corners, mut taken) = without(&images, 7);
         assert_eq!(corners.junctions.len(), 8);
-        assert_eq!(complete_edges(&images, &mut corners, &mut taken, (3.0, &[])), 1);
+        assert_eq!(complete_edges(&images, &mut corners, &mut taken, (3.0, &KnownArcs::new(&[]))), 1);
         assert_eq!(corners.ends.len(), 12);
-        assert_eq!(complete_edges(&images, &mut corners, &mut taken, (3.0, &[])), 0);
+        assert_eq!(complete_edges(&images, &mut corners, &mut taken, (3.0, &KnownArcs::new(&[]))), 0);
     }
 
     #[test]

@@ -15,7 +15,7 @@ use neat_core::LineSegment3;
 use rayon::prelude::*;
 
 /// A line touches a tube within so many reaches: as far as lines that meet may be apart …
-const GAP: f64 = 2.0;
+pub(super) const GAP: f64 = 2.0;
 /// … or lies outside by so much of the radius, where tangent planes meet that are 60° apart …
 const MAX_BEYOND: f64 = 0.15;
 /// … if it has this cosine to the axis, 15°, judged: lines of a cone are as oblique as it is.
@@ -27,7 +27,7 @@ const MOST_LEFT: f64 = 0.5;
 
 impl Tube {
     /// The same tube as one of another line; `None` unless they touch, within `gap`.
-    fn touched_by(&self, line: &LineSegment3, gap: f64) -> Option<Self> {
+    pub(super) fn touched_by(&self, line: &LineSegment3, gap: f64) -> Option<Self> {
         let [start, end] = self.axis.map(|axis| self.across * axis);
         let axis = LineSegment3::new(self.line.start + start, self.line.end + end);
         let along = (line.end - line.start).try_normalize(0.0)?;
@@ -54,24 +54,21 @@ impl Tube {
 }
 
 impl Images<'_> {
-    /// What speaks for a line where the outlines of tubes that it touches have their edgels, as
-    /// good as nothing where it cannot be more than `least`.
-    pub(super) fn beside_outlines(&self, line: &LineSegment3, tubes: &[Tube], least: f64) -> f64 {
+    /// Takes the edgels beside the outlines of a tube on one side of it, in all views.
+    pub(super) fn claim_outlines(&self, tube: &Tube, taken: &mut [Vec<bool>]) {
         let wide = Images {
             reach: GAP * self.reach,
             ..*self
         };
-        let mut taken = self.nothing_taken();
-        for tube in tubes {
-            claim_edgels_of(&wide, |view| Some(tube.outline(self, view)?.0), &mut taken);
-        }
-        self.evidence(line, Some(&taken), least).gain
+        claim_edgels_of(&wide, |view| Some(tube.outline(self, view)?.0), taken);
     }
 
     /// Whether most of what speaks for a line, `of_line`, are outlines of a tube.
     pub(super) fn explains_away(&self, tube: &Tube, line: &LineSegment3, of_line: f64) -> bool {
         let most = MOST_LEFT * of_line.max(0.0);
-        self.beside_outlines(line, &[*tube], most) <= most
+        let mut taken = self.nothing_taken();
+        self.claim_outlines(tube, &mut taken);
+        self.evidence(line, Some(&taken), most).gain <= most
     }
 
     /// The lines that are no outlines of some tubes.
@@ -105,16 +102,6 @@ impl Images<'_> {
                 && self.explains_away(&tube, line, of_line)
         })
     }
-}
-
-/// Of `tubes` that are known without a line, whether a line that touches some is nothing but
-/// outlines of theirs.
-pub(super) fn is_of_tubes(images: &Images, line: &LineSegment3, tubes: &[Tube], least: f64) -> bool {
-    let gap = GAP * images.reach * images.pixel_size(line, 0..images.views.len());
-    let touched: Vec<Tube> = (tubes.iter())
-        .filter_map(|tube| tube.touched_by(line, gap))
-        .collect();
-    !touched.is_empty() && images.beside_outlines(line, &touched, least) <= least
 }
 
 #[cfg(test)]

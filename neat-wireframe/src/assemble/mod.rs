@@ -75,7 +75,7 @@ pub use report::{AssembleReport, Assembled};
 
 use crate::paper::NeatLine;
 use crate::{ViewObservation, Wireframe3d};
-use arc_tubes::tubes_between;
+use arc_tubes::KnownArcs;
 use circle_fitting::FoundArc;
 use collinear_pieces::merge_pieces;
 use common_directions::turn_to_common_directions;
@@ -89,12 +89,10 @@ use free_ends::move_free_ends;
 use gaps::drop_gaps;
 use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Alternatives, Scoring, score_hypotheses};
-use known_tubes::is_of_tubes;
 use line_continuation::{continue_lines, meet_in_slivers};
 use line_selection::{Selection, select_lines, sure_lines};
 use nalgebra::Matrix4;
 use neat_core::{CircularArc, EdgelMap, LineSegment2};
-use outlines::Tube;
 use pose_fitting::fit_poses;
 use profiles::place_curves;
 use progress::part;
@@ -223,15 +221,15 @@ pub fn assemble_with_progress(
         &mut part(progress, [SELECTED, FOLLOWED]),
     )?;
     report.arcs = arcs.len();
-    let tubes = tubes_between(arcs);
+    let known = KnownArcs::new(arcs);
     let least = config.min_evidence;
-    (selection.lines).retain(|found| !is_of_tubes(&selection.images, &found.line, &tubes, least));
+    (selection.lines).retain(|found| !known.explain(&selection.images, &found.line, least));
     report.outlines += report.lines - selection.lines.len();
     let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
     let wireframe = graph_of(
         selection,
-        (arcs, &tubes),
+        (arcs, &known),
         photographs,
         config,
         &mut report,
@@ -317,7 +315,7 @@ fn proposals(
 /// From lines to a graph: merged, continued, joined at corners, completed, cut and fitted.
 fn graph_of(
     mut selection: Selection<'_>,
-    (arcs, tubes): (&mut [FoundArc], &[Tube]),
+    (arcs, known): (&mut [FoundArc], &KnownArcs),
     photographs: Option<Photographs<'_>>,
     config: &AssembleConfig,
     report: &mut AssembleReport,
@@ -346,8 +344,8 @@ fn graph_of(
     report.ends = corners.junctions.len();
     fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
     move_free_ends(&images, &lines, &mut corners);
-    report.completed_edges = complete_edges(&images, &mut corners, taken, (least, tubes));
-    report.completed_edges += close_slabs(&images, &mut corners, taken, (least, tubes));
+    report.completed_edges = complete_edges(&images, &mut corners, taken, (least, known));
+    report.completed_edges += close_slabs(&images, &mut corners, taken, (least, known));
     if let Some(light) = photographs.zip(response) {
         report.completed_edges += close_wedges(&images, light, &mut corners);
     }

@@ -1,10 +1,10 @@
 //! Short edges across the ends of thin slabs: too short for a detector of segments, but where
 //! two edges run side by side and end together, one is expected, and a few views are enough.
 
+use super::arc_tubes::KnownArcs;
 use super::corners::{Corners, WINDOW_IN_PIXELS};
 use super::edge_completion::supported;
 use super::edge_samples::Images;
-use super::outlines::Tube;
 use super::profiles::{Asked, Photographs, Response, light_across};
 use crate::statistics::upper_median;
 use nalgebra::Vector3;
@@ -43,7 +43,7 @@ pub(super) fn close_slabs(
     images: &Images,
     corners: &mut Corners,
     taken: &mut [Vec<bool>],
-    (min_evidence, tubes): (f64, &[Tube]),
+    (min_evidence, arcs): (f64, &KnownArcs),
 ) -> usize {
     let images = Images {
         reach: images.reach.max(REACH),
@@ -51,7 +51,7 @@ pub(super) fn close_slabs(
         ..*images
     };
     let pairs = without_chords(&corners.junctions, slab_ends(corners, MAX_TAPER));
-    let found = supported(&images, corners, pairs, taken, (min_evidence - EXPECTED, tubes));
+    let found = supported(&images, corners, pairs, taken, (min_evidence - EXPECTED, arcs));
     corners.add(&found);
     found.len()
 }
@@ -211,7 +211,7 @@ mod tests {
         }
         let mut corners = find_corners(&images, &along);
         let before = corners.ends.len();
-        let count = close_slabs(&images, &mut corners, &mut taken, (3.0, &[]));
+        let count = close_slabs(&images, &mut corners, &mut taken, (3.0, &KnownArcs::new(&[])));
         assert_eq!(corners.ends.len(), before + count);
         for [a, b] in &corners.ends[before..] {
             let found = LineSegment3::new(corners.junctions[*a], corners.junctions[*b]);
