@@ -19,6 +19,7 @@
 //! All steps work in a world whose scene ball is the unit ball around the origin.
 
 mod arc_covariance;
+mod arc_joints;
 mod arc_tubes;
 mod arcs;
 mod candidate_queue;
@@ -60,7 +61,6 @@ mod slab_ends;
 mod straightness;
 mod swept_tubes;
 mod tangent_ends;
-mod tangent_joints;
 mod view_segments;
 mod wander;
 
@@ -75,6 +75,7 @@ pub use report::{AssembleReport, Assembled};
 
 use crate::paper::NeatLine;
 use crate::{ViewObservation, Wireframe3d};
+use arc_joints::{end_on_arcs, join_tangents};
 use arc_tubes::KnownArcs;
 use circle_fitting::FoundArc;
 use collinear_pieces::merge_pieces;
@@ -100,7 +101,6 @@ use rayon::prelude::*;
 use slab_ends::{close_slabs, close_wedges};
 use std::ops::ControlFlow;
 use tangent_ends::cut_tangent_ends;
-use tangent_joints::join_tangents;
 use view_segments::PreparedView;
 
 /// Views that must agree on a position for it to be proposed; the images decide.
@@ -344,6 +344,7 @@ fn graph_of(
     report.ends = corners.junctions.len();
     fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
     move_free_ends(&images, &lines, &mut corners);
+    end_on_arcs(&images, &mut corners, arcs);
     report.completed_edges = complete_edges(&images, &mut corners, taken, (least, known));
     report.completed_edges += close_slabs(&images, &mut corners, taken, (least, known));
     if let Some(light) = photographs.zip(response) {

@@ -1,11 +1,12 @@
-//! Where a straight edge runs into an arc that has been found, both end at the point of tangency.
+//! Where straight edges meet arcs.
 //!
-//! Beside that point line and arc lie within the noise of each other for long, over √(2 r δ): no
+//! An edge that runs into an arc ends with it at the point of tangency. Beside that point line and arc lie within the noise of each other for long, over √(2 r δ): no
 //! edgel tells where one becomes the other. But the circle and the line do, each fitted to all of
-//! its edgels: it is the foot of the centre on the line.
+//! its edgels: it is the foot of the centre on the line. Across an arc, an edge that meets nothing
+//! else ends on it.
 
 use super::circle_fitting::FoundArc;
-use super::corners::MAX_GAP;
+use super::corners::{Corners, MAX_GAP};
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
 use nalgebra::Vector3;
@@ -86,6 +87,65 @@ fn tangency(line: &LineSegment3, found: &FoundArc, gap: f64, index: usize) -> Op
         arc_end,
         point,
     })
+}
+
+/// An end of an arc within so many pixels of where a line meets it is there, as for 2D segments.
+const ARC_END: f64 = 5.0;
+/// Squared sine of the angle under which a line crosses an arc at least, 15°, judged: else it
+/// runs into it.
+const MIN_SQUARED_SINE: f64 = 0.067;
+/// Steps from the line to the circle and back: each lowers the distance by the cosine.
+const STEPS: usize = 100;
+
+/// Moves ends of lines that meet nothing else to the arcs that they end on.
+pub(super) fn end_on_arcs(images: &Images, corners: &mut Corners, arcs: &mut [FoundArc]) {
+    let mut degrees = vec![0; corners.junctions.len()];
+    for junction in corners.ends.iter().flatten() {
+        degrees[*junction] += 1;
+    }
+    for line in 0..corners.ends.len() {
+        let edge = corners.edge(line);
+        let gap = MAX_GAP * images.reach * corners.pixels[line];
+        for (end, junction) in corners.ends[line].into_iter().enumerate() {
+            if degrees[junction] > 1 {
+                continue;
+            }
+            let nearest = (arcs.iter().enumerate())
+                .filter_map(|(index, found)| {
+                    let point = crossing(&edge, end, found, gap)?;
+                    Some(((point - corners.junctions[junction]).norm(), index, point))
+                })
+                .filter(|(distance, ..)| *distance <= corners.windows[line])
+                .min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((_, index, point)) = nearest {
+                corners.junctions[junction] = point;
+                let near = ARC_END * arcs[index].pixel;
+                let arc = &mut arcs[index].arc;
+                let off = arc.angles.map(|angle| wrapped(arc.angle_of(&point) - angle));
+                let arc_end = usize::from(off[1].abs() < off[0].abs());
+                if !arc.is_closed() && off[arc_end].abs() * arc.radius <= near {
+                    arc.angles[arc_end] += off[arc_end];
+                }
+            }
+        }
+    }
+}
+
+/// The point near the end of an edge where it crosses an arc.
+fn crossing(edge: &LineSegment3, end: usize, found: &FoundArc, gap: f64) -> Option<Vector3<f64>> {
+    let arc = &found.arc;
+    let along = (edge.end - edge.start).try_normalize(0.0)?;
+    let mut point = edge.ends()[end];
+    for _ in 0..STEPS {
+        let on_circle = arc.point_at(arc.angle_of(&point));
+        point = edge.start + (on_circle - edge.start).dot(&along) * along;
+    }
+    let angle = arc.angle_of(&point);
+    let cosine = arc.tangent_at(angle).dot(&along);
+    let is_across = 1.0 - cosine * cosine >= MIN_SQUARED_SINE;
+    let is_on_arc = arc.distance_to_circle(&point) <= gap
+        && arc.contains(angle, ARC_END * found.pixel / arc.radius);
+    (is_across && is_on_arc).then_some(point)
 }
 
 /// An angle between -π and π.
