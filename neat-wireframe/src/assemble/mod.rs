@@ -98,7 +98,7 @@ use pose_fitting::fit_poses;
 use profiles::place_curves;
 use progress::part;
 use rayon::prelude::*;
-use slab_ends::{close_slabs, close_wedges};
+use slab_ends::{close_slabs, close_by_light};
 use std::ops::ControlFlow;
 use tangent_ends::cut_tangent_ends;
 use view_segments::PreparedView;
@@ -348,7 +348,7 @@ fn graph_of(
     report.completed_edges = complete_edges(&images, &mut corners, taken, (least, known));
     report.completed_edges += close_slabs(&images, &mut corners, taken, (least, known));
     if let Some(light) = photographs.zip(response) {
-        report.completed_edges += close_wedges(&images, light, &mut corners);
+        report.completed_edges += close_by_light(&images, light, &lines, &mut corners);
     }
     let (mut wireframe, mut sources) = cut_edges(&images, corners);
     if let Some(light) = photographs.zip(response) {

@@ -5,6 +5,7 @@ use super::arc_tubes::KnownArcs;
 use super::corners::{Corners, WINDOW_IN_PIXELS};
 use super::edge_completion::supported;
 use super::edge_samples::Images;
+use super::line_selection::ChosenLine;
 use super::profiles::{Asked, Photographs, Response, light_across};
 use crate::statistics::upper_median;
 use nalgebra::Vector3;
@@ -28,9 +29,9 @@ const MIN_COSINE_ALONG: f64 = 0.985;
 const MAX_COSINE_ACROSS: f64 = 0.35;
 /// A slab is as wide at its other end, up to this factor, judged.
 const MAX_TAPER: f64 = 1.5;
-/// The light must speak for an edge across a wedge by so much, in nats, as for outlines: views beside
-/// each other see much the same.
-const BY_LIGHT: f64 = 12.0;
+/// Light must speak for an edge across a wedge by so much, in nats, as for outlines: views beside
+/// each other see much the same. Across a slab one is expected, and light need not speak against it.
+const OF_WEDGE: f64 = 12.0;
 /// Edges that are longer have edgels of their own, in pixels: as far as ends are uncertain.
 const MAX_WIDTH: f64 = WINDOW_IN_PIXELS;
 /// An edge across that turns by less than this into the next one, 35° (cosine), is a chord of the
@@ -56,29 +57,47 @@ pub(super) fn close_slabs(
     found.len()
 }
 
-/// Adds the edges of a few pixels across what ends like a slab and is none, as its sides do not end
-/// together at the other end, where the light of all views speaks for them; returns how many.
-pub(super) fn close_wedges(
+/// Adds the edges of a few pixels across the ends of slabs, and across what ends like one and is
+/// none, as its sides do not end together at the other end, where light speaks for them; returns how
+/// many.
+pub(super) fn close_by_light(
     images: &Images,
     (photographs, response): (Photographs<'_>, Response),
+    lines: &[ChosenLine],
     corners: &mut Corners,
 ) -> usize {
-    let views: Vec<usize> = (0..images.views.len()).collect();
+    let views_of = views_of_junctions(corners, lines);
     let asked = |[a, b]: &[usize; 2]| Asked {
         piece: LineSegment3::new(corners.junctions[*a], corners.junctions[*b]),
-        views: views.clone(),
+        views: (views_of[*a].intersection(&views_of[*b]).copied()).collect(),
     };
     let pixel = upper_median(&mut corners.pixels.clone());
     let mut pairs = without_chords(&corners.junctions, slab_ends(corners, f64::INFINITY));
     pairs.retain(|pair| asked(pair).piece.length() <= MAX_WIDTH * pixel);
     let pieces: Vec<Asked> = pairs.iter().map(asked).collect();
     let lights = light_across(images, photographs, response, &pieces);
+    let slabs: BTreeSet<[usize; 2]> = slab_ends(corners, MAX_TAPER).into_iter().collect();
+    let least = |pair: &[usize; 2]| if slabs.contains(pair) { 0.0 } else { OF_WEDGE };
     let found = pairs.into_iter().zip(lights);
-    let found: Vec<([usize; 2], f64)> = (found.filter(|(_, light)| light.for_edge() > BY_LIGHT))
+    let found: Vec<([usize; 2], f64)> = found
+        .filter(|(pair, light)| light.for_edge() > least(pair))
         .map(|(pair, _)| (pair, pixel))
         .collect();
     corners.add(&found);
     found.len()
+}
+
+/// For each junction the views that show a line which ends there: others may not see it.
+fn views_of_junctions(corners: &Corners, lines: &[ChosenLine]) -> Vec<BTreeSet<usize>> {
+    let mut views = vec![BTreeSet::new(); corners.junctions.len()];
+    for (ends, source) in corners.ends.iter().zip(&corners.sources) {
+        let showing = source.into_iter().flat_map(|line| lines[*line].evidence.views());
+        let showing: Vec<usize> = showing.collect();
+        for end in ends {
+            views[*end].extend(&showing);
+        }
+    }
+    views
 }
 
 /// Pairs of junctions, ascending, at which two edges that run side by side end together.
@@ -149,7 +168,6 @@ mod tests {
     use crate::assemble::claimed_edgels::claim_edgels;
     use crate::assemble::corners::find_corners;
     use crate::assemble::line_evidence::LineEvidence;
-    use crate::assemble::line_selection::ChosenLine;
     use crate::assemble::test_views::{TestViews, chosen};
     use crate::assemble::view_segments::PreparedView;
     use crate::test_scenes::{cameras_on_sphere, views_of_edges};
