@@ -12,6 +12,7 @@ use super::line_selection::ChosenLine;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
 
 /// Line and arc end within so many lengths over which they cannot be told apart of where they
 /// touch, judged: each may stop short or go on by one.
@@ -32,7 +33,12 @@ pub(super) fn join_tangents(images: &Images, lines: &mut [ChosenLine], arcs: &mu
     let joints: Vec<Vec<Joint>> = (lines.par_iter())
         .map(|chosen| {
             let joint = |(index, found): (usize, &FoundArc)| {
-                tangency(&chosen.line, found, MAX_GAP * images.reach * found.pixel, index)
+                tangency(
+                    &chosen.line,
+                    found,
+                    MAX_GAP * images.reach * found.pixel,
+                    index,
+                )
             };
             arcs.iter().enumerate().filter_map(joint).collect()
         })
@@ -77,8 +83,9 @@ fn tangency(line: &LineSegment3, found: &FoundArc, gap: f64, index: usize) -> Op
         let into = arc.tangent_at(arc.angles[end]) * if end == 0 { 1.0 } else { -1.0 };
         (off, end, into.dot(&outward) > 0.0)
     };
-    let (from_arc_end, arc_end, goes_on) =
-        [at_end(0), at_end(1)].into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (from_arc_end, arc_end, goes_on) = [at_end(0), at_end(1)]
+        .into_iter()
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
     let distance = from_line_end.max(from_arc_end);
     (goes_on && distance <= within && within < length).then_some(Joint {
         distance,
@@ -121,7 +128,9 @@ pub(super) fn end_on_arcs(images: &Images, corners: &mut Corners, arcs: &mut [Fo
                 corners.junctions[junction] = point;
                 let near = ARC_END * arcs[index].pixel;
                 let arc = &mut arcs[index].arc;
-                let off = arc.angles.map(|angle| wrapped(arc.angle_of(&point) - angle));
+                let off = arc
+                    .angles
+                    .map(|angle| wrapped(arc.angle_of(&point) - angle));
                 let arc_end = usize::from(off[1].abs() < off[0].abs());
                 if !arc.is_closed() && off[arc_end].abs() * arc.radius <= near {
                     arc.angles[arc_end] += off[arc_end];
@@ -150,6 +159,105 @@ fn crossing(edge: &LineSegment3, end: usize, found: &FoundArc, gap: f64) -> Opti
 
 /// An angle between -π and π.
 fn wrapped(angle: f64) -> f64 {
-    use std::f64::consts::{PI, TAU};
     (angle + PI).rem_euclid(TAU) - PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::corners::find_corners;
+    use crate::assemble::test_views::{TestViews, chosen};
+    use crate::test_scenes::cameras_on_sphere;
+    use neat_core::CircularArc;
+    use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+
+    /// A quarter of a circle from (0.3, 0, 0.1) on, which runs along y there, to (0, 0.3, 0.1).
+    fn quarter() -> FoundArc {
+        FoundArc {
+            arc: CircularArc {
+                center: Vector3::new(0.0, 0.0, 0.1),
+                axes: [Vector3::x(), Vector3::y()],
+                radius: 0.3,
+                angles: [0.0, FRAC_PI_2],
+            },
+            gain: 100.0,
+            pixel: 0.003,
+            sectors: Vec::new(),
+            covariance: None,
+        }
+    }
+
+    fn line(start: [f64; 3], end: [f64; 3]) -> LineSegment3 {
+        LineSegment3::new(start.into(), end.into())
+    }
+
+    /// What `join` makes of one line and the quarter of a circle, which begins 5° late.
+    fn joined(line: &LineSegment3) -> (LineSegment3, CircularArc) {
+        let junctions = line.ends();
+        let views = TestViews::of_edges(&cameras_on_sphere(20), &junctions, &[[0, 1]]);
+        let images = views.images();
+        let mut lines = [chosen(&images, line)];
+        let mut arcs = [quarter()];
+        arcs[0].arc.angles[0] += 0.08;
+        join_tangents(&images, &mut lines, &mut arcs);
+        (lines[0].line, arcs[0].arc)
+    }
+
+    #[test]
+    fn a_line_and_the_arc_it_runs_into_end_where_they_touch() {
+        let corner = Vector3::new(0.3, 0.0, 0.1);
+        for end in [-0.02, 0.02] {
+            for turned in [false, true] {
+                let edge = line([0.3, -0.4, 0.1], [0.3, end, 0.1]);
+                let (found, arc) = joined(&if turned { edge.reversed() } else { edge });
+                let [start, end] = found.ends();
+                let joint = if turned { start } else { end };
+                assert!((joint - corner).norm() < 1e-9);
+                assert!((arc.point_at(arc.angles[0]) - corner).norm() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn lines_that_touch_an_arc_otherwise_are_left_alone() {
+        let as_it_was = quarter().arc.angles[0] + 0.08;
+        for other in [
+            // Backwards, out of the plane, beside the circle, and far from its end.
+            line([0.3, 0.4, 0.1], [0.3, 0.02, 0.1]),
+            line([0.3, -0.4, 0.2], [0.3, 0.0, 0.1]),
+            line([0.31, -0.4, 0.1], [0.31, 0.0, 0.1]),
+            line([0.3, -0.5, 0.1], [0.3, -0.3, 0.1]),
+        ] {
+            let (found, arc) = joined(&other);
+            assert_eq!(found, other);
+            assert!((arc.angles[0] - as_it_was).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_free_end_comes_to_the_arc_that_it_crosses() {
+        let ends_at = |edge: LineSegment3, late: f64| {
+            let views = TestViews::of_edges(&cameras_on_sphere(20), &edge.ends(), &[[0, 1]]);
+            let images = views.images();
+            let mut corners = find_corners(&images, &[chosen(&images, &edge)]);
+            let mut arcs = [quarter()];
+            arcs[0].arc.angles[0] += late;
+            end_on_arcs(&images, &mut corners, &mut arcs);
+            (corners.edge(0).end, arcs[0].arc.angles[0])
+        };
+        // Along x at the middle of the arc, short of it and beyond.
+        let middle = 0.3 * FRAC_PI_4.sin();
+        for short in [-0.01, 0.01] {
+            let edge = line([-0.2, middle, 0.1], [middle - short, middle, 0.1]);
+            let (end, angle) = ends_at(edge, 0.0);
+            assert!((end - Vector3::new(middle, middle, 0.1)).norm() < 1e-9);
+            assert!(angle.abs() < 1e-12);
+        }
+        // At its end, which comes along.
+        let (end, angle) = ends_at(line([-0.2, 0.0, 0.1], [0.29, 0.0, 0.1]), 0.02);
+        assert!((end - Vector3::new(0.3, 0.0, 0.1)).norm() < 1e-9 && angle.abs() < 1e-9);
+        // Above it.
+        let above = line([-0.2, middle, 0.2], [middle - 0.01, middle, 0.2]);
+        assert_eq!(ends_at(above, 0.0).0, above.end);
+    }
 }

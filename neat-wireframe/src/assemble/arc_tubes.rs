@@ -41,7 +41,9 @@ impl KnownArcs {
         let touched: Vec<Tube> = touched.collect();
         let is_chord = |found: &&FoundArc| {
             let near = NEAR_IN_PIXELS * found.pixel;
-            let mut points = [0.1, 0.5, 0.9].map(|place| line.point_at(place)).into_iter();
+            let mut points = [0.1, 0.5, 0.9]
+                .map(|place| line.point_at(place))
+                .into_iter();
             points.all(|point| {
                 let angle = found.arc.angle_of(&point);
                 found.arc.distance_to_circle(&point) < near
@@ -85,7 +87,9 @@ fn tube_between(one: &CircularArc, other: &CircularArc, pixel: f64) -> Option<Tu
     let off_axis = |arc: &CircularArc| between.cross(&arc.normal()).norm();
     let turned = |arc: &CircularArc| arc.radius * arc.normal().cross(&between).norm() / length;
     let gap = GAP_IN_PIXELS * pixel;
-    let is_coaxial = [one, other].iter().all(|arc| off_axis(arc).max(turned(arc)) <= gap);
+    let is_coaxial = [one, other]
+        .iter()
+        .all(|arc| off_axis(arc).max(turned(arc)) <= gap);
     if length < MIN_LENGTH_IN_PIXELS * pixel || !is_coaxial {
         return None;
     }
@@ -100,4 +104,88 @@ fn tube_between(one: &CircularArc, other: &CircularArc, pixel: f64) -> Option<Tu
         taper: 0.5 * (other.radius - one.radius),
         ..Tube::touching(&line, across, -axis[0])
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::circle_fitting::tests::{arc, views_of_arcs};
+    use crate::assemble::outlines::tests::{generator, views_of_cone};
+    use crate::assemble::test_views::{TestViews, cube_edge};
+    use std::f64::consts::TAU;
+
+    /// A rim around the z axis.
+    fn rim(radius: f64, z: f64, angles: [f64; 2]) -> FoundArc {
+        FoundArc {
+            arc: CircularArc {
+                center: Vector3::new(0.0, 0.0, z),
+                axes: [Vector3::x(), Vector3::y()],
+                radius,
+                angles,
+            },
+            gain: 100.0,
+            pixel: 0.003,
+            sectors: Vec::new(),
+            covariance: None,
+        }
+    }
+
+    #[test]
+    fn rims_of_one_axis_make_a_tube() {
+        let quarter = [0.0, 1.5];
+        let low = rim(0.1, -0.2, quarter).arc;
+        let tube = |other: &CircularArc| tube_between(&low, other, 0.003);
+        let cone = tube(&rim(0.3, 0.2, [2.0, 3.0]).arc).unwrap();
+        assert!((cone.radius - 0.2).abs() < 1e-12 && (cone.taper - 0.1).abs() < 1e-12);
+        let up = rim(0.1, 0.2, quarter).arc;
+        // Another axis, a turned one, and none.
+        let moved = up.map(|point| point + Vector3::new(0.01, 0.0, 0.0));
+        let turned = CircularArc {
+            axes: [Vector3::x(), Vector3::new(0.0, 0.8, 0.6)],
+            ..up
+        };
+        assert!(tube(&up).is_some() && tube(&moved).is_none());
+        assert!(tube(&turned).is_none() && tube(&low).is_none());
+    }
+
+    #[test]
+    fn outlines_between_rims_are_explained_and_edges_are_not() {
+        for radii in [[0.15, 0.15], [0.1, 0.3]] {
+            let views = views_of_cone(radii);
+            let images = views.images();
+            let line = generator(radii, [0.6, 0.8]);
+            assert!(images.evidence(&line, None, 0.0).gain > 3.0);
+            let [start, end] = [line.start.z, line.end.z];
+            let rims = [
+                rim(radii[0], start, [0.0, TAU]),
+                rim(radii[1], end, [0.0, TAU]),
+            ];
+            assert!(KnownArcs::new(&rims).explain(&images, &line, 3.0));
+            assert!(!KnownArcs::new(&rims[..1]).explain(&images, &line, 3.0));
+        }
+        // An edge of a cube, on the cylinder around it.
+        let cube = TestViews::of_cube(60);
+        let upright = (0..12).map(cube_edge);
+        let upright = upright.filter(|edge| edge.start.xy() == edge.end.xy());
+        let radius = 0.5_f64.sqrt();
+        let known = KnownArcs::new(&[-0.5, 0.5].map(|z| rim(radius, z, [0.0, TAU])));
+        for edge in upright {
+            assert!(!known.explain(&cube.images(), &edge, 3.0));
+        }
+    }
+
+    #[test]
+    fn chords_of_an_arc_are_explained() {
+        let views = views_of_arcs(20, |_| arc(1.5));
+        let images = views.images();
+        let found = FoundArc {
+            arc: arc(1.5),
+            ..rim(0.3, 0.0, [0.0, 1.5])
+        };
+        let known = KnownArcs::new(&[found]);
+        let chord = LineSegment3::new(arc(1.5).point_at(0.5), arc(1.5).point_at(0.62));
+        assert!(images.evidence(&chord, None, 0.0).gain > 3.0);
+        assert!(known.explain(&images, &chord, 3.0));
+        assert!(!known.explain(&images, &cube_edge(0), 3.0));
+    }
 }

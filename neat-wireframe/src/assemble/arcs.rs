@@ -280,7 +280,11 @@ impl Images<'_> {
             let [u, v] = arc.across.tr_mul(&(start + end)).into();
             let (place, rise) = (sample.place, arc.rise(sample.place));
             // What is straight stays so.
-            let rise = if arc.bend == Vector2::zeros() { 0.0 } else { rise };
+            let rise = if arc.bend == Vector2::zeros() {
+                0.0
+            } else {
+                rise
+            };
             let row = [u, v, u * place, v * place, u * rise, v * rise];
             Some((SVector::from(row), -found.distance))
         };
@@ -363,6 +367,36 @@ mod tests {
     fn sides_of_a_polygon_are_no_chords() {
         let (points, views) = polygon(24, 0.4);
         assert!(!is_chord(&views, &LineSegment3::new(points[0], points[1])));
+    }
+
+    #[test]
+    fn an_arc_must_beat_the_line_that_is_fitted_to_its_edgels() {
+        let (points, circle) = polygon(120, 0.3);
+        let chord = LineSegment3::new(points[0], points[6]);
+        let chord = chord.map(|end| end + 0.5 * (points[3] - chord.point_at(0.5)));
+        let cube = TestViews::of_cube(20);
+        // Turned by what edgels may lie beside a line.
+        let edge = cube_edge(3);
+        let turned = LineSegment3::new(edge.start, edge.end + Vector3::new(0.0, 0.002, 0.002));
+        for (views, line, is_arc) in [(circle, chord, true), (cube, turned, false)] {
+            let images = views.images();
+            let evidence = images.evidence(&line, None, 0.0);
+            let pixel = images.pixel_size(&line, evidence.views());
+            let straight = Arc::straight(&line, directions_across(&line).unwrap());
+            let fitted = |start: &Arc| images.fit_arc(start, &evidence, RANGES[0], pixel).unwrap();
+            let height = images.bend(&line, &evidence).bow.unwrap().height;
+            let arc = fitted(&straight.bent(pixel * height));
+            assert!(
+                images
+                    .fit_arc(&straight, &evidence, RANGES[0], pixel)
+                    .unwrap()
+                    .bend
+                    .norm()
+                    == 0.0
+            );
+            let bends = images.bends(&arc, &fitted(&straight), &evidence, RANGES[0], NOISE);
+            assert_eq!(bends, is_arc);
+        }
     }
 
     #[test]

@@ -35,7 +35,8 @@ pub(super) fn claim_edgels_of(
             let count = (CLAIM_DENSITY * projected.length())
                 .ceil()
                 .clamp(8.0, 4000.0);
-            let Some(samples) = images.samples(view, &line, [0.0, 1.0], Some(count as usize)) else {
+            let Some(samples) = images.samples(view, &line, [0.0, 1.0], Some(count as usize))
+            else {
                 return;
             };
             take_beside(map, &samples, images.reach, taken);

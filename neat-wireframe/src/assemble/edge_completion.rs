@@ -151,9 +151,25 @@ mod tests {
         let images = cube.images();
         let (mut corners, mut taken) = without(&images, 7);
         assert_eq!(corners.junctions.len(), 8);
-        assert_eq!(complete_edges(&images, &mut corners, &mut taken, (3.0, &KnownArcs::new(&[]))), 1);
+        assert_eq!(
+            complete_edges(
+                &images,
+                &mut corners,
+                &mut taken,
+                (3.0, &KnownArcs::new(&[]))
+            ),
+            1
+        );
         assert_eq!(corners.ends.len(), 12);
-        assert_eq!(complete_edges(&images, &mut corners, &mut taken, (3.0, &KnownArcs::new(&[]))), 0);
+        assert_eq!(
+            complete_edges(
+                &images,
+                &mut corners,
+                &mut taken,
+                (3.0, &KnownArcs::new(&[]))
+            ),
+            0
+        );
     }
 
     #[test]

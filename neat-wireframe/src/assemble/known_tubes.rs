@@ -155,6 +155,8 @@ mod tests {
         assert!(images.is_outline_of(&line, &evidence, &tubes));
         assert!(!images.is_outline_of(&line, &evidence, &[tube([0.1, 0.1], [1.0, 0.0])]));
         assert!(!images.is_outline_of(&line, &evidence, &[]));
+        let of_line = images.evidence(&line, None, 0.0).gain;
+        assert!(images.explains_away(&tubes[0], &line, of_line));
 
         // An edge that touches a tube stays one.
         let cube = TestViews::of_cube(60);
@@ -165,5 +167,6 @@ mod tests {
         let tubes = [0.0_f64, 1.0, 2.0, 3.0]
             .map(|turn| Tube::touching(&edge, across, 0.1 * Vector2::new(turn.cos(), turn.sin())));
         assert!(!images.is_outline_of(&edge, &evidence, &tubes));
+        assert!((tubes.iter()).all(|tube| !images.explains_away(tube, &edge, evidence.gain)));
     }
 }

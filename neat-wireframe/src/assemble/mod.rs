@@ -98,7 +98,7 @@ use pose_fitting::fit_poses;
 use profiles::place_curves;
 use progress::part;
 use rayon::prelude::*;
-use slab_ends::{close_slabs, close_by_light};
+use slab_ends::{close_by_light, close_slabs};
 use std::ops::ControlFlow;
 use tangent_ends::cut_tangent_ends;
 use view_segments::PreparedView;

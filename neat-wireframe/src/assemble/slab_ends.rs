@@ -52,7 +52,13 @@ pub(super) fn close_slabs(
         ..*images
     };
     let pairs = without_chords(&corners.junctions, slab_ends(corners, MAX_TAPER));
-    let found = supported(&images, corners, pairs, taken, (min_evidence - EXPECTED, arcs));
+    let found = supported(
+        &images,
+        corners,
+        pairs,
+        taken,
+        (min_evidence - EXPECTED, arcs),
+    );
     corners.add(&found);
     found.len()
 }
@@ -91,7 +97,9 @@ pub(super) fn close_by_light(
 fn views_of_junctions(corners: &Corners, lines: &[ChosenLine]) -> Vec<BTreeSet<usize>> {
     let mut views = vec![BTreeSet::new(); corners.junctions.len()];
     for (ends, source) in corners.ends.iter().zip(&corners.sources) {
-        let showing = source.into_iter().flat_map(|line| lines[*line].evidence.views());
+        let showing = source
+            .into_iter()
+            .flat_map(|line| lines[*line].evidence.views());
         let showing: Vec<usize> = showing.collect();
         for end in ends {
             views[*end].extend(&showing);
@@ -229,7 +237,12 @@ mod tests {
         }
         let mut corners = find_corners(&images, &along);
         let before = corners.ends.len();
-        let count = close_slabs(&images, &mut corners, &mut taken, (3.0, &KnownArcs::new(&[])));
+        let count = close_slabs(
+            &images,
+            &mut corners,
+            &mut taken,
+            (3.0, &KnownArcs::new(&[])),
+        );
         assert_eq!(corners.ends.len(), before + count);
         for [a, b] in &corners.ends[before..] {
             let found = LineSegment3::new(corners.junctions[*a], corners.junctions[*b]);
