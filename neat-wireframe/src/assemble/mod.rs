@@ -172,12 +172,7 @@ pub fn assemble_with_progress(
         photographs,
         field_lines,
     } = *witnesses;
-    let usable = scene_radius.is_normal() && scene_radius > 0.0;
-    let fits = |views: usize| views == observations.len();
-    if !usable
-        || !(edgels.is_empty() || fits(edgels.len()))
-        || !field_lines.is_none_or(|lines| fits(lines.len()))
-    {
+    if !is_usable(witnesses, scene_radius) {
         return ControlFlow::Continue(Assembled::default());
     }
     let _span = tracing::debug_span!("assemble", views = observations.len()).entered();
@@ -206,7 +201,7 @@ pub fn assemble_with_progress(
         report.poses_moved_in_pixels = poses.pixels;
         report.pose_reliability = poses.reliability;
     }
-    let mut selection = {
+    let selection = {
         let progress = &mut part(progress, [SURE, SELECTED]);
         select_lines(images, &alternatives, &sure, config, progress)?
     };
@@ -221,20 +216,9 @@ pub fn assemble_with_progress(
         &mut part(progress, [SELECTED, FOLLOWED]),
     )?;
     report.arcs = arcs.len();
-    let known = KnownArcs::new(arcs);
-    let least = config.min_evidence;
-    (selection.lines).retain(|found| !known.explain(&selection.images, &found.line, least));
-    report.outlines += report.lines - selection.lines.len();
     let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
-    let wireframe = graph_of(
-        selection,
-        (arcs, &known),
-        photographs,
-        config,
-        &mut report,
-        progress,
-    )?;
+    let wireframe = graph_of(selection, arcs, photographs, config, &mut report, progress)?;
     let arc_covariances = covariances_of_arcs(&images, arcs, scene_radius);
     let wireframe = wireframe.map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
@@ -248,6 +232,15 @@ pub fn assemble_with_progress(
         report,
         refined_cameras,
     })
+}
+
+fn is_usable(witnesses: &Witnesses<'_>, scene_radius: f64) -> bool {
+    let fits = |views: usize| views == witnesses.views.len();
+    let edgels = witnesses.edgels.len();
+    scene_radius.is_normal()
+        && scene_radius > 0.0
+        && (edgels == 0 || fits(edgels))
+        && witnesses.field_lines.is_none_or(|lines| fits(lines.len()))
 }
 
 /// What there is to go by.
@@ -315,18 +308,23 @@ fn proposals(
 /// From lines to a graph: merged, continued, joined at corners, completed, cut and fitted.
 fn graph_of(
     mut selection: Selection<'_>,
-    (arcs, known): (&mut [FoundArc], &KnownArcs),
+    arcs: &mut [FoundArc],
     photographs: Option<Photographs<'_>>,
     config: &AssembleConfig,
     report: &mut AssembleReport,
     progress: OnProgress<'_>,
 ) -> ControlFlow<(), Wireframe3d> {
     let images = selection.images;
+    let least = config.min_evidence;
+    let known = &KnownArcs::new(arcs);
+    (selection.lines).retain(|found| !known.explain(&images, &found.line, least));
+    report.outlines += report.lines - selection.lines.len();
+    report.lines = selection.lines.len();
     cut_tangent_ends(&images, &mut selection.lines, selection.noise);
     progress(ENDED)?;
     turn_to_common_directions(&images, selection.noise, &mut selection.lines);
     let mut lines = merge_pieces(&images, selection.lines);
-    let (taken, least) = (&mut selection.taken, config.min_evidence);
+    let taken = &mut selection.taken;
     continue_lines(&images, &mut lines, taken, least);
     lines = merge_pieces(&images, lines);
     progress(CONTINUED)?;
