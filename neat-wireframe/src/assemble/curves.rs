@@ -8,6 +8,7 @@ use super::edge_samples::Images;
 use super::line_selection::{Chord, Selection, select_chords};
 use super::progress::OnProgress;
 use super::proposals;
+use super::rounded_corners::rounded_corners;
 use super::view_segments::PreparedView;
 use super::wander::retain_steady;
 use neat_core::CircularArc;
@@ -48,6 +49,7 @@ pub(super) fn find_arcs(
         config,
         progress,
     )?);
+    chords.extend(rounded_corners(images, &selection.lines));
     tracing::debug!(pieces, chords = chords.len(), "curves are proposed");
     let mut taken = images.nothing_taken();
     for line in &selection.lines {

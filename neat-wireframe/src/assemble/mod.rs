@@ -57,6 +57,7 @@ mod profiles;
 mod progress;
 mod projected_line;
 mod report;
+mod rounded_corners;
 mod slab_ends;
 mod straightness;
 mod swept_tubes;
