@@ -10,7 +10,7 @@ use super::corners::{Corners, MAX_GAP};
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
 use nalgebra::Vector3;
-use neat_core::LineSegment3;
+use neat_core::{CircularArc, LineSegment3};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
@@ -59,35 +59,59 @@ pub(super) fn join_tangents(images: &Images, lines: &mut [ChosenLine], arcs: &mu
     }
 }
 
-/// The tangency of a line with an arc, where they are at most `gap` apart.
-fn tangency(line: &LineSegment3, found: &FoundArc, gap: f64, index: usize) -> Option<Joint> {
-    let arc = &found.arc;
-    if arc.is_closed() {
-        return None;
-    }
+/// Whether a line ends where it touches the circle of an arc.
+pub(super) fn runs_into(images: &Images, line: &LineSegment3, found: &FoundArc) -> bool {
+    touch(line, &found.arc, MAX_GAP * images.reach * found.pixel)
+        .is_some_and(|touch| touch.distance <= touch.within)
+}
+
+/// Where a line touches a circle.
+struct Touch {
+    point: Vector3<f64>,
+    line_end: usize,
+    /// From the end of the line, and how much of it is nothing.
+    distance: f64,
+    within: f64,
+}
+
+/// Where a line touches the circle of an arc, if they are at most `gap` apart there.
+fn touch(line: &LineSegment3, arc: &CircularArc, gap: f64) -> Option<Touch> {
     let place = line.line_parameter(&arc.center);
     let point = line.point_at(place);
     let length = line.length();
     // The circle's plane holds the line, as far as both go beside each other.
     let beside = length.min(arc.radius);
     let out_of_plane = (line.end - line.start).dot(&arc.normal()).abs() / length * beside;
-    if arc.distance_to_circle(&point).max(out_of_plane) > gap {
-        return None;
-    }
-    let within = WITHIN * (2.0 * arc.radius * gap).sqrt();
     let line_end = usize::from(place > 0.5);
-    let from_line_end = (point - line.ends()[line_end]).norm();
-    let outward = (line.end - line.start) * if line_end == 1 { 1.0 } else { -1.0 };
+    let touch = Touch {
+        point,
+        line_end,
+        distance: (point - line.ends()[line_end]).norm(),
+        within: WITHIN * (2.0 * arc.radius * gap).sqrt(),
+    };
+    (arc.distance_to_circle(&point).max(out_of_plane) <= gap && touch.within < length)
+        .then_some(touch)
+}
+
+/// The tangency of a line with an arc, where they are at most `gap` apart.
+fn tangency(line: &LineSegment3, found: &FoundArc, gap: f64, index: usize) -> Option<Joint> {
+    let arc = &found.arc;
+    let Touch {
+        point,
+        line_end,
+        distance,
+        within,
+    } = touch(line, arc, gap).filter(|_| !arc.is_closed())?;
+    let outward = (line.end - line.start) * [-1.0, 1.0][line_end];
     let at_end = |end: usize| {
         let off = arc.radius * wrapped(arc.angle_of(&point) - arc.angles[end]).abs();
-        let into = arc.tangent_at(arc.angles[end]) * if end == 0 { 1.0 } else { -1.0 };
+        let into = arc.tangent_at(arc.angles[end]) * [1.0, -1.0][end];
         (off, end, into.dot(&outward) > 0.0)
     };
-    let (from_arc_end, arc_end, goes_on) = [at_end(0), at_end(1)]
-        .into_iter()
-        .min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let distance = from_line_end.max(from_arc_end);
-    (goes_on && distance <= within && within < length).then_some(Joint {
+    let nearer = |a: &(f64, usize, bool), b: &(f64, usize, bool)| a.0.total_cmp(&b.0);
+    let (from_arc_end, arc_end, goes_on) = [at_end(0), at_end(1)].into_iter().min_by(nearer)?;
+    let distance = distance.max(from_arc_end);
+    (goes_on && distance <= within).then_some(Joint {
         distance,
         line_end,
         arc: index,
@@ -168,7 +192,6 @@ mod tests {
     use crate::assemble::corners::find_corners;
     use crate::assemble::test_views::{TestViews, chosen};
     use crate::test_scenes::cameras_on_sphere;
-    use neat_core::CircularArc;
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
     /// A quarter of a circle from (0.3, 0, 0.1) on, which runs along y there, to (0, 0.3, 0.1).

@@ -4,6 +4,7 @@
 //! tell of a bow. But two straight edges in one plane that stop equally far before they meet tell
 //! of an arc that touches both.
 
+use super::arc_joints::runs_into;
 use super::corners::{MAX_GAP, beyond_end, nearest_points};
 use super::edge_samples::Images;
 use super::line_selection::{Chord, ChosenLine};
@@ -42,9 +43,12 @@ pub(super) fn rounded_corners(images: &Images, lines: &[ChosenLine]) -> Vec<Chor
                 let arc = rounding(&one.line, &other.line, images.reach * pixel, pixel)?;
                 let shown = |view: &usize| other.evidence.views().any(|other| other == *view);
                 let views: Vec<usize> = one.evidence.views().filter(shown).collect();
-                let found = (views.len() >= MIN_VIEWS).then(|| wide.follow_arc(&arc, &views))??;
-                Some(Chord {
-                    arc: found.arc,
+                let guess = (views.len() >= MIN_VIEWS).then(|| wide.follow_arc(&arc, &views))??;
+                let found = images.follow_arc(&guess.arc, &views)?;
+                // Or it is something else.
+                let touches = |line: &ChosenLine| runs_into(images, &line.line, &found);
+                (touches(one) && touches(other)).then_some(Chord {
+                    arc: guess.arc,
                     views,
                 })
             })
