@@ -65,6 +65,13 @@ pub(super) fn runs_into(images: &Images, line: &LineSegment3, found: &FoundArc) 
         .is_some_and(|touch| touch.distance <= touch.within)
 }
 
+/// The place along a line at which an arc goes on from it, at most `gap` apart.
+pub(super) fn touching_place(line: &LineSegment3, arc: &CircularArc, gap: f64) -> Option<f64> {
+    let touch = touch(line, arc, gap)?;
+    let angle = arc.angle_of(&touch.point);
+    (arc.contains(angle, touch.within / arc.radius)).then(|| line.line_parameter(&touch.point))
+}
+
 /// Where a line touches a circle.
 struct Touch {
     point: Vector3<f64>,

@@ -1,6 +1,8 @@
 //! Lines followed beyond their ends to what they would meet there: the views that show most
 //! of an edge are not those that show its rest.
 
+use super::arc_joints::touching_place;
+use super::circle_fitting::FoundArc;
 use super::claimed_edgels::claim_edgels;
 use super::corners::{MAX_GAP, WINDOW_IN_PIXELS, beyond_end, nearest_points, sliver_end};
 use super::edge_samples::Images;
@@ -20,6 +22,7 @@ const MOST_AHEAD: usize = 4;
 pub(super) fn continue_lines(
     images: &Images,
     lines: &mut [ChosenLine],
+    arcs: &[FoundArc],
     taken: &mut [Vec<bool>],
     min_evidence: f64,
 ) {
@@ -28,7 +31,7 @@ pub(super) fn continue_lines(
         .collect();
     let ahead: Vec<[Vec<f64>; 2]> = (0..lines.len())
         .into_par_iter()
-        .map(|k| places_ahead(images, lines, &pixels, k))
+        .map(|k| places_ahead(images, lines, arcs, &pixels, k))
         .collect();
     for (chosen, ahead) in lines.iter_mut().zip(ahead) {
         let line = chosen.line;
@@ -104,18 +107,25 @@ pub(super) fn meet_in_slivers(images: &Images, lines: &mut [ChosenLine]) {
 
 /// Parameters, nearest first, where a line would meet others before its start and beyond its
 /// end.
-fn places_ahead(images: &Images, lines: &[ChosenLine], pixels: &[f64], k: usize) -> [Vec<f64>; 2] {
+fn places_ahead(
+    images: &Images,
+    lines: &[ChosenLine],
+    arcs: &[FoundArc],
+    pixels: &[f64],
+    k: usize,
+) -> [Vec<f64>; 2] {
     let line = &lines[k].line;
     let length = line.length();
+    let gap = |pixel: f64| MAX_GAP * images.reach * pixel.max(pixels[k]);
+    let of_lines = (lines.iter().zip(pixels))
+        .flat_map(|(other, pixel)| meeting_places(line, &other.line, gap(*pixel)));
+    let of_arcs =
+        (arcs.iter()).filter_map(|found| touching_place(line, &found.arc, gap(found.pixel)));
     let mut ahead = [Vec::new(), Vec::new()];
-    for (other, pixel) in lines.iter().zip(pixels) {
-        let pixel = pixel.max(pixels[k]);
-        let gap = MAX_GAP * images.reach * pixel;
-        for place in meeting_places(line, &other.line, gap) {
-            let (beyond, end) = beyond_end(place, length);
-            if beyond > 0.0 && beyond <= BEYOND * length {
-                ahead[end].push(place);
-            }
+    for place in of_lines.chain(of_arcs) {
+        let (beyond, end) = beyond_end(place, length);
+        if beyond > 0.0 && beyond <= BEYOND * length {
+            ahead[end].push(place);
         }
     }
     for (places, sign) in ahead.iter_mut().zip([-1.0, 1.0]) {
@@ -160,7 +170,7 @@ mod tests {
         let all: Vec<Vec<bool>> = none.iter().map(|map| vec![true; map.len()]).collect();
         let grown = |mut taken: Vec<Vec<bool>>| {
             let mut lines = lines.clone();
-            continue_lines(&images, &mut lines, &mut taken, 3.0);
+            continue_lines(&images, &mut lines, &[], &mut taken, 3.0);
             lines[11].line
         };
         assert!(end_distance(&grown(none), &edge) < 0.01);

@@ -326,7 +326,7 @@ fn graph_of(
     turn_to_common_directions(&images, selection.noise, &mut selection.lines);
     let mut lines = merge_pieces(&images, selection.lines);
     let taken = &mut selection.taken;
-    continue_lines(&images, &mut lines, taken, least);
+    continue_lines(&images, &mut lines, arcs, taken, least);
     lines = merge_pieces(&images, lines);
     progress(CONTINUED)?;
     report.merged_pieces = report.lines - lines.len();
