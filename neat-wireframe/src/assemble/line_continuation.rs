@@ -154,7 +154,9 @@ fn meeting_places(line: &LineSegment3, other: &LineSegment3, gap: f64) -> Vec<f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assemble::line_fitting::directions_across;
     use crate::assemble::test_views::{TestViews, chosen, cube_edge, end_distance};
+    use neat_core::CircularArc;
 
     #[test]
     fn a_line_grows_to_what_it_meets_where_edgels_speak_for_it() {
@@ -176,6 +178,38 @@ mod tests {
         assert!(end_distance(&grown(none), &edge) < 0.01);
         // Others have the edgels.
         assert!(end_distance(&grown(all), &piece) < 1e-9);
+    }
+
+    #[test]
+    fn a_line_grows_to_the_arc_that_it_runs_into() {
+        let cube = TestViews::of_cube(20);
+        let images = cube.images();
+        let edge = cube_edge(0);
+        let along = (edge.end - edge.start).normalize();
+        let across = directions_across(&edge).unwrap();
+        // From the end of the edge on, toward one side of it.
+        let axes = [-across.column(0).into_owned(), along];
+        let radius = 0.1;
+        let found = FoundArc {
+            arc: CircularArc {
+                center: edge.end - radius * axes[0],
+                axes,
+                radius,
+                angles: [0.0, 1.5],
+            },
+            gain: 100.0,
+            pixel: 0.003,
+            sectors: Vec::new(),
+            covariance: None,
+        };
+        let piece = LineSegment3::new(edge.start, edge.point_at(0.7));
+        let grown = |arcs: &[FoundArc]| {
+            let mut lines = [chosen(&images, &piece)];
+            continue_lines(&images, &mut lines, arcs, &mut images.nothing_taken(), 3.0);
+            end_distance(&lines[0].line, &edge)
+        };
+        assert!(grown(&[found]) < 0.01);
+        assert!(grown(&[]) > 0.2);
     }
 
     #[test]

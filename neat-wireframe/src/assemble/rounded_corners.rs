@@ -95,7 +95,7 @@ mod tests {
     fn an_arc_touches_both_lines() {
         let at = |x: f64, y: f64| Vector3::new(x, y, 0.2);
         let line = |a: Vector3<f64>, b: Vector3<f64>| LineSegment3::new(a, b);
-        let (pixel, reach) = (0.002, 1e-3);
+        let (pixel, reach) = (0.002, 1e-3_f64);
         // A quarter of a circle of radius 0.1 beside the corner at the origin: at 0.1 it touches,
         // and has left the line by the reach at 0.1 - √(2 · 0.1 · 0.001).
         let short = 0.1 - (0.2 * reach).sqrt();
