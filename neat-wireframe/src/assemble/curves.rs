@@ -49,12 +49,12 @@ pub(super) fn find_arcs(
         config,
         progress,
     )?);
-    chords.extend(rounded_corners(images, &selection.lines));
-    tracing::debug!(pieces, chords = chords.len(), "curves are proposed");
     let mut taken = images.nothing_taken();
     for line in &selection.lines {
         claim_edgels(images, &line.line, &mut taken);
     }
+    chords.extend(rounded_corners(images, &selection.lines, &taken));
+    tracing::debug!(pieces, chords = chords.len(), "curves are proposed");
     let grown = grown_arcs(images, &chords);
     let mut arcs = chosen_arcs(images, grown, taken, config.min_evidence);
     retain_steady(images, &mut arcs);

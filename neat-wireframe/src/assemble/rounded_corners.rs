@@ -23,33 +23,75 @@ const OFF_IN_PIXELS: f64 = 1.5;
 /// Fewer views that show both edges tell of no arc, as of no line.
 const MIN_VIEWS: usize = 3;
 
-/// The arcs between lines that stop before they meet, as edgels beside them say.
-pub(super) fn rounded_corners(images: &Images, lines: &[ChosenLine]) -> Vec<Chord> {
+/// Two ends of lines, each `2 * line + end`, and the arc between them.
+struct Rounding {
+    ends: [usize; 2],
+    /// How far both stop before they would meet.
+    short: f64,
+    arc: CircularArc,
+}
+
+/// The arcs between lines that stop before they meet, where edgels that no line has `taken` speak for
+/// them. An end runs into one arc, the nearest.
+pub(super) fn rounded_corners(
+    images: &Images,
+    lines: &[ChosenLine],
+    taken: &[Vec<bool>],
+) -> Vec<Chord> {
+    let all = roundings(images, lines);
+    let mut nearest = vec![f64::INFINITY; 2 * lines.len()];
+    for rounding in &all {
+        for end in rounding.ends {
+            nearest[end] = rounding.short.min(nearest[end]);
+        }
+    }
+    let is_nearest =
+        |Rounding { ends, short, .. }: &Rounding| ends.iter().all(|end| *short <= nearest[*end]);
     let wide = Images {
         reach: images.reach.max(OFF_IN_PIXELS),
         ..*images
     };
+    (all.par_iter())
+        .filter(|rounding| is_nearest(rounding))
+        // Sides of a polygon have others between them.
+        .filter(|Rounding { arc, .. }| {
+            let third = arc.sweep() / 3.0;
+            let angles = [arc.angles[0] + third, arc.angles[1] - third];
+            wide.evidence_of_sector(arc, angles, Some(taken)).gain > 0.0
+        })
+        .filter_map(|rounding| {
+            let [one, other] = rounding.ends.map(|end| &lines[end / 2]);
+            let shown = |view: &usize| other.evidence.views().any(|other| other == *view);
+            let views: Vec<usize> = one.evidence.views().filter(shown).collect();
+            let guess =
+                (views.len() >= MIN_VIEWS).then(|| wide.follow_arc(&rounding.arc, &views))??;
+            let found = images.follow_arc(&guess.arc, &views)?;
+            // Or it is something else.
+            let touches = |line: &ChosenLine| runs_into(images, &line.line, &found);
+            (touches(one) && touches(other)).then_some(Chord {
+                arc: guess.arc,
+                views,
+            })
+        })
+        .collect()
+}
+
+fn roundings(images: &Images, lines: &[ChosenLine]) -> Vec<Rounding> {
     let pixels: Vec<f64> = (lines.iter())
         .map(|line| images.pixel_size(&line.line, line.evidence.views()))
         .collect();
     let reach = |k: usize| 1.5 * lines[k].line.length();
     let middles: Vec<Vector3<f64>> = lines.iter().map(|line| line.line.point_at(0.5)).collect();
-    let of_line = |i: usize| -> Vec<Chord> {
+    let of_line = |i: usize| -> Vec<Rounding> {
         (i + 1..lines.len())
             .filter(|j| (middles[i] - middles[*j]).norm() <= reach(i) + reach(*j))
             .filter_map(|j| {
-                let [one, other] = [i, j].map(|k| &lines[k]);
                 let pixel = pixels[i].max(pixels[j]);
-                let arc = rounding(&one.line, &other.line, images.reach * pixel, pixel)?;
-                let shown = |view: &usize| other.evidence.views().any(|other| other == *view);
-                let views: Vec<usize> = one.evidence.views().filter(shown).collect();
-                let guess = (views.len() >= MIN_VIEWS).then(|| wide.follow_arc(&arc, &views))??;
-                let found = images.follow_arc(&guess.arc, &views)?;
-                // Or it is something else.
-                let touches = |line: &ChosenLine| runs_into(images, &line.line, &found);
-                (touches(one) && touches(other)).then_some(Chord {
-                    arc: guess.arc,
-                    views,
+                let found = rounding(&lines[i].line, &lines[j].line, images.reach * pixel, pixel)?;
+                let [a, b] = found.ends;
+                Some(Rounding {
+                    ends: [2 * i + a, 2 * j + b],
+                    ..found
                 })
             })
             .collect()
@@ -57,14 +99,9 @@ pub(super) fn rounded_corners(images: &Images, lines: &[ChosenLine]) -> Vec<Chor
     (0..lines.len()).into_par_iter().flat_map(of_line).collect()
 }
 
-/// The arc that touches two lines which stop before they meet. Each is followed over the arc until
-/// that has left it by `reach`.
-fn rounding(
-    one: &LineSegment3,
-    other: &LineSegment3,
-    reach: f64,
-    pixel: f64,
-) -> Option<CircularArc> {
+/// The arc that touches two lines which stop before they meet, and these ends. Each line is followed
+/// over the arc until that has left it by `reach`.
+fn rounding(one: &LineSegment3, other: &LineSegment3, reach: f64, pixel: f64) -> Option<Rounding> {
     let (places, gap) = nearest_points(one, other)?;
     let lines = [one, other];
     let short = [0, 1].map(|k| beyond_end(places[k], lines[k].length()));
@@ -84,7 +121,12 @@ fn rounding(
     let over = (2.0 * reach * tangent).sqrt();
     let touches = (0.5 * (over + (over * over + 2.0 * (a + b)).sqrt())).powi(2);
     let middle = touches * (1.0 / cosine - tangent) * bisector;
-    CircularArc::through([touches * toward[0], middle, touches * toward[1]].map(|p| corner + p))
+    let points = [touches * toward[0], middle, touches * toward[1]];
+    Some(Rounding {
+        ends: short.map(|(_, end)| end),
+        short: a + b,
+        arc: CircularArc::through(points.map(|point| corner + point))?,
+    })
 }
 
 #[cfg(test)]
@@ -101,7 +143,9 @@ mod tests {
         let short = 0.1 - (0.2 * reach).sqrt();
         let along_x = line(at(0.5, 0.0), at(short, 0.0));
         let along_y = line(at(0.0, short), at(0.0, 0.6));
-        let arc = rounding(&along_x, &along_y, reach, pixel).unwrap();
+        let found = rounding(&along_x, &along_y, reach, pixel).unwrap();
+        assert_eq!(found.ends, [1, 0]);
+        let arc = found.arc;
         assert!((arc.radius - 0.1).abs() < 1e-9 && (arc.center - at(0.1, 0.1)).norm() < 1e-9);
         assert!((arc.sweep() - std::f64::consts::FRAC_PI_2).abs() < 1e-9);
 

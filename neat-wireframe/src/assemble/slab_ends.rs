@@ -97,9 +97,7 @@ pub(super) fn close_by_light(
 fn views_of_junctions(corners: &Corners, lines: &[ChosenLine]) -> Vec<BTreeSet<usize>> {
     let mut views = vec![BTreeSet::new(); corners.junctions.len()];
     for (ends, source) in corners.ends.iter().zip(&corners.sources) {
-        let showing = source
-            .into_iter()
-            .flat_map(|line| lines[*line].evidence.views());
+        let showing = source.iter().flat_map(|line| lines[*line].evidence.views());
         let showing: Vec<usize> = showing.collect();
         for end in ends {
             views[*end].extend(&showing);

@@ -1,0 +1,1 @@
+"""Everyday parts with exact truth, for scripts/make_parts.py."""
