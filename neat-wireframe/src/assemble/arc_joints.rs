@@ -137,10 +137,7 @@ const STEPS: usize = 100;
 
 /// Moves ends of lines that meet nothing else to the arcs that they end on.
 pub(super) fn end_on_arcs(images: &Images, corners: &mut Corners, arcs: &mut [FoundArc]) {
-    let mut degrees = vec![0; corners.junctions.len()];
-    for junction in corners.ends.iter().flatten() {
-        degrees[*junction] += 1;
-    }
+    let degrees = corners.degrees();
     for line in 0..corners.ends.len() {
         let edge = corners.edge(line);
         let gap = MAX_GAP * images.reach * corners.pixels[line];
@@ -196,6 +193,7 @@ fn wrapped(angle: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assemble::circle_fitting::tests::found;
     use crate::assemble::corners::find_corners;
     use crate::assemble::test_views::{TestViews, chosen};
     use crate::test_scenes::cameras_on_sphere;
@@ -203,18 +201,12 @@ mod tests {
 
     /// A quarter of a circle from (0.3, 0, 0.1) on, which runs along y there, to (0, 0.3, 0.1).
     fn quarter() -> FoundArc {
-        FoundArc {
-            arc: CircularArc {
-                center: Vector3::new(0.0, 0.0, 0.1),
-                axes: [Vector3::x(), Vector3::y()],
-                radius: 0.3,
-                angles: [0.0, FRAC_PI_2],
-            },
-            gain: 100.0,
-            pixel: 0.003,
-            sectors: Vec::new(),
-            covariance: None,
-        }
+        found(CircularArc {
+            center: Vector3::new(0.0, 0.0, 0.1),
+            axes: [Vector3::x(), Vector3::y()],
+            radius: 0.3,
+            angles: [0.0, FRAC_PI_2],
+        })
     }
 
     fn line(start: [f64; 3], end: [f64; 3]) -> LineSegment3 {

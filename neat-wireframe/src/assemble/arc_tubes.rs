@@ -9,14 +9,13 @@ use super::outlines::Tube;
 use nalgebra::Vector3;
 use neat_core::{CircularArc, LineSegment3};
 
-/// Axes of two arcs are one within so many pixels, at both arcs: as far as lines that meet may be
-/// apart, and arcs of a few pixels' bow more.
+/// Axes of two arcs are one within so many pixels, at both arcs, judged: as far as the axis of a
+/// short arc is off.
 const GAP_IN_PIXELS: f64 = 2.0;
-/// Arcs that are nearer to each other, in pixels, are one or lie in one plane.
+/// Arcs that are nearer to each other, in pixels, are one or lie in one plane, judged.
 const MIN_LENGTH_IN_PIXELS: f64 = 4.0;
-
-/// A line that is farther from an arc, in pixels, is no chord of it: one that bends more is told by
-/// its bow.
+/// A line that is farther from an arc, in pixels, is no chord of it, judged: one that bends more is
+/// told by its bow.
 const NEAR_IN_PIXELS: f64 = 8.0;
 
 /// Arcs, and the tubes between them.
@@ -58,12 +57,9 @@ impl KnownArcs {
         for tube in &touched {
             images.claim_outlines(tube, &mut taken);
         }
-        let wide = Images {
-            reach: GAP * images.reach,
-            ..*images
-        };
+        let beside = images.beside_tubes();
         for found in along {
-            wide.claim_arc(found, &mut taken);
+            beside.claim_arc(found, &mut taken);
         }
         images.evidence(line, Some(&taken), least).gain <= least
     }
@@ -83,14 +79,12 @@ fn tubes_between(arcs: &[FoundArc]) -> Vec<Tube> {
 fn tube_between(one: &CircularArc, other: &CircularArc, pixel: f64) -> Option<Tube> {
     let between = other.center - one.center;
     let length = between.norm();
-    // How far the axis of an arc passes the other's centre, and turns the other's plane.
-    let off_axis = |arc: &CircularArc| between.cross(&arc.normal()).norm();
-    let turned = |arc: &CircularArc| arc.radius * arc.normal().cross(&between).norm() / length;
-    let gap = GAP_IN_PIXELS * pixel;
-    let is_coaxial = [one, other]
-        .iter()
-        .all(|arc| off_axis(arc).max(turned(arc)) <= gap);
-    if length < MIN_LENGTH_IN_PIXELS * pixel || !is_coaxial {
+    // How far the axis of an arc passes the other's centre, and a plane across both the arc itself.
+    let is_coaxial = |arc: &CircularArc| {
+        let off_axis = between.cross(&arc.normal()).norm();
+        off_axis * (arc.radius / length).max(1.0) <= GAP_IN_PIXELS * pixel
+    };
+    if length < MIN_LENGTH_IN_PIXELS * pixel || !(is_coaxial(one) && is_coaxial(other)) {
         return None;
     }
     let outward: Vector3<f64> = one.axes[0];
@@ -109,25 +103,19 @@ fn tube_between(one: &CircularArc, other: &CircularArc, pixel: f64) -> Option<Tu
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::circle_fitting::tests::{arc, views_of_arcs};
+    use crate::assemble::circle_fitting::tests::{arc, found, views_of_arcs};
     use crate::assemble::outlines::tests::{generator, views_of_cone};
     use crate::assemble::test_views::{TestViews, cube_edge};
     use std::f64::consts::TAU;
 
     /// A rim around the z axis.
     fn rim(radius: f64, z: f64, angles: [f64; 2]) -> FoundArc {
-        FoundArc {
-            arc: CircularArc {
-                center: Vector3::new(0.0, 0.0, z),
-                axes: [Vector3::x(), Vector3::y()],
-                radius,
-                angles,
-            },
-            gain: 100.0,
-            pixel: 0.003,
-            sectors: Vec::new(),
-            covariance: None,
-        }
+        found(CircularArc {
+            center: Vector3::new(0.0, 0.0, z),
+            axes: [Vector3::x(), Vector3::y()],
+            radius,
+            angles,
+        })
     }
 
     #[test]
@@ -178,11 +166,7 @@ mod tests {
     fn chords_of_an_arc_are_explained() {
         let views = views_of_arcs(20, |_| arc(1.5));
         let images = views.images();
-        let found = FoundArc {
-            arc: arc(1.5),
-            ..rim(0.3, 0.0, [0.0, 1.5])
-        };
-        let known = KnownArcs::new(&[found]);
+        let known = KnownArcs::new(&[found(arc(1.5))]);
         let chord = LineSegment3::new(arc(1.5).point_at(0.5), arc(1.5).point_at(0.62));
         assert!(images.evidence(&chord, None, 0.0).gain > 3.0);
         assert!(known.explain(&images, &chord, 3.0));

@@ -346,6 +346,17 @@ pub(super) mod tests {
         TestViews::of(cameras_on_sphere(count).iter().map(view).collect())
     }
 
+    /// An arc of which nothing else is known.
+    pub(crate) fn found(arc: CircularArc) -> FoundArc {
+        FoundArc {
+            arc,
+            gain: 100.0,
+            pixel: 0.003,
+            sectors: Vec::new(),
+            covariance: None,
+        }
+    }
+
     pub(crate) fn arc(sweep: f64) -> CircularArc {
         CircularArc {
             center: Vector3::new(0.05, -0.1, 0.1),

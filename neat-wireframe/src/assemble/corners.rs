@@ -55,6 +55,15 @@ impl Corners {
         self.ends.iter().map(|[a, b]| [*a.min(b), *a.max(b)])
     }
 
+    /// How many lines end at each junction.
+    pub(super) fn degrees(&self) -> Vec<usize> {
+        let mut degrees = vec![0; self.junctions.len()];
+        for junction in self.ends.iter().flatten() {
+            degrees[*junction] += 1;
+        }
+        degrees
+    }
+
     /// Adds edges between junctions, with the sizes of a pixel. Their ends are corners already:
     /// they are not sought any more.
     pub(super) fn add(&mut self, edges: &[([usize; 2], f64)]) {
@@ -141,11 +150,15 @@ pub(super) fn sliver_end(
     (is_sliver && meets).then_some((place, end))
 }
 
+/// The size of a pixel at each line, over the views that show it.
+pub(super) fn pixel_sizes(images: &Images, lines: &[ChosenLine]) -> Vec<f64> {
+    let size = |found: &ChosenLine| images.pixel_size(&found.line, found.evidence.views());
+    lines.iter().map(size).collect()
+}
+
 /// Joins the ends of lines.
 pub(super) fn find_corners(images: &Images, lines: &[ChosenLine]) -> Corners {
-    let pixels: Vec<f64> = (lines.iter())
-        .map(|line| images.pixel_size(&line.line, line.evidence.views()))
-        .collect();
+    let pixels = pixel_sizes(images, lines);
     let windows: Vec<f64> = (lines.iter().zip(&pixels))
         .map(|(line, pixel)| {
             let length = line.line.length();

@@ -63,11 +63,10 @@ pub(super) fn supported(
 /// an end of their own that lies on the edge.
 fn drop_pieces(images: &Images, corners: &mut Corners, edges: &[([usize; 2], f64)]) {
     let junctions = &corners.junctions;
-    let mut degrees = vec![0; junctions.len()];
+    let degrees = corners.degrees();
     let mut lines_at: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (line, ends) in corners.ends.iter().enumerate() {
         for end in ends {
-            degrees[*end] += 1;
             lines_at.entry(*end).or_default().push(line);
         }
     }

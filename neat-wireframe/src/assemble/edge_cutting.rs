@@ -21,10 +21,7 @@ pub(super) fn cut_edges(
     mut corners: Corners,
 ) -> (Wireframe3d, Vec<Option<usize>>) {
     let count = corners.ends.len();
-    let mut degrees = vec![0; corners.junctions.len()];
-    for junction in corners.ends.iter().flatten() {
-        degrees[*junction] += 1;
-    }
+    let mut degrees = corners.degrees();
     // For each line where it is cut, and by which junction.
     let mut cuts: Vec<Vec<(f64, usize)>> = vec![Vec::new(); count];
     for (meeting, side) in nearest_first(&corners) {

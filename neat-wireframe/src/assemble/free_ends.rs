@@ -24,10 +24,7 @@ struct End {
 
 /// Moves free ends along their edges. `lines` end where their edgels do.
 pub(super) fn move_free_ends(images: &Images, lines: &[ChosenLine], corners: &mut Corners) {
-    let mut degrees = vec![0; corners.junctions.len()];
-    for junction in corners.ends.iter().flatten() {
-        degrees[*junction] += 1;
-    }
+    let degrees = corners.degrees();
     let junctions = &corners.junctions;
     let ends = lines.iter().enumerate().flat_map(|(k, chosen)| {
         let edge = corners.edge(k);

@@ -54,13 +54,18 @@ impl Tube {
 }
 
 impl Images<'_> {
-    /// Takes the edgels beside the outlines of a tube on one side of it, in all views.
-    pub(super) fn claim_outlines(&self, tube: &Tube, taken: &mut [Vec<bool>]) {
-        let wide = Images {
+    /// The images with the reach within which an edgel is one of what is known.
+    pub(super) fn beside_tubes(&self) -> Self {
+        Self {
             reach: GAP * self.reach,
             ..*self
-        };
-        claim_edgels_of(&wide, |view| Some(tube.outline(self, view)?.0), taken);
+        }
+    }
+
+    /// Takes the edgels beside the outlines of a tube on one side of it, in all views.
+    pub(super) fn claim_outlines(&self, tube: &Tube, taken: &mut [Vec<bool>]) {
+        let outline = |view| Some(tube.outline(self, view)?.0);
+        claim_edgels_of(&self.beside_tubes(), outline, taken);
     }
 
     /// Whether most of what speaks for a line, `of_line`, are outlines of a tube.

@@ -4,7 +4,9 @@
 use super::arc_joints::touching_place;
 use super::circle_fitting::FoundArc;
 use super::claimed_edgels::claim_edgels;
-use super::corners::{MAX_GAP, WINDOW_IN_PIXELS, beyond_end, nearest_points, sliver_end};
+use super::corners::{
+    MAX_GAP, WINDOW_IN_PIXELS, beyond_end, nearest_points, pixel_sizes, sliver_end,
+};
 use super::edge_samples::Images;
 use super::line_evidence::LineEvidence;
 use super::line_selection::ChosenLine;
@@ -26,9 +28,7 @@ pub(super) fn continue_lines(
     taken: &mut [Vec<bool>],
     min_evidence: f64,
 ) {
-    let pixels: Vec<f64> = (lines.iter())
-        .map(|line| images.pixel_size(&line.line, line.evidence.views()))
-        .collect();
+    let pixels = pixel_sizes(images, lines);
     let ahead: Vec<[Vec<f64>; 2]> = (0..lines.len())
         .into_par_iter()
         .map(|k| places_ahead(images, lines, arcs, &pixels, k))
@@ -78,9 +78,7 @@ fn shown_until(images: &Images, stretch: &LineSegment3, evidence: &LineEvidence)
 
 /// Lengthens lines to where they end in slivers.
 pub(super) fn meet_in_slivers(images: &Images, lines: &mut [ChosenLine]) {
-    let pixels: Vec<f64> = (lines.iter())
-        .map(|line| images.pixel_size(&line.line, line.evidence.views()))
-        .collect();
+    let pixels = pixel_sizes(images, lines);
     let before: Vec<LineSegment3> = lines.iter().map(|chosen| chosen.line).collect();
     let ends_of = |k: usize| {
         let mut reached = [0.0, 1.0];
@@ -154,6 +152,7 @@ fn meeting_places(line: &LineSegment3, other: &LineSegment3, gap: f64) -> Vec<f6
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::assemble::circle_fitting::tests::found;
     use crate::assemble::line_fitting::directions_across;
     use crate::assemble::test_views::{TestViews, chosen, cube_edge, end_distance};
     use neat_core::CircularArc;
@@ -190,25 +189,19 @@ mod tests {
         // From the end of the edge on, toward one side of it.
         let axes = [-across.column(0).into_owned(), along];
         let radius = 0.1;
-        let found = FoundArc {
-            arc: CircularArc {
-                center: edge.end - radius * axes[0],
-                axes,
-                radius,
-                angles: [0.0, 1.5],
-            },
-            gain: 100.0,
-            pixel: 0.003,
-            sectors: Vec::new(),
-            covariance: None,
-        };
+        let arc = found(CircularArc {
+            center: edge.end - radius * axes[0],
+            axes,
+            radius,
+            angles: [0.0, 1.5],
+        });
         let piece = LineSegment3::new(edge.start, edge.point_at(0.7));
         let grown = |arcs: &[FoundArc]| {
             let mut lines = [chosen(&images, &piece)];
             continue_lines(&images, &mut lines, arcs, &mut images.nothing_taken(), 3.0);
             end_distance(&lines[0].line, &edge)
         };
-        assert!(grown(&[found]) < 0.01);
+        assert!(grown(&[arc]) < 0.01);
         assert!(grown(&[]) > 0.2);
     }
 

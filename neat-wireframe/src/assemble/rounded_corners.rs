@@ -5,20 +5,20 @@
 //! of an arc that touches both.
 
 use super::arc_joints::runs_into;
-use super::corners::{MAX_GAP, beyond_end, nearest_points};
+use super::corners::{MAX_GAP, beyond_end, nearest_points, pixel_sizes};
 use super::edge_samples::Images;
 use super::line_selection::{Chord, ChosenLine};
 use nalgebra::Vector3;
 use neat_core::{CircularArc, LineSegment3};
 use rayon::prelude::*;
 
-/// Edges that stop nearer to where they would meet, in pixels, meet there.
+/// Edges that stop nearer to where they would meet, in pixels, meet there, judged.
 const MIN_SHORT_IN_PIXELS: f64 = 4.0;
 /// Edges stop where both do within so many pixels …
 const UNEVEN_IN_PIXELS: f64 = 4.0;
 /// … or this share of it: one may be hidden a little earlier. Judged.
 const UNEVEN: f64 = 0.3;
-/// The arc is off by so many pixels in its middle, where edges stop that uncertainly.
+/// The arc is off by so many pixels in its middle, where edges stop that uncertainly, judged.
 const OFF_IN_PIXELS: f64 = 1.5;
 /// Fewer views that show both edges tell of no arc, as of no line.
 const MIN_VIEWS: usize = 3;
@@ -77,9 +77,7 @@ pub(super) fn rounded_corners(
 }
 
 fn roundings(images: &Images, lines: &[ChosenLine]) -> Vec<Rounding> {
-    let pixels: Vec<f64> = (lines.iter())
-        .map(|line| images.pixel_size(&line.line, line.evidence.views()))
-        .collect();
+    let pixels = pixel_sizes(images, lines);
     let reach = |k: usize| 1.5 * lines[k].line.length();
     let middles: Vec<Vector3<f64>> = lines.iter().map(|line| line.line.point_at(0.5)).collect();
     let of_line = |i: usize| -> Vec<Rounding> {

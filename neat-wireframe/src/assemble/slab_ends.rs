@@ -11,7 +11,7 @@ use crate::statistics::upper_median;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Smoothing moves the edgels of an edge among others by so many pixels: 0.3 to 0.8 on edges 5 to
 /// 12 pixels long of rendered parts. With 0.75 to 1.25 the same edges are found but one.
@@ -51,7 +51,9 @@ pub(super) fn close_slabs(
         rounding: ROUNDING,
         ..*images
     };
-    let pairs = without_chords(&corners.junctions, slab_ends(corners, MAX_TAPER));
+    let mut ends = slab_ends(corners);
+    ends.retain(|_, taper| *taper <= MAX_TAPER);
+    let pairs = without_chords(&corners.junctions, ends.into_keys().collect());
     let found = supported(
         &images,
         corners,
@@ -78,12 +80,18 @@ pub(super) fn close_by_light(
         views: (views_of[*a].intersection(&views_of[*b]).copied()).collect(),
     };
     let pixel = upper_median(&mut corners.pixels.clone());
-    let mut pairs = without_chords(&corners.junctions, slab_ends(corners, f64::INFINITY));
+    let ends = slab_ends(corners);
+    let mut pairs = without_chords(&corners.junctions, ends.keys().copied().collect());
     pairs.retain(|pair| asked(pair).piece.length() <= MAX_WIDTH * pixel);
     let pieces: Vec<Asked> = pairs.iter().map(asked).collect();
     let lights = light_across(images, photographs, response, &pieces);
-    let slabs: BTreeSet<[usize; 2]> = slab_ends(corners, MAX_TAPER).into_iter().collect();
-    let least = |pair: &[usize; 2]| if slabs.contains(pair) { 0.0 } else { OF_WEDGE };
+    let least = |pair: &[usize; 2]| {
+        if ends[pair] <= MAX_TAPER {
+            0.0
+        } else {
+            OF_WEDGE
+        }
+    };
     let found = pairs.into_iter().zip(lights);
     let found: Vec<([usize; 2], f64)> = found
         .filter(|(pair, light)| light.for_edge() > least(pair))
@@ -106,8 +114,9 @@ fn views_of_junctions(corners: &Corners, lines: &[ChosenLine]) -> Vec<BTreeSet<u
     views
 }
 
-/// Pairs of junctions, ascending, at which two edges that run side by side end together.
-fn slab_ends(corners: &Corners, max_taper: f64) -> Vec<[usize; 2]> {
+/// Pairs of junctions at which two edges that run side by side end together, each with how far these
+/// are apart at their other ends, by what they are there.
+fn slab_ends(corners: &Corners) -> BTreeMap<[usize; 2], f64> {
     let junctions = &corners.junctions;
     let others = others_at(junctions.len(), &corners.ends);
     let known: BTreeSet<[usize; 2]> = corners.pairs().collect();
@@ -116,28 +125,32 @@ fn slab_ends(corners: &Corners, max_taper: f64) -> Vec<[usize; 2]> {
     let longest: Vec<f64> = (0..junctions.len())
         .map(|at| (others[at].iter()).fold(0.0, |most: f64, to| most.max(from(at, *to).norm())))
         .collect();
-    let is_slab = |[a, b]: [usize; 2]| {
+    let taper = |[a, b]: [usize; 2]| {
         let across = from(a, b);
         let width = across.norm();
         let is_across =
             |edge: Vector3<f64>| edge.dot(&across).abs() <= MAX_COSINE_ACROSS * width * edge.norm();
         let beside = |c: usize, d: usize| {
             let (u, v) = (from(a, c), from(b, d));
-            width < u.norm().min(v.norm())
-                && u.dot(&v) > MIN_COSINE_ALONG * u.norm() * v.norm()
-                && from(c, d).norm() <= max_taper * width
+            width < u.norm().min(v.norm()) && u.dot(&v) > MIN_COSINE_ALONG * u.norm() * v.norm()
         };
-        (others[a].iter()).any(|c| others[b].iter().any(|d| beside(*c, *d)))
-            && (others[a].iter()).all(|c| is_across(from(a, *c)))
-            && (others[b].iter()).all(|d| is_across(from(b, *d)))
+        let all_across = (others[a].iter()).all(|c| is_across(from(a, *c)))
+            && (others[b].iter()).all(|d| is_across(from(b, *d)));
+        let sides = (others[a].iter())
+            .flat_map(|c| others[b].iter().map(move |d| (*c, *d)))
+            .filter(|(c, d)| all_across && beside(*c, *d));
+        sides
+            .map(|(c, d)| from(c, d).norm() / width)
+            .min_by(f64::total_cmp)
     };
     let is_end = |pair: &[usize; 2]| {
         let [a, b] = *pair;
-        from(a, b).norm() < longest[a].min(longest[b]) && is_slab(*pair) && !known.contains(pair)
+        from(a, b).norm() < longest[a].min(longest[b]) && !known.contains(pair)
     };
     (0..junctions.len())
         .into_par_iter()
         .flat_map_iter(|a| (a + 1..junctions.len()).map(move |b| [a, b]).filter(is_end))
+        .filter_map(|pair| Some((pair, taper(pair)?)))
         .collect()
 }
 
@@ -281,8 +294,9 @@ mod tests {
             placed: true,
         });
         let corners = find_corners(&cube.images(), &lines);
-        assert_eq!(slab_ends(&corners, MAX_TAPER), [[0usize; 2]; 0]);
-        assert_eq!(slab_ends(&corners, f64::INFINITY), [[0, 2]]);
+        let ends = slab_ends(&corners);
+        assert!(ends.values().all(|taper| *taper > MAX_TAPER));
+        assert_eq!(ends.into_keys().collect::<Vec<_>>(), [[0, 2]]);
     }
 
     #[test]
