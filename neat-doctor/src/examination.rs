@@ -197,6 +197,12 @@ impl Finding {
             .remedied_by(remedy)
     }
 
+    /// Whether nothing, or nothing but another order of the images, explains what they show.
+    pub(crate) fn is_unexplained(&self) -> bool {
+        let cause = matches!(self.cause, Some(Cause::PosesDisagree | Cause::ImageOrder));
+        self.level == Level::Problem && self.views.is_empty() && cause
+    }
+
     pub(crate) fn because(mut self, cause: Cause) -> Self {
         self.cause = Some(cause);
         self

@@ -131,15 +131,30 @@ fn pose_findings(
     } else {
         FULL_VIEWS
     };
-    let gathered = gather(scene, working, evenly(count, limit), textured)?;
-    Ok(Diagnosis::new(
-        scene,
-        &gathered,
-        options.read_with,
-        options.file_axes,
-        mirrored,
-    )
-    .findings())
+    let diagnosed = |limit: usize, textured: bool| {
+        let gathered = gather(scene, working, evenly(count, limit), textured)?;
+        let diagnosis = Diagnosis::new(
+            scene,
+            &gathered,
+            options.read_with,
+            options.file_axes,
+            mirrored,
+        );
+        Ok(diagnosis.findings())
+    };
+    let findings = diagnosed(limit, textured)?;
+    if textured && findings.iter().any(Finding::is_unexplained) {
+        // Things that look the same from several sides are matched wrongly, however often:
+        // where corners without any match agree, they are right.
+        let of_corners: Vec<Finding> = diagnosed(FULL_VIEWS, false)?;
+        if of_corners
+            .iter()
+            .all(|finding| finding.level == Level::Good)
+        {
+            return Ok(of_corners);
+        }
+    }
+    Ok(findings)
 }
 
 /// Reads the scene in the folder `dir` and examines it. A scene that cannot be

@@ -52,7 +52,7 @@ impl Diagnosis<'_> {
             .map(|hypothesis| self.try_out(hypothesis, &self.cameras, trusted))
             .collect();
         candidates.push(self.best_focal(&self.cameras, trusted));
-        candidates.push(self.best_along(&strengths(), Hypothesis::Lens, &self.cameras, trusted));
+        candidates.push(self.best_lens(trusted));
         let best = candidates
             .iter()
             .map(|candidate| candidate.agreement.score)
@@ -74,7 +74,39 @@ impl Diagnosis<'_> {
         }
         let agreement = &found.last()?.agreement;
         let clear = agreement.score > CLEARLY * given.score && agreement.share() >= min_share;
-        clear.then_some(found)
+        (clear && self.holds_for_other_views(&found[0].hypothesis, trusted)).then_some(found)
+    }
+
+    /// Whether what explains more of one half of the views explains clearly more of the other,
+    /// too. Few true corners let some factor of the focal length or some lens bring false ones
+    /// together, another in each half; a true one is the same in both. Where halves show
+    /// nothing, the whole has the word.
+    fn holds_for_other_views(&self, hypothesis: &Hypothesis, trusted: &[bool]) -> bool {
+        let half = |parity: usize| -> Vec<bool> {
+            let mut rank = 0..;
+            let mut chosen =
+                |&trusts: &bool| trusts && rank.next().is_some_and(|n| n % 2 == parity);
+            trusted.iter().map(&mut chosen).collect()
+        };
+        let halves = [half(0), half(1)];
+        let (mut found, mut given) = (0.0, 0.0);
+        for [one, other] in [[0, 1], [1, 0]] {
+            let fitted = match hypothesis {
+                Hypothesis::FocalScale(_) => {
+                    self.best_focal(&self.cameras, &halves[one]).hypothesis
+                }
+                Hypothesis::Lens(_) => self.best_lens(&halves[one]).hypothesis,
+                other => *other,
+            };
+            let there = self.try_out(fitted, &self.cameras, &halves[other]);
+            found += there.agreement.score;
+            given += self.given(&halves[other]).score;
+        }
+        found > CLEARLY * given || found + given == 0.0
+    }
+
+    fn best_lens(&self, trusted: &[bool]) -> Candidate {
+        self.best_along(&strengths(), Hypothesis::Lens, &self.cameras, trusted)
     }
 
     fn hypotheses(&self) -> Vec<Hypothesis> {
@@ -146,5 +178,48 @@ impl Diagnosis<'_> {
         // Three digits after the first: as exact as the search is.
         let unit = 10f64.powf(found.abs().max(0.1).log10().floor() - 3.0);
         try_out((found / unit).round() * unit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::corner_consensus::{CornerEvidence, ViewCorners};
+    use crate::evidence::{Evidence, Gathered};
+    use crate::examination::Repair;
+    use crate::lens::straightened;
+    use neat_core::layout::CameraAxes;
+    use neat_core::synthetic::{SyntheticScene, generate};
+
+    #[test]
+    fn a_lens_has_to_be_the_same_in_both_halves_of_the_views() {
+        let config = SyntheticScene {
+            views: 40,
+            image_size: 400,
+            ..SyntheticScene::default()
+        };
+        let data = generate(&config).unwrap();
+        let corners = &data.truth.junctions;
+        let holds = |strengths: [f64; 2]| {
+            let views = (data.scene.views.iter().enumerate()).map(|(index, view)| {
+                let bend = |corner| {
+                    let pixel = view.camera.project(corner).pixel;
+                    straightened(&pixel, &view.camera, -strengths[index % 2])
+                };
+                ViewCorners::new(index, corners.iter().map(bend).collect(), 400.0)
+            });
+            let gathered = Gathered {
+                views: (0..40).collect(),
+                evidence: Evidence::Corners(CornerEvidence::new(views.collect())),
+                likeness: Vec::new(),
+                silhouettes: Vec::new(),
+            };
+            let (repair, axes) = (Repair::default(), CameraAxes::OPENCV);
+            let diagnosis = Diagnosis::new(&data.scene, &gathered, repair, axes, false);
+            diagnosis.holds_for_other_views(&Hypothesis::Lens(0.1), &[true; 40])
+        };
+        assert!(holds([0.16, 0.16]));
+        assert!(!holds([0.16, -0.1]));
+        assert!(!holds([0.0, 0.0]));
     }
 }

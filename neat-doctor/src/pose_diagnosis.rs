@@ -136,7 +136,7 @@ impl<'a> Diagnosis<'a> {
     }
 
     /// How well the given cameras explain what the `trusted` views show.
-    fn given(&self, trusted: &[bool]) -> Agreement {
+    pub fn given(&self, trusted: &[bool]) -> Agreement {
         self.evidence().agreement(&self.cameras, trusted)
     }
 

@@ -50,6 +50,19 @@ pub fn veins(point: &Vector3<f64>) -> f64 {
     0.2 + 0.4 * f64::from(bands > 0.5) + 0.4 * octave(25.0)
 }
 
+/// Dark squares that are the same again after a twelfth of a turn around the upright axis, and none
+/// far away: what is matched across views are places that look the same.
+pub fn repeated_twelve_times(point: &Vector3<f64>) -> f64 {
+    let twelfth = std::f64::consts::FRAC_PI_6;
+    let angle = point.y.atan2(point.x).rem_euclid(twelfth);
+    let [across, up] = [5.0 * angle / twelfth, 9.0 * point.z];
+    let in_square = [across, up]
+        .iter()
+        .all(|place| place.rem_euclid(1.0) > 0.35);
+    let dark = in_square && hash([across.floor() as i64, up.floor() as i64, 3]) > 0.3;
+    if dark && point.norm() < 3.0 { 0.3 } else { 1.0 }
+}
+
 /// Bricks with mortar between them, each a little lighter or darker than the next: what
 /// photographs of walls repeat.
 pub fn bricks(point: &Vector3<f64>) -> f64 {

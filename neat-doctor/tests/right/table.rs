@@ -1,7 +1,7 @@
 //! The table of right scenes.
 
 use super::Right;
-use crate::corruption::textured::{bricks, veins};
+use crate::corruption::textured::{bricks, repeated_twelve_times, veins};
 use image::{Rgb, RgbImage, imageops};
 use nalgebra::{Matrix4, Rotation3, Vector3};
 use neat_core::Camera;
@@ -246,6 +246,16 @@ fn textures() -> Vec<Right> {
                 noisy(&mut image, index, 8.0);
                 image
             }),
+        Right::new(
+            "the same pattern twelve times around",
+            scene(Solid::HexagonalPrism, 20),
+        )
+        .texture(repeated_twelve_times)
+        // 40° apart, which look as 10° do.
+        .camera(|index, camera| {
+            let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 0.6981 * index as f64);
+            Some(placed(camera, turn * Vector3::new(1.7, 0.0, 0.2)))
+        }),
         wall("bricks, all around", Solid::Box, 30).shows_little(),
         wall("bricks, one side", Solid::Box, 14).camera(beside),
         wall("bricks, stairs", Solid::StairPrism, 30).shows_little(),
