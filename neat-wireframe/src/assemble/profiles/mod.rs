@@ -22,6 +22,7 @@ mod pursuit;
 mod response;
 mod rounding;
 mod short_pieces;
+mod softness;
 mod step_fit;
 mod step_model;
 mod straight;
@@ -45,8 +46,9 @@ use placed_arcs::{PlacedArc, move_arcs};
 use profile::{Profile, profiles};
 use rayon::prelude::*;
 use response::response_of;
-use rounding::{Widths, is_rounded};
+use rounding::{ADVANTAGE, Widths, outline_gain};
 pub(super) use short_pieces::{Asked, light_across};
+use softness::{Softness, least_gain};
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 use straight::Straight;
@@ -163,17 +165,12 @@ pub(super) fn place_curves(
         let widths = Widths::new(response.blur);
         let least_radius = MIN_REACHES * images.reach;
         let of_line = |straight: &Straight, light: &[LightProfile<4>], bundle: &Bundle<'_, 4>| {
-            (!is_rounded(light, &widths, response.blur, least_radius))
-                .then(|| PlacedLine::new(straight, bundle))
+            let as_outline = outline_gain(light, &widths, response.blur, least_radius);
+            (as_outline, PlacedLine::new(straight, bundle))
         };
         straight.explained(response, of_line, progress)?
     };
-    let rounded: Vec<usize> = (indices.iter().zip(&placed))
-        .filter_map(|(index, line)| matches!(line, Some(None)).then_some(*index))
-        .collect();
-    let placed: Vec<(usize, PlacedLine)> = (indices.into_iter().zip(placed))
-        .filter_map(|(index, line)| Some((index, line??)))
-        .collect();
+    let (rounded, placed) = told_apart(lines, indices, &straight.profiles, placed, response.blur);
     let (before, moved) = (lines.len(), move_lines(lines, &placed));
     add_beside(images, lines, placed);
     let beside = lines.len() - before;
@@ -188,6 +185,31 @@ pub(super) fn place_curves(
         "curves are placed by profiles"
     );
     ControlFlow::Continue(Some(response))
+}
+
+/// The middles of rounded edges, and what profiles tell of the other lines: `told` is that of all
+/// that have `profiles`, and by how much each is rather the outline of a fillet than an edge.
+fn told_apart(
+    lines: &[ChosenLine],
+    indices: Vec<usize>,
+    profiles: &[Vec<Profile<4>>],
+    told: Vec<Option<(f64, PlacedLine)>>,
+    blur: f64,
+) -> (Vec<usize>, Vec<(usize, PlacedLine)>) {
+    let views = |index: &usize| lines[*index].evidence.views().collect();
+    let shown: Vec<Vec<usize>> = indices.iter().map(views).collect();
+    let from_in_front = Softness::new(blur).gains(profiles, &shown);
+    let least = least_gain(&from_in_front, ADVANTAGE);
+    let (mut rounded, mut others) = (Vec::new(), Vec::new());
+    for ((index, line), in_front) in indices.into_iter().zip(told).zip(from_in_front) {
+        let as_outline = line.as_ref().map_or(0.0, |(gain, _)| *gain);
+        if as_outline + in_front > least {
+            rounded.push(index);
+        } else if let Some((_, line)) = line {
+            others.push((index, line));
+        }
+    }
+    (rounded, others)
 }
 
 /// What profiles tell of a line.

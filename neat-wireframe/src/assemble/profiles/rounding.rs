@@ -38,7 +38,7 @@ const DIRECTIONS: usize = 36;
 /// both sides; some more. With .5 and .7 as many are told.
 const MIN_COSINE: f64 = 0.6;
 /// It must explain the views so much better than an edge, in nats, as outlines must.
-const ADVANTAGE: f64 = 12.0;
+pub(super) const ADVANTAGE: f64 = 12.0;
 /// It must have the step of this share of the views, and of more than an edge has: thin plates
 /// and grooves look like tubes to some views, and have an edge in others. With .6 true edges of
 /// parts are lost, with .75 a twentieth fewer fillets are told.
@@ -75,15 +75,19 @@ struct Sighting {
     offset: f64,
 }
 
-/// Whether a line is the middle of a rounded edge, of at least `least_radius` pixels.
-pub(super) fn is_rounded(
+/// By how many nats a line is rather the middle of a rounded edge, of at least `least_radius`
+/// pixels, than an edge; 0 where it may be an edge for other reasons.
+pub(super) fn outline_gain(
     profiles: &[LightProfile<4>],
     widths: &Widths,
     blur: f64,
     least_radius: f64,
-) -> bool {
+) -> f64 {
     let sightings = sightings(profiles, widths, blur);
-    sightings.len() >= MIN_VIEWS && is_round(&sightings, least_radius)
+    if sightings.len() < MIN_VIEWS {
+        return 0.0;
+    }
+    gain_of_round(&sightings, least_radius)
 }
 
 fn sightings(profiles: &[LightProfile<4>], widths: &Widths, blur: f64) -> Vec<Sighting> {
@@ -131,7 +135,7 @@ fn step_of(step: &OneStep, columns: &Columns) -> (f64, f64) {
     ((best as f64 + beyond) * TRIED - SOUGHT, here)
 }
 
-fn is_round(sightings: &[Sighting], least_radius: f64) -> bool {
+fn gain_of_round(sightings: &[Sighting], least_radius: f64) -> f64 {
     let of_edge: Vec<Row> = sightings.iter().map(|s| Row::new(s, 0.0)).collect();
     let edge = Fit::new(&of_edge);
     let by_direction = (0..DIRECTIONS).filter_map(|k| {
@@ -146,15 +150,14 @@ fn is_round(sightings: &[Sighting], least_radius: f64) -> bool {
         let gain = fit.likelihood + others.len() as f64 * of_chance().ln() - edge.likelihood;
         (fit.parameters.z > least_radius).then_some((gain, fit.near))
     });
-    by_direction
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .is_some_and(|(gain, near)| {
-            let all: usize = near.iter().sum();
-            gain > ADVANTAGE
-                && all as f64 >= COMMON * sightings.len() as f64
-                && all > edge.near.iter().sum::<usize>()
-                && near.iter().all(|from_side| *from_side >= MIN_FROM_SIDE)
-        })
+    let best = by_direction.max_by(|a, b| a.0.total_cmp(&b.0));
+    let holds = |(_, near): &(f64, [usize; 2])| {
+        let all: usize = near.iter().sum();
+        all as f64 >= COMMON * sightings.len() as f64
+            && all > edge.near.iter().sum::<usize>()
+            && near.iter().all(|from_side| *from_side >= MIN_FROM_SIDE)
+    };
+    best.filter(holds).map_or(0.0, |(gain, _)| gain.max(0.0))
 }
 
 impl Sighting {
@@ -296,10 +299,10 @@ mod tests {
     #[test]
     fn a_fillet_is_told_from_an_edge() {
         let fillet = |radius| seen_from_around(move |by_shift| outline(by_shift, radius));
-        assert!(is_round(&fillet(4.0), LEAST_RADIUS));
-        assert!(!is_round(&fillet(4.0), 6.0));
+        assert!(ADVANTAGE < gain_of_round(&fillet(4.0), LEAST_RADIUS));
+        assert!(ADVANTAGE >= gain_of_round(&fillet(4.0), 6.0));
         // Less than what poses are off by.
-        assert!(!is_round(&fillet(0.2), 0.0));
+        assert!(ADVANTAGE >= gain_of_round(&fillet(0.2), 0.0));
         // An edge a little aside, of which some views see another thing.
         let aside = Vector2::new(0.3, -0.2);
         let edge = |others: f64| {
@@ -308,15 +311,15 @@ mod tests {
                 Some(if other { 1.2 } else { by_shift.dot(&aside) })
             })
         };
-        assert!(!is_round(&edge(1.0), LEAST_RADIUS));
-        assert!(!is_round(&edge(0.5), LEAST_RADIUS));
+        assert!(ADVANTAGE >= gain_of_round(&edge(1.0), LEAST_RADIUS));
+        assert!(ADVANTAGE >= gain_of_round(&edge(0.5), LEAST_RADIUS));
     }
 
     #[test]
     fn an_edge_that_most_views_have_in_place_stays_one() {
         // What looks like a fillet from some sides is an edge from the others.
         let both = seen_from_around(|by_shift| Some(outline(by_shift, 4.0).unwrap_or_default()));
-        assert!(!is_round(&both, LEAST_RADIUS));
+        assert!(ADVANTAGE >= gain_of_round(&both, LEAST_RADIUS));
     }
 
     #[test]
@@ -344,7 +347,7 @@ mod tests {
                     (seen.in_light(24).into_iter().filter(of_view)).map(from_other_side)
                 })
                 .collect();
-            is_rounded(&profiles, &widths, RESPONSE.blur, LEAST_RADIUS)
+            outline_gain(&profiles, &widths, RESPONSE.blur, LEAST_RADIUS) > ADVANTAGE
         };
         assert!(rounded(9.0, RESPONSE.blur));
         assert!(!rounded(0.0, RESPONSE.blur));
