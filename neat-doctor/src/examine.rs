@@ -1,7 +1,7 @@
 //! The examination of a scene, and of a folder that should hold one.
 
 use crate::capture_checks::capture_findings;
-use crate::evidence::{evenly, gather, is_textured};
+use crate::evidence::{Gathered, evenly, gather, is_textured};
 use crate::examination::{Check, Examination, Finding, Level, Repair};
 use crate::image_checks::image_findings;
 use crate::load_failure::{explain, size_factor};
@@ -115,13 +115,7 @@ fn pose_findings(
             evenly(count, QUICK_VIEWS)
         };
         let gathered = gather(scene, working, views, textured)?;
-        let diagnosis = Diagnosis::new(
-            scene,
-            &gathered,
-            options.read_with,
-            options.file_axes,
-            mirrored,
-        );
+        let diagnosis = diagnosis(scene, &gathered, options, mirrored);
         if diagnosis.is_plainly_good() {
             return Ok(diagnosis.agreeing_findings());
         }
@@ -133,14 +127,7 @@ fn pose_findings(
     };
     let diagnosed = |limit: usize, textured: bool| {
         let gathered = gather(scene, working, evenly(count, limit), textured)?;
-        let diagnosis = Diagnosis::new(
-            scene,
-            &gathered,
-            options.read_with,
-            options.file_axes,
-            mirrored,
-        );
-        Ok(diagnosis.findings())
+        Ok(diagnosis(scene, &gathered, options, mirrored).findings())
     };
     let findings = diagnosed(limit, textured)?;
     if textured && findings.iter().any(Finding::is_unexplained) {
@@ -155,6 +142,16 @@ fn pose_findings(
         }
     }
     Ok(findings)
+}
+
+fn diagnosis<'a>(
+    scene: &'a Scene,
+    gathered: &'a Gathered,
+    options: &ExamineOptions,
+    mirrored: bool,
+) -> Diagnosis<'a> {
+    let (read_with, file_axes) = (options.read_with, options.file_axes);
+    Diagnosis::new(scene, gathered, read_with, file_axes, mirrored)
 }
 
 /// Reads the scene in the folder `dir` and examines it. A scene that cannot be

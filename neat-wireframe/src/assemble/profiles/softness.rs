@@ -14,15 +14,16 @@ use rayon::prelude::*;
 const SOFT_BLURS: [f64; 4] = [3.0, 4.5, 6.0, 9.0];
 /// Pixels between the places where steps are tried.
 const TRIED: f64 = 0.25;
-/// A step that is the line's own lies within so many pixels of it.
+/// A step that is the line's own lies within so many pixels of it, judged.
 const OWN: f64 = 2.0;
-/// Two steps nearer to each other, in pixels, are a soft one.
+/// Two steps nearer to each other, in pixels, are a soft one, judged.
 const APART: f64 = 1.0;
-/// The share of the profiles that the noise is known by, the cleanest.
+/// The share of the profiles that the noise is known by, the cleanest, as for the blur.
 const CLEANEST: f64 = 0.1;
 /// The least variance of noise: that of rounding to whole values.
 const ROUNDING: f64 = 1.0 / 12.0;
-/// A profile shows something if steps explain so many times the noise of it.
+/// A profile shows something if steps explain so many times the noise of it: with 30 and 100 a
+/// photographed house has as many soft views, and a casting with fillets half and a sixth of them.
 const LEAST_SHOWN: f64 = 4.0;
 /// Of the views that show one of 530 true lines of nineteen parts .0005 are soft, .011 of those of
 /// the lines of a photographed house, true and false …
