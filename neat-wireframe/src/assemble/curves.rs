@@ -21,7 +21,7 @@ const SAME: f64 = 2.0;
 /// An arc all along a surer one, nearer than so many pixels, is what blur and rims make of the same
 /// edge: smoothing leaves no two edges so near each other. Of parts 001 and 004 it leaves 24 and 29
 /// arcs of 36 and 40, on the same length.
-const BESIDE_IN_PIXELS: f64 = 3.0;
+pub(super) const BESIDE_IN_PIXELS: f64 = 3.0;
 
 /// The arcs that the images show, of the chords among the lines and of those that pieces of
 /// curves propose.
@@ -104,7 +104,7 @@ fn covers(images: &Images, whole: &FoundArc, part: &CircularArc) -> bool {
 }
 
 /// Whether all of an arc is at most so far from another one.
-fn runs_beside(whole: &FoundArc, part: &CircularArc, near: f64) -> bool {
+pub(super) fn runs_beside(whole: &FoundArc, part: &CircularArc, near: f64) -> bool {
     [0.1, 0.5, 0.9].iter().all(|place| {
         let point = part.point_at(part.angles[0] + place * part.sweep());
         whole.arc.distance_to_circle(&point) < near

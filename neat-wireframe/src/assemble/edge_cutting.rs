@@ -127,10 +127,12 @@ fn cut_crossings(images: &Images, corners: &mut Corners, cuts: &mut [Vec<(f64, u
     }
 }
 
-/// The used junctions in lexicographic order of their coordinates, and the edges, sorted.
-pub(super) fn in_order(wireframe: &Wireframe3d) -> Wireframe3d {
+/// The junctions that edges use, and some others, in lexicographic order of their coordinates, and
+/// the edges, sorted.
+pub(super) fn in_order(wireframe: &Wireframe3d, others: BTreeSet<usize>) -> Wireframe3d {
     let Wireframe3d { junctions, edges } = wireframe;
-    let used: BTreeSet<usize> = edges.iter().flatten().copied().collect();
+    let mut used = others;
+    used.extend(edges.iter().flatten());
     let mut order: Vec<usize> = used.into_iter().collect();
     let at = |junction: &usize| -> [f64; 3] { junctions[*junction].into() };
     order.sort_by(|a, b| {
@@ -179,7 +181,10 @@ mod tests {
             },
         };
         let lines: Vec<ChosenLine> = lines.iter().map(chosen).collect();
-        in_order(&cut_edges(&images, find_corners(&images, &lines)).0)
+        in_order(
+            &cut_edges(&images, find_corners(&images, &lines)).0,
+            BTreeSet::new(),
+        )
     }
 
     #[test]

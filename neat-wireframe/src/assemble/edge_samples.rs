@@ -8,7 +8,7 @@ use neat_core::{EdgelMap, LineSegment2, LineSegment3};
 use std::ops::ControlFlow;
 
 /// Edgels of a line have at most this angle to its normal (cosine): about 20°, judged.
-const MIN_COSINE: f64 = 0.93;
+pub(super) const MIN_COSINE: f64 = 0.93;
 /// Distance between samples in pixels: the smoothing before gradients correlates nearer
 /// ones.
 const SPACING: f64 = 3.0;

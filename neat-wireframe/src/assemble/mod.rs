@@ -31,6 +31,7 @@ mod config;
 mod corners;
 mod curve_pieces;
 mod curve_samples;
+mod curved_edges;
 mod curves;
 mod edge_completion;
 mod edge_cutting;
@@ -82,6 +83,7 @@ use circle_fitting::FoundArc;
 use collinear_pieces::merge_pieces;
 use common_directions::turn_to_common_directions;
 use corners::find_corners;
+use curved_edges::{add_as_arcs, take_curved_edges};
 use curves::find_arcs;
 use edge_completion::complete_edges;
 use edge_cutting::{cut_edges, in_order};
@@ -216,10 +218,10 @@ pub fn assemble_with_progress(
         config,
         &mut part(progress, [SELECTED, FOLLOWED]),
     )?;
-    report.arcs = arcs.len();
     let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
     let wireframe = graph_of(selection, arcs, photographs, config, &mut report, progress)?;
+    report.arcs = arcs.len();
     let arc_covariances = covariances_of_arcs(&images, arcs, scene_radius);
     let wireframe = wireframe.map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
@@ -309,7 +311,7 @@ fn proposals(
 /// From lines to a graph: merged, continued, joined at corners, completed, cut and fitted.
 fn graph_of(
     mut selection: Selection<'_>,
-    arcs: &mut [FoundArc],
+    arcs: &mut Vec<FoundArc>,
     photographs: Option<Photographs<'_>>,
     config: &AssembleConfig,
     report: &mut AssembleReport,
@@ -353,8 +355,12 @@ fn graph_of(
     if let Some(light) = photographs.zip(response) {
         drop_gaps(&images, light, &lines, &mut wireframe, &mut sources);
     }
+    let curved = take_curved_edges(&images, &mut wireframe, &mut sources);
     fit_edges(&images, &lines, &sources, &mut wireframe);
-    ControlFlow::Continue(in_order(&wireframe))
+    add_as_arcs(&curved, &wireframe.junctions, arcs);
+    report.curved_lines += curved.len();
+    let ends_of_curves = curved.iter().flat_map(|edge| edge.ends).collect();
+    ControlFlow::Continue(in_order(&wireframe, ends_of_curves))
 }
 
 /// The edgels of a view that is known by its segments only.
