@@ -1,7 +1,7 @@
 //! What the assembler makes of scenes, measured against the truth that each folder holds.
 //!
 //! ```text
-//! cargo run --release -p neat-eval --example measure_assembler -- [--structure] [--reliability] [--out DIR] SCENE…
+//! cargo run --release -p neat-eval --example measure_assembler -- [--structure] [--reliability] [--every K,…] [--out DIR] SCENE…
 //! ```
 //!
 //! No field, no run folder and, unless it is asked for, no confidence: the quickest way from a
@@ -12,10 +12,13 @@
 //! of the 2D segments it explains. With `--out` the wireframes are kept, and so are the 2D
 //! segments, which the next call takes from there. With `--structure` only edges are measured
 //! that are rather creases or boundaries than texture or shadows. With `--reliability` the
-//! probabilities of the edges are held to the truth, too: scenes of one folder are a class.
+//! probabilities of the edges are held to the truth, too, and the weights are fitted from which
+//! they would come: scenes of one folder are a class. With `--every 4,2,1` each scene is built of
+//! every fourth view, of every second and of all; what `--out` keeps is of the last.
 
 #![expect(clippy::print_stdout, reason = "it measures for people to read")]
 
+mod calibration_weights;
 mod prepared;
 mod probabilities;
 
@@ -41,21 +44,33 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 fn main() -> Result<()> {
     let (mut scenes, mut out, mut structure) = (Vec::new(), None, false);
-    let mut probabilities = None;
+    let (mut probabilities, mut every) = (None, vec![1]);
     let mut arguments = env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--out" => out = arguments.next().map(PathBuf::from),
             "--structure" => structure = true,
+            "--every" => {
+                let list = arguments.next().unwrap_or_default();
+                every = (list.split(',').map(str::parse)).collect::<std::result::Result<_, _>>()?;
+            }
             "--reliability" => probabilities = Some(Probabilities::default()),
             _ => scenes.push(PathBuf::from(argument)),
         }
     }
     let mut scores = Vec::new();
-    for dir in &scenes {
+    let parts = scenes
+        .iter()
+        .flat_map(|dir| every.iter().map(move |every| (dir, *every)));
+    for (dir, every) in parts {
         let name = dir.file_name().unwrap_or_default().to_string_lossy();
         let kept = out.as_ref().map(|out| out.join(&*name));
         let mut scene = prepared(dir, kept.as_deref())?;
+        scene.views = scene
+            .views
+            .into_iter()
+            .step_by(usize::max(every, 1))
+            .collect();
         let start = Instant::now();
         let mut built = assembled(&scene)?;
         if let Some(cameras) = &built.refined_cameras {

@@ -1,6 +1,7 @@
-//! Whether edges exist as often as their probabilities say.
+//! Whether edges exist as often as their probabilities say, and what weights these would have.
 
 use crate::Result;
+use crate::calibration_weights::{WeighedEdge, weights};
 use crate::prepared::MIN_SEGMENT_SCORE;
 use neat_core::{LineSegment3, Scene};
 use neat_eval::{Binning, Judged, NeatAbc, SceneTruth, SurfaceAndCreases};
@@ -16,6 +17,7 @@ const BINS: usize = 10;
 #[derive(Default)]
 pub struct Probabilities {
     by_class: BTreeMap<String, Vec<Judged>>,
+    weighed: BTreeMap<String, Vec<WeighedEdge>>,
 }
 
 impl Probabilities {
@@ -29,6 +31,21 @@ impl Probabilities {
         let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
         let config = ConfidenceConfig::default();
         let confidence = assess(in_world, &views, None, 1.0, &config)?;
+        let folder = dir.parent().and_then(Path::file_name).unwrap_or_default();
+        let class = folder.to_string_lossy().into_owned();
+        let edges = confidence.edges.iter().zip(&exists);
+        let of_scene = (edges.len() as f64).sqrt().recip();
+        let weighed = edges.filter_map(|(edge, exists)| {
+            Some(WeighedEdge {
+                witnesses: edge.witnesses?,
+                exists: *exists,
+                weight: of_scene,
+            })
+        });
+        self.weighed
+            .entry(class.clone())
+            .or_default()
+            .extend(weighed);
         let said = confidence.edges.iter().map(|edge| edge.probability);
         let judged: Vec<Judged> = said.zip(exists).collect();
         let count = judged.len().max(1) as f64;
@@ -37,8 +54,6 @@ impl Probabilities {
             judged.iter().map(|(p, _)| p).sum::<f64>() / count,
             judged.iter().filter(|(_, exists)| *exists).count() as f64 / count
         );
-        let folder = dir.parent().and_then(Path::file_name).unwrap_or_default();
-        let class = folder.to_string_lossy().into_owned();
         self.by_class.entry(class).or_default().extend(judged);
         Ok(text)
     }
@@ -64,7 +79,34 @@ impl Probabilities {
                 error(Binning::Count)
             );
         }
+        text += &self.weights();
         text
+    }
+
+    /// The weights that these edges ask for, all of them and without each class, which is then
+    /// held to them.
+    fn weights(&self) -> String {
+        let without = |left_out: Option<&String>| {
+            let used = (self.weighed.iter()).filter(|(class, _)| Some(*class) != left_out);
+            let edges: Vec<WeighedEdge> = used.flat_map(|(_, edges)| edges).copied().collect();
+            let weights = weights(&edges)?;
+            let asked = left_out.map_or(&edges, |class| &self.weighed[class]);
+            let judged: Vec<Judged> = (asked.iter())
+                .map(|edge| (edge.probability(&weights), edge.exists))
+                .collect();
+            let error = expected_calibration_error(&reliability(&judged, BINS, Binning::Width));
+            let named = left_out.map_or("all".to_owned(), |class| format!("all but {class}"));
+            let [base, precision, whole] = weights;
+            Some(format!(
+                "weights of {named}: {base:.2}, precision {precision:.2}, whole {whole:.2}, \
+                 {} calibration error {error:.3}\n",
+                left_out.map_or("their", |class| class)
+            ))
+        };
+        let classes = self.weighed.keys().filter(|_| self.weighed.len() > 1);
+        (std::iter::once(None).chain(classes.map(Some)))
+            .filter_map(without)
+            .collect()
     }
 }
 

@@ -40,6 +40,7 @@ mod occlusion;
 mod provenance;
 mod view_correlation;
 
+pub use calibration::ExistenceWitnesses;
 pub use config::ConfidenceConfig;
 pub use document::{fill_arcs, transformed_covariance};
 pub use noise::DetectionNoise;
@@ -104,6 +105,8 @@ pub struct EdgeConfidence {
     pub residual_in_pixels: Option<f64>,
     /// Probability that the edge exists, in (0, 1).
     pub probability: f64,
+    /// What that is made of; `None` where no view shows any edge.
+    pub witnesses: Option<ExistenceWitnesses>,
 }
 
 /// Asks the images, and the surface if there is one, about a wireframe.
@@ -174,13 +177,16 @@ pub fn assess(
         radius,
         &covariances,
     );
-    let mut probabilities: Vec<f64> = (counts.iter())
+    let by_counts: Vec<f64> = (counts.iter())
         .map(|count| model.probability(*count))
         .collect();
-    if let Some(radius) = radius {
-        let (edges, covariances) = (&wireframe.edges, &estimate.covariances);
-        probabilities = calibrate(&probabilities, edges, &found, covariances, radius);
-    }
+    let probabilities = match radius {
+        Some(radius) => {
+            let (edges, covariances) = (&wireframe.edges, &estimate.covariances);
+            calibrate(&by_counts, edges, &found, covariances, radius)
+        }
+        None => by_counts.into_iter().map(|p| (p, None)).collect(),
+    };
     debug!(
         views = usable_views,
         edges = segments.len(),
@@ -220,7 +226,11 @@ fn view_count(
     }
 }
 
-fn edge_confidence(found: EdgeProvenance, count: ViewCount, probability: f64) -> EdgeConfidence {
+fn edge_confidence(
+    found: EdgeProvenance,
+    count: ViewCount,
+    (probability, witnesses): (f64, Option<ExistenceWitnesses>),
+) -> EdgeConfidence {
     let supports = found.supports;
     let squares: f64 = (supports.iter())
         .map(|support| support.residual_in_pixels.powi(2))
@@ -232,6 +242,7 @@ fn edge_confidence(found: EdgeProvenance, count: ViewCount, probability: f64) ->
         residual_in_pixels: (!supports.is_empty())
             .then(|| (squares / supports.len() as f64).sqrt()),
         probability,
+        witnesses,
         supports,
     }
 }

@@ -95,7 +95,7 @@ fn lines_on_whose_place_views_do_not_agree_are_less_probable() {
         assert!(line.showing_views.len() >= 20);
         let probability = line.probability;
         assert!(
-            2.0 * odds(probability) < odds(least),
+            1.8 * odds(probability) < odds(least),
             "{probability} of {least}"
         );
     }
