@@ -65,6 +65,22 @@ pub(super) fn runs_into(images: &Images, line: &LineSegment3, found: &FoundArc) 
         .is_some_and(|touch| touch.distance <= touch.within)
 }
 
+/// Whether an arc rounds the corner of two lines: each runs into it at its named end, and it turns
+/// by less than half a circle, or they would not meet.
+pub(super) fn rounds(
+    images: &Images,
+    found: &FoundArc,
+    lines: [&LineSegment3; 2],
+    ends: [usize; 2],
+) -> bool {
+    let gap = MAX_GAP * images.reach * found.pixel;
+    let runs_in = |(line, end): (&LineSegment3, usize)| {
+        touch(line, &found.arc, gap)
+            .is_some_and(|touch| touch.line_end == end && touch.distance <= touch.within)
+    };
+    found.arc.sweep() < PI && lines.into_iter().zip(ends).all(runs_in)
+}
+
 /// The place along a line at which an arc goes on from it, at most `gap` apart.
 pub(super) fn touching_place(line: &LineSegment3, arc: &CircularArc, gap: f64) -> Option<f64> {
     let touch = touch(line, arc, gap)?;
@@ -261,7 +277,7 @@ mod tests {
         let ends_at = |edge: LineSegment3, late: f64| {
             let views = TestViews::of_edges(&cameras_on_sphere(20), &edge.ends(), &[[0, 1]]);
             let images = views.images();
-            let mut corners = find_corners(&images, &[chosen(&images, &edge)]);
+            let mut corners = find_corners(&images, &[chosen(&images, &edge)], &[]);
             let mut arcs = [quarter()];
             arcs[0].arc.angles[0] += late;
             end_on_arcs(&images, &mut corners, &mut arcs);
@@ -281,5 +297,31 @@ mod tests {
         // Above it.
         let above = line([-0.2, middle, 0.2], [middle - 0.01, middle, 0.2]);
         assert_eq!(ends_at(above, 0.0).0, above.end);
+    }
+
+    #[test]
+    fn ends_that_an_arc_joins_meet_in_no_corner() {
+        let mut round = quarter();
+        round.arc.radius = 0.03;
+        let lines = [
+            line([0.03, -0.4, 0.1], [0.03, 0.0, 0.1]),
+            line([0.0, 0.03, 0.1], [-0.4, 0.03, 0.1]),
+        ];
+        let ends = lines.map(|line| line.ends()).concat();
+        let views = TestViews::of_edges(&cameras_on_sphere(20), &ends, &[[0, 1], [2, 3]]);
+        let images = views.images();
+        let chosen = lines.map(|line| chosen(&images, &line));
+        let junctions = |arc: Option<FoundArc>| {
+            let corners = find_corners(&images, &chosen, arc.as_slice());
+            corners.junctions.len()
+        };
+        assert_eq!(junctions(None), 3);
+        assert_eq!(junctions(Some(round.clone())), 4);
+        // One that turns back, and one beside them.
+        let mut back = round.clone();
+        back.arc.angles[1] = 1.5 * PI;
+        assert_eq!(junctions(Some(back)), 3);
+        round.arc.center.z += 0.1;
+        assert_eq!(junctions(Some(round)), 3);
     }
 }

@@ -3,6 +3,8 @@
 //! Ends are joined where one point lies on all their lines, as well as these are known, and
 //! near their ends, which edgels tell less well than the lines. The nearest go first.
 
+use super::arc_joints::rounds;
+use super::circle_fitting::FoundArc;
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
 use nalgebra::{Matrix3, Vector3};
@@ -156,8 +158,8 @@ pub(super) fn pixel_sizes(images: &Images, lines: &[ChosenLine]) -> Vec<f64> {
     lines.iter().map(size).collect()
 }
 
-/// Joins the ends of lines.
-pub(super) fn find_corners(images: &Images, lines: &[ChosenLine]) -> Corners {
+/// Joins the ends of lines, but not of those that run into an arc which rounds their corner.
+pub(super) fn find_corners(images: &Images, lines: &[ChosenLine], arcs: &[FoundArc]) -> Corners {
     let pixels = pixel_sizes(images, lines);
     let windows: Vec<f64> = (lines.iter().zip(&pixels))
         .map(|(line, pixel)| {
@@ -182,7 +184,10 @@ pub(super) fn find_corners(images: &Images, lines: &[ChosenLine]) -> Corners {
                     return None;
                 }
             }
-            Some((cost, ends))
+            let pieces = meeting.lines.map(|line| &lines[line].line);
+            let is_round =
+                |found: &FoundArc| rounds(images, found, pieces, ends.map(|end| end % 2));
+            (!arcs.iter().any(is_round)).then_some((cost, ends))
         })
         .collect();
     joints.sort_by(|(a, i), (b, j)| a.total_cmp(b).then(i.cmp(j)));

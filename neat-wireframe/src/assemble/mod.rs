@@ -341,7 +341,7 @@ fn graph_of(
     report.common_directions = turn_to_common_directions(&images, selection.noise, &mut lines);
     join_tangents(&images, &mut lines, arcs);
     meet_in_slivers(&images, &mut lines);
-    let mut corners = find_corners(&images, &lines);
+    let mut corners = find_corners(&images, &lines, arcs);
     report.ends = corners.junctions.len();
     fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
     move_free_ends(&images, &lines, &mut corners);
