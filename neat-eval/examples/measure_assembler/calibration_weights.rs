@@ -18,12 +18,8 @@ impl WeighedEdge {
     }
 
     /// The probability by some weights that it exists.
-    pub fn probability(&self, weights: &[f64; 3]) -> f64 {
-        self.witnesses.by_counts * self.if_more_than_chance(&Vector3::from(*weights))
-    }
-
-    fn if_more_than_chance(&self, weights: &Vector3<f64>) -> f64 {
-        1.0 / (1.0 + (-self.row().dot(weights)).exp())
+    pub fn probability(&self, weights: [f64; 3]) -> f64 {
+        self.witnesses.by_counts * self.witnesses.if_more_than_chance(weights)
     }
 }
 
@@ -39,16 +35,17 @@ pub fn weights(edges: &[WeighedEdge]) -> Option<[f64; 3]> {
         let mut information = Matrix3::identity() * RIDGE;
         let mut gradient = -RIDGE * weights;
         for edge in edges {
-            let by_counts = edge.witnesses.by_counts;
-            let given = edge.if_more_than_chance(&weights);
-            let probability = by_counts * given;
+            let given = edge.witnesses.if_more_than_chance(weights.into());
+            let probability = edge.probability(weights.into());
             let exists = f64::from(u8::from(edge.exists));
-            let change = by_counts * given * (1.0 - given) * edge.row();
-            let weight = edge.weight / (probability * (1.0 - probability));
-            information += weight * change * change.transpose();
-            gradient += weight * (exists - probability) * change;
+            // By how much a weight changes the logarithm of the odds.
+            let row = (1.0 - given) / (1.0 - probability) * edge.row();
+            information += edge.weight * probability * (1.0 - probability) * row * row.transpose();
+            gradient += edge.weight * (exists - probability) * row;
         }
-        weights += information.cholesky()?.solve(&gradient);
+        let step = information.cholesky()?.solve(&gradient);
+        // Few edges ask for steps that lead nowhere.
+        weights += step / step.amax().max(1.0);
     }
     weights
         .iter()

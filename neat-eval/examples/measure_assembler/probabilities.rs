@@ -92,7 +92,7 @@ impl Probabilities {
             let weights = weights(&edges)?;
             let asked = left_out.map_or(&edges, |class| &self.weighed[class]);
             let judged: Vec<Judged> = (asked.iter())
-                .map(|edge| (edge.probability(&weights), edge.exists))
+                .map(|edge| (edge.probability(weights), edge.exists))
                 .collect();
             let error = expected_calibration_error(&reliability(&judged, BINS, Binning::Width));
             let named = left_out.map_or("all".to_owned(), |class| format!("all but {class}"));

@@ -50,10 +50,16 @@ pub struct ExistenceWitnesses {
 }
 
 impl ExistenceWitnesses {
+    /// The probability that the edge exists if it is more than chance, by the log-odds at the
+    /// reference and by what precision and whole edges add.
+    pub fn if_more_than_chance(&self, [base, precision, whole]: [f64; 3]) -> f64 {
+        let log_odds = base + precision * self.precision + whole * self.whole_share;
+        1.0 / (1.0 + (-log_odds).exp())
+    }
+
     /// The probability that the edge exists, neither 0 nor 1.
     fn probability(&self) -> f64 {
-        let log_odds = BASE + PRECISION * self.precision + WHOLE * self.whole_share;
-        possible(self.by_counts / (1.0 + (-log_odds).exp()))
+        possible(self.by_counts * self.if_more_than_chance([BASE, PRECISION, WHOLE]))
     }
 }
 
