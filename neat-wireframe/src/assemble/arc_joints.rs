@@ -59,10 +59,11 @@ pub(super) fn join_tangents(images: &Images, lines: &mut [ChosenLine], arcs: &mu
     }
 }
 
-/// Whether a line ends where it touches the circle of an arc.
-pub(super) fn runs_into(images: &Images, line: &LineSegment3, found: &FoundArc) -> bool {
+/// The end of a line at which it touches the circle of an arc.
+pub(super) fn runs_into(images: &Images, line: &LineSegment3, found: &FoundArc) -> Option<usize> {
     touch(line, &found.arc, MAX_GAP * images.reach * found.pixel)
-        .is_some_and(|touch| touch.distance <= touch.within)
+        .filter(|touch| touch.distance <= touch.within)
+        .map(|touch| touch.line_end)
 }
 
 /// Whether an arc rounds the corner of two lines: each runs into it at its named end, and it turns
@@ -73,12 +74,9 @@ pub(super) fn rounds(
     lines: [&LineSegment3; 2],
     ends: [usize; 2],
 ) -> bool {
-    let gap = MAX_GAP * images.reach * found.pixel;
-    let runs_in = |(line, end): (&LineSegment3, usize)| {
-        touch(line, &found.arc, gap)
-            .is_some_and(|touch| touch.line_end == end && touch.distance <= touch.within)
-    };
-    found.arc.sweep() < PI && lines.into_iter().zip(ends).all(runs_in)
+    let mut of_lines = lines.into_iter().zip(ends);
+    found.arc.sweep() < PI
+        && of_lines.all(|(line, end)| runs_into(images, line, found) == Some(end))
 }
 
 /// The place along a line at which an arc goes on from it, at most `gap` apart.

@@ -13,8 +13,10 @@
 
 use super::circle_fitting::FoundArc;
 use super::curves::{BESIDE_IN_PIXELS, runs_beside};
-use super::edge_samples::{Images, MIN_COSINE};
+use super::edge_cutting::retain_edges;
+use super::edge_samples::{Images, MIN_COSINE, project_segment};
 use super::line_fitting::{directions_across, loss_of_reach};
+use super::line_selection::REACH_NOISES;
 use super::projected_line::ProjectedLine;
 use crate::solve::reweighted;
 use crate::statistics::upper_median;
@@ -31,9 +33,7 @@ const SHARES: [f64; 2] = [0.6, 0.9];
 const BOW_OF_CURVE: f64 = 0.1;
 /// … and how high all views may see a straight edge bow, in reaches, judged: half the standard
 /// deviation of an edgel.
-const BOW_OF_LINE: f64 = 1.0 / 6.0;
-/// The reach by the standard deviation of an edgel.
-const NOISES_OF_REACH: f64 = 3.0;
+const BOW_OF_LINE: f64 = 0.5 / REACH_NOISES;
 /// Edgels of a bowed edge lie farther from its chord than those of a straight one: within so
 /// many reaches, and at least so many pixels, judged.
 const WIDE_REACH: f64 = 2.5;
@@ -103,10 +103,8 @@ pub(super) fn take_curved_edges(
     let curved: Vec<Option<CurvedEdge>> = (edges.par_iter().zip(&asked))
         .map(|(ends, asked)| asked.as_ref()?.curve(*ends, least))
         .collect();
-    let mut of_edges = curved.iter();
-    edges.retain(|_| of_edges.next().is_some_and(Option::is_none));
-    let mut of_edges = curved.iter();
-    sources.retain(|_| of_edges.next().is_some_and(Option::is_none));
+    let kept: Vec<bool> = curved.iter().map(Option::is_none).collect();
+    retain_edges(&kept, edges, sources);
     curved.into_iter().flatten().collect()
 }
 
@@ -188,8 +186,8 @@ impl Images<'_> {
     ) -> Option<BowOfView> {
         let (camera, map) = (&self.views[view].camera, &self.maps[view]);
         let projected = ProjectedLine::new(camera, line)?;
-        let length = share * self.projected_length(line, std::iter::once(view));
-        let count = (length / SPACING).clamp(COUNTS[0], COUNTS[1]) as usize;
+        let length = project_segment(&self.views[view], line).map_or(0.0, |whole| whole.length());
+        let count = (share * length / SPACING).clamp(COUNTS[0], COUNTS[1]) as usize;
         let inner = [0.5 - 0.5 * share, 0.5 + 0.5 * share];
         let samples = self.samples(view, line, inner, Some(count))?;
         let reach = (WIDE_REACH * self.reach).max(MIN_WIDE_REACH);
@@ -212,7 +210,7 @@ impl Images<'_> {
             return None;
         }
         let found = reweighted(&rows, loss_of_reach(self.reach), RIDGE)?;
-        let noise = self.reach / NOISES_OF_REACH;
+        let noise = self.reach / REACH_NOISES;
         let middle = samples[samples.len() / 2].pixel;
         let [by_start, by_end] = projected.distance_with_gradient(camera, &middle).by_points;
         Some(BowOfView {

@@ -127,6 +127,18 @@ fn cut_crossings(images: &Images, corners: &mut Corners, cuts: &mut [Vec<(f64, u
     }
 }
 
+/// Takes the edges away that are not `kept`, with the lines that they are pieces of.
+pub(super) fn retain_edges(
+    kept: &[bool],
+    edges: &mut Vec<[usize; 2]>,
+    sources: &mut Vec<Option<usize>>,
+) {
+    let mut of_edges = kept.iter();
+    edges.retain(|_| of_edges.next() == Some(&true));
+    let mut of_edges = kept.iter();
+    sources.retain(|_| of_edges.next() == Some(&true));
+}
+
 /// The junctions that edges use, and some others, in lexicographic order of their coordinates, and
 /// the edges, sorted.
 pub(super) fn in_order(wireframe: &Wireframe3d, others: BTreeSet<usize>) -> Wireframe3d {

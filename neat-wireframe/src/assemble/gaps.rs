@@ -5,6 +5,7 @@
 //! and the light says whether anything lies between.
 
 use super::collinear_pieces::MAX_GAP;
+use super::edge_cutting::retain_edges;
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
 use super::profiles::{Asked, Photographs, Response, light_across};
@@ -38,10 +39,7 @@ pub(super) fn drop_gaps(
     for (edge, light) in edges.into_iter().zip(lights) {
         kept[edge] = light.for_rest_of_edge() >= 0.0;
     }
-    let mut of_edges = kept.iter();
-    wireframe.edges.retain(|_| of_edges.next() == Some(&true));
-    let mut of_edges = kept.iter();
-    sources.retain(|_| of_edges.next() == Some(&true));
+    retain_edges(&kept, &mut wireframe.edges, sources);
 }
 
 /// The edges at both of whose ends their line goes on.

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::ops::ControlFlow;
 
 /// An edgel may be off by so many standard deviations of edgels: 99.7 % are not.
-const REACH_NOISES: f64 = 3.0;
+pub(super) const REACH_NOISES: f64 = 3.0;
 /// Bounds of the reach in pixels: rounding and rendering, and edges side by side.
 const REACH_BOUNDS: [f64; 2] = [0.25, 1.5];
 /// So many lines tell of the noise and the poses; with 400 scores of photographs are the same.

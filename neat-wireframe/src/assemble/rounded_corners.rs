@@ -67,7 +67,7 @@ pub(super) fn rounded_corners(
                 (views.len() >= MIN_VIEWS).then(|| wide.follow_arc(&rounding.arc, &views))??;
             let found = images.follow_arc(&guess.arc, &views)?;
             // Or it is something else.
-            let touches = |line: &ChosenLine| runs_into(images, &line.line, &found);
+            let touches = |line: &ChosenLine| runs_into(images, &line.line, &found).is_some();
             (touches(one) && touches(other)).then_some(Chord {
                 arc: guess.arc,
                 views,
