@@ -1,0 +1,1 @@
+"""Houses, façades and tables with exact truth, for scripts/make_photographs.py."""

@@ -1,0 +1,161 @@
+"""Which creases of a surface are seen, by rays."""
+
+import numpy as np
+import trimesh
+
+SHARP = np.cos(np.radians(30.0))
+# Bends of a chain of creases up to here are of one round edge.
+ROUND = np.cos(np.radians(20.0))
+STRAIGHT = np.cos(np.radians(0.05))
+STEP, VIEWS, PIXELS = 0.025, 3, 8.0
+# So far off the plane of what is beside it, in metres, is something behind or before it.
+OFF = 0.005
+
+
+def creases(vertices, triangles, endless):
+    """Straight creases, as they end at each other, and round ones as polylines.
+
+    Faces that are `endless` end somewhere, but not for anyone who looks: no crease is between them.
+    """
+    mesh = trimesh.Trimesh(vertices, triangles, process=False)
+    mesh.merge_vertices(digits_vertex=6)
+    normals = mesh.face_normals
+    pairs = mesh.face_adjacency
+    sharp = (normals[pairs[:, 0]] * normals[pairs[:, 1]]).sum(1) < SHARP
+    sharp &= ~endless[pairs].all(1)
+    points = np.asarray(mesh.vertices)
+    edges = mesh.face_adjacency_edges[sharp]
+    edges = edges[np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1) > 1e-6]
+    chains = chained(points, edges)
+    straight, curved = [], []
+    for chain in chains:
+        line = points[chain]
+        steps = np.diff(line, axis=0)
+        steps /= np.linalg.norm(steps, axis=1, keepdims=True)
+        bends = (steps[1:] * steps[:-1]).sum(1)
+        if len(bends) and bends.min() < STRAIGHT:
+            curved.append(line)
+        else:
+            straight.append(line[[0, -1]])
+    return np.array(straight), curved
+
+
+def chained(points, edges):
+    """Edges that go on in each other, where nothing else ends, with small bends."""
+    at = {}
+    for edge, (a, b) in enumerate(edges):
+        at.setdefault(a, []).append(edge)
+        at.setdefault(b, []).append(edge)
+
+    def following(edge, end):
+        others = [other for other in at[end] if other != edge]
+        if len(others) != 1:
+            return None
+        far = edges[others[0]][edges[others[0]] != end][0]
+        near = edges[edge][edges[edge] != end][0]
+        before, after = points[end] - points[near], points[far] - points[end]
+        cosine = before @ after / np.linalg.norm(before) / np.linalg.norm(after)
+        return (others[0], far) if cosine > ROUND else None
+
+    chains, used = [], set()
+    for first in range(len(edges)):
+        if first in used:
+            continue
+        used.add(first)
+        chain = list(edges[first])
+        for side in (1, 0):
+            edge = first
+            while (step := following(edge, chain[-1] if side else chain[0])) and step[
+                0
+            ] not in used:
+                edge, end = step
+                used.add(edge)
+                chain.insert(len(chain) if side else 0, end)
+        chains.append(chain)
+    return chains
+
+
+class Sight:
+    """Rays through a surface with leaves."""
+
+    def __init__(self, vertices, triangles, scale):
+        self.mesh = trimesh.Trimesh(vertices, triangles, process=False)
+        self.normals, self.scale = self.mesh.face_normals, scale
+        self.caster = trimesh.ray.ray_pyembree.RayMeshIntersector(self.mesh)
+
+    def first(self, center, directions):
+        """Distance along each unit direction to what is hit first, and its normal."""
+        hits = self.caster.intersects_first(np.tile(center, (len(directions), 1)), directions)
+        normals = self.normals[hits]
+        on = self.mesh.vertices[self.mesh.faces[hits, 0]]
+        slant = (normals * directions).sum(1)
+        away = ((on - center) * normals).sum(1) / np.where(np.abs(slant) < 1e-12, 1e-12, slant)
+        return np.where(hits < 0, np.inf, away), np.where(hits[:, None] < 0, 0.0, normals)
+
+    def seen(self, camera, points, directions):
+        """Whether edges with a direction are visible at points, and the points in the picture."""
+        rotation, center, focal, width, height = camera
+        local = (points - center) @ rotation.T
+        ahead = local[:, 2] > 0.01 * self.scale
+        depth = np.where(ahead, local[:, 2], 1.0)
+        at = local[:, :2] / depth[:, None] * focal + [width / 2, height / 2]
+        inside = ahead & (at > 2).all(1) & (at < [width - 2, height - 2]).all(1)
+        result, chosen = np.zeros(len(points), bool), np.flatnonzero(inside)
+        away = np.linalg.norm(points[chosen] - center, axis=1)
+        free, _ = self.first(center, (points[chosen] - center) / away[:, None])
+        pixel = away / focal
+        chosen = chosen[free > away - np.maximum(0.25 * pixel, 1e-4 * self.scale)]
+        away = np.linalg.norm(points[chosen] - center, axis=1)
+        moved = (points[chosen] + 1e-3 * self.scale * directions[chosen] - center) @ rotation.T
+        across = moved[:, :2] / moved[:, 2:] * focal + [width / 2, height / 2] - at[chosen]
+        length = np.linalg.norm(across, axis=1, keepdims=True)
+        across = np.column_stack([-across[:, 1], across[:, 0]]) / np.maximum(length, 1e-12)
+        sides, rays_of = [], []
+        for side in (-1, 1):
+            rays = (at[chosen] + side * across - [width / 2, height / 2]) / focal
+            rays = np.column_stack([rays, np.ones(len(rays))]) @ rotation
+            rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+            rays_of.append(rays)
+            sides.append(self.first(center, rays))
+        # Seen surfaces differ if they turn, or if what is on one side lies off the plane of the other.
+        (near, one), (far, two) = sides
+        bent = (one * two).sum(1) < SHARP
+        with np.errstate(invalid="ignore"):
+            apart = far[:, None] * rays_of[1] - near[:, None] * rays_of[0]
+            off = np.maximum(np.abs((apart * one).sum(1)), np.abs((apart * two).sum(1)))
+            step = ~(off < OFF * self.scale)
+        result[chosen[bent | step]] = True
+        return result, at
+
+
+def visible(sight, cameras, lines, scale):
+    """Pieces of lines that enough views see: two points and whether each is an end of its line."""
+    counts = [max(int(np.ceil(np.linalg.norm(b - a) / (STEP * scale))), 2) for a, b in lines]
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    share = np.concatenate([(np.arange(count) + 0.5) / count for count in counts])
+    of = np.repeat(np.arange(len(lines)), counts)
+    points = lines[of, 0] + share[:, None] * (lines[of, 1] - lines[of, 0])
+    directions = lines[:, 1] - lines[:, 0]
+    directions = (directions / np.linalg.norm(directions, axis=1, keepdims=True))[of]
+    votes = np.zeros(len(points), int)
+    for camera in cameras:
+        seen, at = sight.seen(camera, points, directions)
+        for line in np.unique(of[seen]):
+            here = slice(starts[line], starts[line + 1])
+            for low, high in runs(seen[here]):
+                a, b = at[here][low], at[here][high - 1]
+                if np.linalg.norm(b - a) * (high - low) / max(high - low - 1, 1) >= PIXELS:
+                    votes[here][low:high] += 1
+    pieces = []
+    for line, (a, b) in enumerate(lines):
+        count = counts[line]
+        for low, high in runs(votes[starts[line] : starts[line + 1]] >= VIEWS):
+            ends = a + np.array([[low], [high]]) / count * (b - a)
+            pieces.append((ends, (low == 0, high == count)))
+    return pieces
+
+
+def runs(mask):
+    """Where a mask is true: first and one past last of each run."""
+    change = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return change.reshape(-1, 2)
