@@ -9,7 +9,7 @@ use neat_wireframe::assemble::{
 };
 use neat_wireframe::confidence::{ConfidenceConfig, assess};
 use neat_wireframe::faces::{MeasuredGraph, find_shells, surface_points};
-use neat_wireframe::kinds::edge_kinds;
+use neat_wireframe::kinds::{WithoutPaint, edge_kinds, without_paint};
 use neat_wireframe::paper::NeatLine;
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SignedDistance, ViewObservation};
@@ -49,6 +49,8 @@ pub struct Draft {
     pub arc_covariances: Vec<Option<Matrix4<f64>>>,
     /// What each step kept and removed.
     pub report: BackEndReport,
+    /// Edges that are structure with less than this probability are left out.
+    pub min_structure: f64,
     /// The cameras where the images show the wireframe, if they were moved.
     pub refined_cameras: Option<Vec<Camera>>,
 }
@@ -91,13 +93,13 @@ pub fn assemble_images(
         return Err(error.into());
     }
     match built {
-        ControlFlow::Continue(built) => Ok(Draft::from(built)),
+        ControlFlow::Continue(built) => Ok(Draft::new(built, config.min_structure)),
         ControlFlow::Break(()) => Err(Cancelled.into()),
     }
 }
 
-impl From<Assembled> for Draft {
-    fn from(built: Assembled) -> Self {
+impl Draft {
+    fn new(built: Assembled, min_structure: f64) -> Self {
         Self {
             wireframe: built.wireframe,
             arcs: built.arcs,
@@ -105,14 +107,13 @@ impl From<Assembled> for Draft {
             report: BackEndReport::Assembler {
                 steps: built.report,
             },
+            min_structure,
             refined_cameras: built.refined_cameras,
         }
     }
-}
 
-impl Draft {
     /// Asks the images, and the surface that may hide things where one is given, how sure
-    /// everything is and what each edge is.
+    /// everything is and what each edge is; what is hardly structure goes.
     ///
     /// # Errors
     /// If an image lies in a file that cannot be read, or the wireframe is not valid.
@@ -129,14 +130,25 @@ impl Draft {
         // The images are asked from where they show the wireframe.
         let scene = refined_scene.as_ref().unwrap_or(scene);
         let views = ViewObservation::from_scene(scene, min_segment_score);
-        let confidence = assess(&self.wireframe, &views, hiding, scene_radius, config)?;
+        let assessed = |wireframe: &_| assess(wireframe, &views, hiding, scene_radius, config);
+        let mut confidence = assessed(&self.wireframe)?;
         let edges = confidence.edges.iter();
         let shown: Vec<Vec<usize>> = edges.map(|edge| edge.showing_views.clone()).collect();
         let kinds = edge_kinds(&self.wireframe, scene, &shown)?;
+        let WithoutPaint {
+            wireframe,
+            kinds,
+            painted,
+        } = without_paint(&self.wireframe, &self.arcs, &kinds, self.min_structure);
+        let mut report = self.report;
+        if painted > 0 {
+            confidence = assessed(&wireframe)?;
+            report.leave_out(painted, &wireframe);
+        }
         let junctions = confidence.junctions.iter();
         let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
         let graph = MeasuredGraph {
-            wireframe: &self.wireframe,
+            wireframe: &wireframe,
             arcs: &self.arcs,
             covariances: &covariances,
         };
@@ -144,13 +156,13 @@ impl Draft {
         let points = surface_points(&cameras, &scene.sparse_points);
         let shells = find_shells(&graph, &views, &points);
         Ok(Distilled {
-            wireframe: self.wireframe,
+            wireframe,
             arcs: self.arcs,
             shells,
             arc_covariances: self.arc_covariances,
             confidence,
             kinds,
-            report: self.report,
+            report,
             refined_scene,
         })
     }

@@ -61,6 +61,14 @@ pub enum BackEndReport {
 }
 
 impl BackEndReport {
+    /// Counts what went once the kinds of edges were known, and what is left.
+    pub(crate) fn leave_out(&mut self, painted: usize, left: &Wireframe3d) {
+        if let Self::Assembler { steps } = self {
+            steps.painted = painted;
+            (steps.junctions, steps.edges) = (left.junctions.len(), left.edges.len());
+        }
+    }
+
     /// How far the poses were moved, if they were.
     pub fn moved_poses(&self) -> Option<Decision> {
         let Self::Assembler { steps } = self else {
@@ -107,6 +115,12 @@ impl BackEndReport {
                 "{segments} {} have positions in space, none of which enough images show: the \
                  poses, or 2D wireframes of other images; {LOOK}",
                 found.segments_with_hypotheses
+            )
+        } else if found.painted > 0 {
+            format!(
+                "the {} edges that the images show are paint, joints or shadows: \
+                 --set distill.assembler.min_structure=0 keeps them",
+                found.painted
             )
         } else {
             format!(

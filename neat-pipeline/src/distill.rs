@@ -161,6 +161,7 @@ fn paper(
         report: BackEndReport::Paper {
             steps: built.counts,
         },
+        min_structure: 0.0,
         refined_cameras: None,
     })
 }

@@ -11,7 +11,8 @@
 //! `scripts/measure_photographs.py` does (surface-and-creases), one without truth by how much
 //! of the 2D segments it explains. With `--out` the wireframes are kept, and so are the 2D
 //! segments, which the next call takes from there. With `--structure` only edges are measured
-//! that are rather creases or boundaries than texture or shadows. With `--reliability` the
+//! that are rather creases or boundaries than texture or shadows, without it those that are not
+//! surely the latter, as a run keeps them. With `--reliability` the
 //! probabilities of the edges are held to the truth, too, and the weights are fitted from which
 //! they would come: scenes of one folder are a class. With `--every 4,2,1` each scene is built of
 //! every fourth view, of every second and of all; what `--out` keeps is of the last.
@@ -27,9 +28,10 @@ use neat_eval::{
     CubicBezier, EdgeModel, EdgePoints, EdgeSampling, EvaluationInput, EvaluationOptions, NeatAbc,
 };
 use neat_eval::{Protocol, SceneTruth, Scores, SurfaceAndCreases, foreign};
+use neat_wireframe::assemble::{AssembleConfig, Assembled};
 use neat_wireframe::confidence::{ConfidenceConfig, assess};
 use neat_wireframe::export::{WireframeDocument, write_json};
-use neat_wireframe::kinds::edge_kinds;
+use neat_wireframe::kinds::{edge_kinds, without_paint};
 use neat_wireframe::metrics::{ImageEvidenceConfig, Matching, PrecisionRecall, image_evidence};
 use neat_wireframe::{ViewObservation, Wireframe3d};
 use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
@@ -76,9 +78,12 @@ fn main() -> Result<()> {
         if let Some(cameras) = &built.refined_cameras {
             scene = scene.with_cameras(cameras);
         }
-        if structure {
-            built.wireframe = structure_of(&built.wireframe, &scene)?;
-        }
+        let least = if structure {
+            0.5
+        } else {
+            AssembleConfig::default().min_structure
+        };
+        built.wireframe = structure_of(&built, &scene, least)?;
         let seconds = start.elapsed().as_secs_f64();
         let original = |p: &_| scene.original_from_world.apply(p);
         let wireframe = built.wireframe.map(original);
@@ -117,22 +122,15 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// The edges that are more likely creases or boundaries than anything else.
-fn structure_of(wireframe: &Wireframe3d, scene: &Scene) -> Result<Wireframe3d> {
+/// Without edges that are creases or boundaries with less than a probability.
+fn structure_of(built: &Assembled, scene: &Scene, least: f64) -> Result<Wireframe3d> {
     let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
     let config = ConfidenceConfig::default();
-    let confidence = assess(wireframe, &views, None, 1.0, &config)?;
+    let confidence = assess(&built.wireframe, &views, None, 1.0, &config)?;
     let edges = confidence.edges.into_iter();
     let shown: Vec<Vec<usize>> = edges.map(|edge| edge.showing_views).collect();
-    let kinds = edge_kinds(wireframe, scene, &shown)?;
-    let edges = wireframe.edges.iter().zip(&kinds);
-    Ok(Wireframe3d {
-        junctions: wireframe.junctions.clone(),
-        edges: edges
-            .filter(|(_, kinds)| kinds.structure() >= 0.5)
-            .map(|(edge, _)| *edge)
-            .collect(),
-    })
+    let kinds = edge_kinds(&built.wireframe, scene, &shown)?;
+    Ok(without_paint(&built.wireframe, &built.arcs, &kinds, least).wireframe)
 }
 
 /// How much of the length of what was found lies within 0.01 of true edges and curves, and how

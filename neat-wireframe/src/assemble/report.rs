@@ -55,6 +55,9 @@ pub struct AssembleReport {
     pub ends: usize,
     /// Edges between corners that no pair of views could place.
     pub completed_edges: usize,
+    /// Edges that are hardly structure, and were left out once their kinds were known.
+    #[serde(default)]
+    pub painted: usize,
     /// Junctions of the wireframe.
     pub junctions: usize,
     /// Edges of the wireframe.

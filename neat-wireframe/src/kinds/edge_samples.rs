@@ -24,6 +24,8 @@ const END: f64 = 0.05;
 /// what a joint or a rounded edge is wide, and the edge itself.
 const SIDE_BAND: [f64; 5] = [6.0, 7.5, 9.0, 10.5, 12.0];
 const CENTRE_BAND: [f64; 3] = [-0.5, 0.0, 0.5];
+/// Bands next to the edge, just beyond its blur: a thin line has the same on both sides.
+const NEAR_BAND: [f64; 3] = [2.5, 3.25, 4.0];
 
 /// What one view shows of an edge.
 #[derive(Clone, Debug, Default)]
@@ -40,6 +42,8 @@ pub(super) struct Bands {
     pub left: [f64; 3],
     pub centre: [f64; 3],
     pub right: [f64; 3],
+    /// Next to the edge, left and right.
+    pub near: [[f64; 3]; 2],
 }
 
 /// Where an edge is sampled: for each piece, shares of the edge's length.
@@ -194,6 +198,7 @@ impl Image<'_> {
             left: mean(&SIDE_BAND, 1.0)?,
             centre: mean(&CENTRE_BAND, 1.0)?,
             right: mean(&SIDE_BAND, -1.0)?,
+            near: [mean(&NEAR_BAND, 1.0)?, mean(&NEAR_BAND, -1.0)?],
         })
     }
 

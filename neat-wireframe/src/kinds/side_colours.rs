@@ -7,7 +7,7 @@ use crate::statistics::upper_median;
 const DARK: f64 = 5.0;
 
 /// Differences are natural logarithms of ratios: 0.1 is ten percent.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SideColours {
     /// Mean over the colour channels by how much their ratios across the edge differ: what
     /// light cannot do, as it changes all channels alike.
@@ -16,22 +16,24 @@ pub(super) struct SideColours {
     pub step: f64,
     /// By how much the edge is darker than the mean of its sides; negative if it is brighter.
     pub darkness: f64,
+    /// Half the ratio of brightness just left and right of it: root mean square over the views.
+    /// Two faces are lit alike by chance only, and hardly from all sides.
+    pub contrast: f64,
     /// By how much more the chroma of one side changes over the views than that of the other:
     /// a background moves behind an edge, a face does not.
     pub instability: f64,
 }
 
 impl SideColours {
-    /// All zero if no view shows the bands.
-    pub(super) fn new(samples: &[ViewSamples]) -> Self {
-        let views: Vec<[[f64; 3]; 3]> = samples
-            .iter()
+    /// `None` if no view shows the bands.
+    pub(super) fn new(samples: &[ViewSamples]) -> Option<Self> {
+        let bands: Vec<&Bands> = (samples.iter())
             .filter_map(|view| view.bands.as_ref())
-            .map(logarithms)
             .collect();
-        if views.is_empty() {
-            return Self::default();
+        if bands.is_empty() {
+            return None;
         }
+        let views: Vec<[[f64; 3]; 3]> = bands.iter().map(|bands| logarithms(bands)).collect();
         let across = |view: &[[f64; 3]; 3]| std::array::from_fn(|k| view[0][k] - view[2][k]);
         let ratios: Vec<[f64; 3]> = views.iter().map(across).collect();
         let mut steps: Vec<f64> = ratios
@@ -48,17 +50,26 @@ impl SideColours {
         let dark = |view: &[[f64; 3]; 3]| {
             0.5 * (mean_channel(&view[0]) + mean_channel(&view[2])) - mean_channel(&view[1])
         };
-        Self {
+        let contrasts = bands.iter().map(|bands| {
+            let [left, right] = bands.near.map(|rgb| mean_channel(&logarithm(&rgb)));
+            (0.5 * (left - right)).powi(2)
+        });
+        Some(Self {
             chroma: mean_channel(&mean(&chroma_ratios).map(f64::abs)),
             step: upper_median(&mut steps),
             darkness: views.iter().map(dark).sum::<f64>() / views.len() as f64,
+            contrast: (contrasts.sum::<f64>() / bands.len() as f64).sqrt(),
             instability: (scatter(&relative(0)) - scatter(&relative(2))).abs(),
-        }
+        })
     }
 }
 
 fn logarithms(bands: &Bands) -> [[f64; 3]; 3] {
-    [bands.left, bands.centre, bands.right].map(|rgb| rgb.map(|x| (x + DARK).ln()))
+    [bands.left, bands.centre, bands.right].map(|rgb| logarithm(&rgb))
+}
+
+fn logarithm(rgb: &[f64; 3]) -> [f64; 3] {
+    rgb.map(|x| (x + DARK).ln())
 }
 
 fn mean_channel(rgb: &[f64; 3]) -> f64 {

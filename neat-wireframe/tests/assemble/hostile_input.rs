@@ -114,6 +114,7 @@ fn config() -> impl Strategy<Value = AssembleConfig> {
             min_segment_length_in_pixels: min_length,
             ball_margin,
             neighbours,
+            ..AssembleConfig::default()
         }
     })
 }
