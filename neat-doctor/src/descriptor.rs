@@ -62,7 +62,7 @@ const STEP: f32 = 1.5;
 
 /// A histogram of gradients (Lowe 2004), of which only comparisons are kept: of
 /// each number to the mean, and to the next orientation of its cell.
-fn describe(gradients: &[GrayImage; 2], corner: &Corner) -> Option<Descriptor> {
+pub(crate) fn describe(gradients: &[GrayImage; 2], corner: &Corner) -> Option<Descriptor> {
     let side = CELLS * CELL_SIZE;
     let half = side as f32 / 2.0;
     // The corners of the square, in any rotation.

@@ -5,6 +5,7 @@ use crate::evidence::{Gathered, evenly, gather, is_textured};
 use crate::examination::{Check, Examination, Finding, Level, Repair};
 use crate::image_checks::image_findings;
 use crate::load_failure::{explain, size_factor};
+use crate::point_looks::points_look_alike;
 use crate::pose_diagnosis::Diagnosis;
 use crate::segment_checks::segment_findings;
 use crate::working_copies::WorkingCopies;
@@ -132,13 +133,16 @@ fn pose_findings(
     let findings = diagnosed(limit, textured)?;
     if textured && findings.iter().any(Finding::is_unexplained) {
         // Things that look the same from several sides are matched wrongly, however often:
-        // where corners without any match agree, they are right.
+        // where corners without any match agree, or points of the files, they are right.
         let of_corners: Vec<Finding> = diagnosed(FULL_VIEWS, false)?;
         if of_corners
             .iter()
             .all(|finding| finding.level == Level::Good)
         {
             return Ok(of_corners);
+        }
+        if let Some(message) = points_look_alike(scene, working)? {
+            return Ok(vec![Finding::new(Check::Poses, Level::Good, message)]);
         }
     }
     Ok(findings)

@@ -40,6 +40,7 @@ mod image_checks;
 mod lens;
 mod likeness;
 mod load_failure;
+mod point_looks;
 mod point_transfer;
 mod pose_diagnosis;
 mod pose_findings;
