@@ -114,8 +114,10 @@ def write_truth(folder, kind, seed, solid, everything, cameras, names, sight):
         frame |= {"cx": width / 2, "cy": height / 2, "R": rotation.tolist()}
         frames.append(frame | {"t": (-rotation @ center).tolist(), "centre": center.tolist()})
     save("cameras.json", frames)
-    vertices, triangles = everything
-    trimesh.Trimesh(vertices, triangles, process=False).export(folder / "mesh.ply")
+    mesh = trimesh.Trimesh(*everything, process=False)
+    # A union leaves slivers, to which no distance can be told.
+    mesh.update_faces(mesh.area_faces > 1e-12 * kind.SCALE**2)
+    mesh.export(folder / "mesh.ply")
     length = lambda lines: float(
         sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines)
     )
@@ -127,7 +129,7 @@ def write_truth(folder, kind, seed, solid, everything, cameras, names, sight):
         "f": kind.FOCAL,
     }
     stats |= {
-        "triangles": len(triangles),
+        "triangles": len(everything[1]),
         "junctions": len(junctions),
         "junctions_corner": cut.count(False),
     }
