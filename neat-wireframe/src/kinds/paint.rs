@@ -114,7 +114,12 @@ impl<'a> Graph<'a> {
             self.junctions[end] - self.junctions[junction],
         ];
         let lengths = [before.norm(), after.norm()];
-        if start == end || before.dot(&after) < STRAIGHT * lengths[0] * lengths[1] {
+        let is_known =
+            |edge: &usize| self.edges[*edge].is_some_and(|(ends, _)| ends.contains(&end));
+        if start == end
+            || self.at[start].iter().any(is_known)
+            || before.dot(&after) < STRAIGHT * lengths[0] * lengths[1]
+        {
             return None;
         }
         self.remove(second);
@@ -184,6 +189,15 @@ mod tests {
         assert_eq!(left.wireframe.junctions, ends);
         assert!((left.kinds[0].structure() - 0.7).abs() < 1e-12);
         assert_eq!(left.painted, 1);
+    }
+
+    #[test]
+    fn no_edge_is_there_twice() {
+        let (mut wireframe, mut kinds) = crossed();
+        wireframe.edges.insert(1, [0, 2]);
+        kinds.insert(1, kinds[0]);
+        let left = left(&wireframe, &[], &kinds);
+        assert_eq!(left.edges, [[0, 1], [0, 2], [1, 2]]);
     }
 
     #[test]
