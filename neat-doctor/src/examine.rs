@@ -2,10 +2,10 @@
 
 use crate::capture_checks::capture_findings;
 use crate::evidence::{Gathered, evenly, gather, is_textured};
-use crate::examination::{Check, Examination, Finding, Level, Repair};
+use crate::examination::{Cause, Check, Examination, Finding, Level, Repair};
 use crate::image_checks::image_findings;
 use crate::load_failure::{explain, size_factor};
-use crate::point_looks::points_look_alike;
+use crate::point_looks::PointLooks;
 use crate::pose_diagnosis::Diagnosis;
 use crate::segment_checks::segment_findings;
 use crate::working_copies::WorkingCopies;
@@ -141,8 +141,27 @@ fn pose_findings(
         {
             return Ok(of_corners);
         }
-        if let Some(message) = points_look_alike(scene, working)? {
+        if let Some(message) = PointLooks::new(scene, working, &[])?.for_all() {
             return Ok(vec![Finding::new(Check::Poses, Level::Good, message)]);
+        }
+    }
+    without_views_that_points_speak_for(scene, working, findings)
+}
+
+/// Drops what is said against the poses of some views, if sparse points look as they should in all
+/// of these.
+fn without_views_that_points_speak_for(
+    scene: &Scene,
+    working: &WorkingCopies<'_>,
+    mut findings: Vec<Finding>,
+) -> Result<Vec<Finding>, SceneError> {
+    let accused = |finding: &Finding| finding.cause == Some(Cause::BadPose);
+    if let Some(at) = findings.iter().position(accused) {
+        let named = |name: &String| scene.views.iter().position(|view| view.name == *name);
+        let views: Vec<usize> = findings[at].views.iter().filter_map(named).collect();
+        let looks = PointLooks::new(scene, working, &views)?;
+        if !views.is_empty() && views.iter().all(|view| looks.for_view(*view)) {
+            findings.remove(at);
         }
     }
     Ok(findings)

@@ -3,13 +3,14 @@
 //!
 //! Bricks and boards match their neighbours. But a point of the files is asked for at two places
 //! that nobody has to search for: with the right cameras both views look more alike there than
-//! the one does to a place beside in the other. With wrong ones, or with images of something
-//! else, it is as often the other way round.
+//! the one does to a place beside in the other. With images of something else it is as often the
+//! other way round, and with wrong cameras points are not projected to where they were seen.
 
 use crate::corners::Corner;
 use crate::descriptor::{Descriptor, describe, distance};
 use crate::evidence::evenly;
 use crate::working_copies::WorkingCopies;
+use nalgebra::Vector2;
 use neat_core::{Scene, SceneError, SparsePoint};
 
 /// Views that are looked at, and points in each of them, at most.
@@ -19,65 +20,128 @@ const POINTS: usize = 400;
 const MIN_PAIRS: usize = 100;
 /// How far beside is something else, in pixels of the working image: as wide as what is described.
 const BESIDE: f32 = 24.0;
-/// Standard deviations by which more than half of the pairs must look alike.
-const SIGNIFICANT: f64 = 6.0;
+/// Standard deviations by which more than half of the pairs must look alike, of all views and of
+/// one: views that are asked about are few.
+const SIGNIFICANT: [f64; 2] = [6.0, 3.5];
+/// A point that is projected farther from where it was seen, as a share of the larger side of the
+/// image, does not look like itself: four pixels of a thousand.
+const OFF: f64 = 0.004;
 
 /// What a view shows of a point.
 struct Look {
     point: usize,
+    /// Whether it is projected to where it was seen.
+    in_place: bool,
     here: Descriptor,
     /// Left or right of it, and above or below.
     beside: [Descriptor; 2],
 }
 
-/// What speaks for the cameras of a scene with sparse points, in words; `None` if nothing does.
-///
-/// # Errors
-/// If an image lies in a file that cannot be read.
-pub(crate) fn points_look_alike(
-    scene: &Scene,
-    working: &WorkingCopies<'_>,
-) -> Result<Option<String>, SceneError> {
-    let views = evenly(scene.views.len(), VIEWS);
-    let looks = working.look_at(&views, |view| looks(scene, working, view))?;
-    let mut last = vec![None; scene.sparse_points.len()];
-    let (mut alike, mut total) = ([0; 2], [0; 2]);
-    for look in looks.iter().flatten() {
-        let Some(before) = last[look.point].replace(look.here) else {
-            continue;
-        };
-        let here = distance(&before, &look.here);
-        for (axis, beside) in look.beside.iter().enumerate() {
-            let beside = distance(&before, beside);
-            total[axis] += usize::from(here != beside);
-            alike[axis] += usize::from(here < beside);
-        }
+/// How often points look more alike where they should be, for either way of being beside it.
+#[derive(Clone, Copy, Default)]
+struct Looks {
+    alike: [usize; 2],
+    total: [usize; 2],
+}
+
+impl Looks {
+    fn add(&mut self, axis: usize, [here, beside]: [u32; 2]) {
+        self.total[axis] += usize::from(here != beside);
+        self.alike[axis] += usize::from(here < beside);
     }
-    // Where images are exchanged, courses of bricks still go on in each other: both axes must tell.
-    let is_significant = |axis: usize| {
-        let chance = total[axis] as f64 / 2.0;
-        alike[axis] as f64 - chance > SIGNIFICANT * (chance / 2.0).sqrt()
-    };
-    let enough = total[0].min(total[1]) >= MIN_PAIRS;
-    Ok((enough && is_significant(0) && is_significant(1)).then(|| {
-        let (alike, total) = (alike[0] + alike[1], total[0] + total[1]);
-        format!(
-            "sparse points look the same in two views where the cameras put them, and not beside \
-             it, {alike} times of {total}"
-        )
-    }))
+
+    /// Where images are exchanged, courses of bricks still go on in each other: both axes must
+    /// tell.
+    fn tell(&self, significant: f64) -> bool {
+        let tells = |axis: usize| {
+            let chance = self.total[axis] as f64 / 2.0;
+            let gain = self.alike[axis] as f64 - chance;
+            self.total[axis] >= MIN_PAIRS && gain > significant * (chance / 2.0).sqrt()
+        };
+        tells(0) && tells(1)
+    }
+}
+
+/// What the sparse points of a scene say about its cameras.
+pub(crate) struct PointLooks {
+    all: Looks,
+    per_view: Vec<Looks>,
+}
+
+impl PointLooks {
+    /// Looks at some views, `these` among them.
+    ///
+    /// # Errors
+    /// If an image lies in a file that cannot be read.
+    pub fn new(
+        scene: &Scene,
+        working: &WorkingCopies<'_>,
+        these: &[usize],
+    ) -> Result<Self, SceneError> {
+        let mut views = evenly(scene.views.len(), VIEWS);
+        views.extend(these);
+        views.sort_unstable();
+        views.dedup();
+        let found = working.look_at(&views, |view| looks(scene, working, view))?;
+        let mut this = Self {
+            all: Looks::default(),
+            per_view: vec![Looks::default(); scene.views.len()],
+        };
+        let mut last = vec![None; scene.sparse_points.len()];
+        for (&view, looks) in views.iter().zip(&found) {
+            for look in looks {
+                let Some((other, before)) = last[look.point].replace((view, look.here)) else {
+                    continue;
+                };
+                let here = if look.in_place {
+                    distance(&before, &look.here)
+                } else {
+                    u32::MAX
+                };
+                for (axis, beside) in look.beside.iter().enumerate() {
+                    let distances = [here, distance(&before, beside)];
+                    this.all.add(axis, distances);
+                    this.per_view[view].add(axis, distances);
+                    this.per_view[other].add(axis, distances);
+                }
+            }
+        }
+        Ok(this)
+    }
+
+    /// What speaks for all cameras, in words; `None` if nothing does.
+    pub fn for_all(&self) -> Option<String> {
+        let Looks { alike, total } = self.all;
+        self.all.tell(SIGNIFICANT[0]).then(|| {
+            format!(
+                "sparse points look the same in two views where the cameras put them, and not \
+                 beside it, {} times of {}",
+                alike[0] + alike[1],
+                total[0] + total[1]
+            )
+        })
+    }
+
+    /// Whether points speak for the camera of a view.
+    pub fn for_view(&self, view: usize) -> bool {
+        self.per_view[view].tell(SIGNIFICANT[1])
+    }
 }
 
 fn looks(scene: &Scene, working: &WorkingCopies<'_>, view: usize) -> Result<Vec<Look>, SceneError> {
     let (image, factor) = working.of(view)?;
     let gradients = image.blurred(1).gradients();
     let camera = &scene.views[view].camera;
-    let is_seen = |point: &SparsePoint| point.observations.iter().any(|seen| seen.view == view);
-    let seen: Vec<usize> = (0..scene.sparse_points.len())
-        .filter(|index| is_seen(&scene.sparse_points[*index]))
+    let seen_at = |point: &SparsePoint| {
+        let seen = point.observations.iter().find(|seen| seen.view == view);
+        seen.map(|seen| seen.pixel)
+    };
+    let seen: Vec<(usize, Vector2<f64>)> = (scene.sparse_points.iter().enumerate())
+        .filter_map(|(index, point)| Some((index, seen_at(point)?)))
         .collect();
+    let off = OFF * f64::from(camera.width.max(camera.height));
     let look = |index: usize| {
-        let point = seen[index];
+        let (point, pixel) = seen[index];
         let projection = camera.project(&scene.sparse_points[point].position_in_world);
         let in_copy =
             |full: f64| ((full - scene.pixel_center + 0.5) / f64::from(factor) - 0.5) as f32;
@@ -102,6 +166,7 @@ fn looks(scene: &Scene, working: &WorkingCopies<'_>, view: usize) -> Result<Vec<
         };
         Some(Look {
             point,
+            in_place: (projection.pixel - pixel).norm() <= off,
             here: (projection.depth > 0.0).then(|| at([0.0, 0.0]))??,
             beside: [at([side, 0.0])?, at([0.0, side])?],
         })
@@ -115,7 +180,7 @@ fn looks(scene: &Scene, working: &WorkingCopies<'_>, view: usize) -> Result<Vec<
 mod tests {
     use super::*;
     use image::{Rgb, RgbImage};
-    use nalgebra::{Rotation3, Vector2, Vector3};
+    use nalgebra::{Rotation3, Vector3};
     use neat_core::synthetic::{SyntheticScene, generate};
     use neat_core::{MemoryLimit, Observation};
 
@@ -148,28 +213,42 @@ mod tests {
             view.image = image.into();
         }
         scene.pixel_center = 0.5;
-        let observations: Vec<Observation> = (scene.views.iter().enumerate())
-            .map(|(view, of)| Observation {
-                view,
-                pixel: of.camera.project(&Vector3::zeros()).pixel,
-            })
-            .collect();
+        let cameras: Vec<_> = scene.views.iter().map(|view| view.camera).collect();
         let place = |index: usize, prime: f64| (f64::from(index as u32) * prime).fract() - 0.5;
-        scene.sparse_points = (0..400)
-            .map(|index| SparsePoint {
-                position_in_world: Vector3::new(
-                    place(index, 0.754_877),
-                    place(index, 0.569_840),
-                    0.0,
-                ),
-                observations: observations.clone(),
-            })
-            .collect();
+        let point = |index: usize| {
+            let position_in_world =
+                Vector3::new(place(index, 0.754_877), place(index, 0.569_840), 0.0);
+            let seen = |(view, camera): (usize, &neat_core::Camera)| Observation {
+                view,
+                pixel: camera.project(&position_in_world).pixel,
+            };
+            SparsePoint {
+                position_in_world,
+                observations: cameras.iter().enumerate().map(seen).collect(),
+            }
+        };
+        scene.sparse_points = (0..400).map(point).collect();
         scene
     }
 
+    fn looks(scene: &Scene) -> PointLooks {
+        let working = WorkingCopies::new(scene, MemoryLimit::default());
+        PointLooks::new(scene, &working, &[]).unwrap()
+    }
+
     fn found(scene: &Scene) -> Option<String> {
-        points_look_alike(scene, &WorkingCopies::new(scene, MemoryLimit::default())).unwrap()
+        looks(scene).for_all()
+    }
+
+    #[test]
+    fn points_speak_against_the_one_view_that_is_wrong() {
+        let mut scene = wall(0.0);
+        let off = Rotation3::from_euler_angles(0.2, 0.13, 0.1);
+        scene.views[5].camera.world_from_camera *= off.into_inner();
+        let looks = looks(&scene);
+        let spoken_for: Vec<usize> = (0..8).filter(|view| looks.for_view(*view)).collect();
+        assert!(!looks.for_view(5));
+        assert!(spoken_for.len() >= 5, "{spoken_for:?}");
     }
 
     #[test]
