@@ -18,8 +18,10 @@ import time
 import numpy as np
 import trimesh
 from photographs import colmap, facades, houses, render, tables, truth
+from photographs.cameras import HEIGHT, MIDDLE, WIDTH, Camera
 
 ENDLESS = ["grass", "asphalt", "floor"]
+SIZE = {"width": WIDTH, "height": HEIGHT}
 KINDS = {"house": houses, "facade": facades, "table": tables}
 
 
@@ -41,7 +43,7 @@ def write(kind, seed, folder, count, truth_alone):
     random = np.random.default_rng(seed)
     part, leaves, views = kind.build(random)
     vertices, triangles, materials = part.surface()
-    cameras = [camera(eye, at, kind.FOCAL) for eye, at in views[:count]]
+    cameras = [Camera.looking(eye, at, kind.FOCAL) for eye, at in views[:count]]
     everything = joined([(vertices, triangles), *leaves])
     sight = truth.Sight(*everything, kind.SCALE)
     names = [f"{view + 1:04d}.jpg" for view in range(len(cameras))]
@@ -53,23 +55,13 @@ def write(kind, seed, folder, count, truth_alone):
     (folder / "images").mkdir(parents=True, exist_ok=True)
     render.prepare((vertices, triangles, materials), leaves, kind.SCALE, kind.FOCAL, random)
     pictures = []
-    for name, (rotation, center, *_) in zip(names, cameras):
+    for name, camera in zip(names, cameras):
         started = time.monotonic()
-        picture = render.picture(rotation, center, random)
+        picture = render.picture(camera, random)
         picture.save(folder / "images" / name, quality=92, subsampling=0)
         pictures.append(np.asarray(picture))
         print(f"{folder}/images/{name} {time.monotonic() - started:.0f} s", flush=True)
     colmap.write(folder / "sparse" / "0", cameras, pictures, names, sight, kind.SCALE, random)
-
-
-def camera(eye, at, focal):
-    """Axes right, down, forward in rows, the centre, and the lens."""
-    eye, at = np.asarray(eye, float), np.asarray(at, float)
-    forward = (at - eye) / np.linalg.norm(at - eye)
-    right = np.cross(forward, [0, 0, 1])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(forward, right), forward])
-    return rotation, eye, focal, render.WIDTH, render.HEIGHT
 
 
 def joined(meshes):
@@ -109,10 +101,11 @@ def write_truth(folder, kind, seed, solid, everything, cameras, names, sight):
     save("curved.json", bent)
     save("texture_lines.json", [])
     frames = []
-    for name, (rotation, center, focal, width, height) in zip(names, cameras):
-        frame = {"name": name, "width": width, "height": height, "f": focal}
-        frame |= {"cx": width / 2, "cy": height / 2, "R": rotation.tolist()}
-        frames.append(frame | {"t": (-rotation @ center).tolist(), "centre": center.tolist()})
+    for name, camera in zip(names, cameras):
+        frame = {"name": name, **SIZE, "f": camera.focal}
+        frame |= {"cx": MIDDLE[0], "cy": MIDDLE[1], "R": camera.rotation.tolist()}
+        shift = -camera.rotation @ camera.center
+        frames.append(frame | {"t": shift.tolist(), "centre": camera.center.tolist()})
     save("cameras.json", frames)
     mesh = trimesh.Trimesh(*everything, process=False)
     # A union leaves slivers, to which no distance can be told.
@@ -122,17 +115,8 @@ def write_truth(folder, kind, seed, solid, everything, cameras, names, sight):
         sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines)
     )
     stats = {"scene": kind.__name__.split(".")[-1], "seed": seed, "unit": "m", "scale": kind.SCALE}
-    stats |= {
-        "views": len(cameras),
-        "width": render.WIDTH,
-        "height": render.HEIGHT,
-        "f": kind.FOCAL,
-    }
-    stats |= {
-        "triangles": len(everything[1]),
-        "junctions": len(junctions),
-        "junctions_corner": cut.count(False),
-    }
+    stats |= {"views": len(cameras), **SIZE, "f": kind.FOCAL, "triangles": len(everything[1])}
+    stats |= {"junctions": len(junctions), "junctions_corner": cut.count(False)}
     stats |= {"edges": len(edges), "edge_length": length([ends for ends, _ in pieces])}
     save("stats.json", stats | {"curved": len(bent), "curved_length": length(np.array(bent))})
 

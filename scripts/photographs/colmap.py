@@ -3,6 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from .cameras import HEIGHT, MIDDLE, WIDTH, Camera, within
+
 # Errors of poses in degrees and metres, of image points in pixels, and the share of false matches.
 TURN, MOVE, PIXEL, FALSE = 0.01, 0.0005, 0.5, 0.01
 POINTS = 4000
@@ -11,17 +13,16 @@ POINTS = 4000
 def write(folder, cameras, pictures, names, sight, scale, random):
     folder.mkdir(parents=True, exist_ok=True)
     poses = []
-    for rotation, center, *_ in cameras:
+    for camera in cameras:
         turn = Rotation.from_rotvec(random.normal(0, np.radians(TURN), 3)).as_matrix()
-        poses.append((turn @ rotation, center + random.normal(0, MOVE * scale, 3)))
+        center = camera.center + random.normal(0, MOVE * scale, 3)
+        poses.append(Camera(turn @ camera.rotation, center, camera.focal))
     tracks = observed(cameras, pictures, sight, scale, random)
-    focal, width, height = cameras[0][2:]
-    (folder / "cameras.txt").write_text(
-        f"1 PINHOLE {width} {height} {focal} {focal} {width / 2} {height / 2}\n"
-    )
+    focal, (x, y) = cameras[0].focal, MIDDLE
+    (folder / "cameras.txt").write_text(f"1 PINHOLE {WIDTH} {HEIGHT} {focal} {focal} {x} {y}\n")
     per_view, lines = [[] for _ in cameras], []
     for color, track in tracks:
-        point, error = triangulated(poses, track, focal, width, height)
+        point, error = triangulated(poses, track)
         if point is None:
             continue
         text = []
@@ -34,9 +35,9 @@ def write(folder, cameras, pictures, names, sight, scale, random):
         )
     (folder / "points3D.txt").write_text("\n".join(lines) + "\n")
     text = []
-    for view, ((rotation, center), name) in enumerate(zip(poses, names)):
-        x, y, z, w = Rotation.from_matrix(rotation).as_quat()
-        t = -rotation @ center
+    for view, (pose, name) in enumerate(zip(poses, names)):
+        x, y, z, w = Rotation.from_matrix(pose.rotation).as_quat()
+        t = -pose.rotation @ pose.center
         text.append(
             f"{view + 1} {w:.10f} {x:.10f} {y:.10f} {z:.10f} {t[0]:.8f} {t[1]:.8f} {t[2]:.8f} 1 {name}"
         )
@@ -48,7 +49,6 @@ def observed(cameras, pictures, sight, scale, random):
     """Points at strong gradients: colour, and where views see them."""
     tracks = []
     for camera, picture in zip(cameras, pictures):
-        rotation, center, focal, width, height = camera
         grey = picture.mean(2)
         strength = np.hypot(*np.gradient(grey))
         strength[:4], strength[-4:], strength[:, :4], strength[:, -4:] = 0, 0, 0, 0
@@ -56,14 +56,10 @@ def observed(cameras, pictures, sight, scale, random):
         if not weight.any():
             continue
         chosen = random.choice(len(weight), POINTS // len(cameras), p=weight / weight.sum())
-        at = np.column_stack([chosen % width, chosen // width]) + 0.5
-        rays = (
-            np.column_stack([(at - [width / 2, height / 2]) / focal, np.ones(len(at))]) @ rotation
-        )
-        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-        away, _ = sight.first(center, rays)
+        rays = camera.rays(np.column_stack([chosen % WIDTH, chosen // WIDTH]) + 0.5)
+        away, _ = sight.first(camera.center, rays)
         hit = np.isfinite(away) & (away > 0)
-        points = center + away[hit, None] * rays[hit]
+        points = camera.center + away[hit, None] * rays[hit]
         colors = picture.reshape(-1, 3)[chosen[hit]]
         seen = [views_of(points, other, sight, scale) for other in cameras]
         for index in range(len(points)):
@@ -79,37 +75,31 @@ def observed(cameras, pictures, sight, scale, random):
 
 
 def views_of(points, camera, sight, scale):
-    rotation, center, focal, width, height = camera
-    local = (points - center) @ rotation.T
-    depth = np.maximum(local[:, 2], 1e-9)
-    at = local[:, :2] / depth[:, None] * focal + [width / 2, height / 2]
-    away = np.linalg.norm(points - center, axis=1)
-    first, _ = sight.first(center, (points - center) / away[:, None])
-    inside = (local[:, 2] > 0) & (at > 1).all(1) & (at < [width - 1, height - 1]).all(1)
-    return inside & (first > away - 2e-3 * scale), at
+    at, depth = camera.projected(points)
+    away = np.linalg.norm(points - camera.center, axis=1)
+    first, _ = sight.first(camera.center, (points - camera.center) / away[:, None])
+    return (depth > 0) & within(at, 1) & (first > away - 2e-3 * scale), at
 
 
-def triangulated(poses, track, focal, width, height):
+def triangulated(poses, track):
     """Least squares over rays, then over the picture; the mean error in pixels."""
-    rows = [(poses[view], (at - [width / 2, height / 2]) / focal) for view, at in track]
     system, right = np.zeros((3, 3)), np.zeros(3)
-    for (rotation, center), at in rows:
-        ray = np.array([*at, 1.0]) @ rotation
-        ray /= np.linalg.norm(ray)
+    for view, at in track:
+        ray = poses[view].rays(at[None])[0]
         across = np.eye(3) - np.outer(ray, ray)
         system += across
-        right += across @ center
+        right += across @ poses[view].center
     point = np.linalg.solve(system, right)
     for _ in range(5):
         jacobian, error = [], []
-        for (rotation, center), at in rows:
-            x, y, z = rotation @ (point - center)
+        for view, at in track:
+            pose = poses[view]
+            x, y, z = pose.rotation @ (point - pose.center)
             if z <= 0:
                 return None, None
-            jacobian.append(
-                focal * np.array([[1 / z, 0, -x / z**2], [0, 1 / z, -y / z**2]]) @ rotation
-            )
-            error.append(focal * (at - [x / z, y / z]))
+            by_local = np.array([[1 / z, 0, -x / z**2], [0, 1 / z, -y / z**2]])
+            jacobian.append(pose.focal * by_local @ pose.rotation)
+            error.append(at - MIDDLE - pose.focal * np.array([x / z, y / z]))
         jacobian, error = np.concatenate(jacobian), np.concatenate(error)
         point = point + np.linalg.lstsq(jacobian, error, rcond=None)[0]
     return point, float(np.linalg.norm(error.reshape(-1, 2), axis=1).mean())

@@ -9,7 +9,9 @@ import mathutils
 import numpy as np
 from PIL import Image, ImageFilter
 
-WIDTH, HEIGHT, SAMPLES = 1080, 720, 12
+from .cameras import HEIGHT, WIDTH
+
+SAMPLES = 12
 # Blur of the lens in pixels, noise of the sensor and darkening at the corners.
 BLUR, NOISE, VIGNETTE = 0.4, 1.5, 0.15
 
@@ -155,12 +157,11 @@ def prepare(surface, leaves, scale, focal, random):
     scene.camera = camera
 
 
-def picture(rotation, center, random):
-    """Of a camera with axes right, down, forward in the rows of `rotation`."""
+def picture(camera, random):
     scene = bpy.context.scene
     pose = np.eye(4)
-    pose[:3, :3] = rotation.T @ np.diag([1, -1, -1])
-    pose[:3, 3] = center
+    pose[:3, :3] = camera.rotation.T @ np.diag([1, -1, -1])
+    pose[:3, 3] = camera.center
     scene.camera.matrix_world = mathutils.Matrix(pose.tolist())
     with tempfile.TemporaryDirectory() as folder:
         scene.render.filepath = str(pathlib.Path(folder) / "picture.png")

@@ -3,6 +3,8 @@
 import numpy as np
 import trimesh
 
+from .cameras import within
+
 SHARP = np.cos(np.radians(30.0))
 # Bends of a chain of creases up to here are of one round edge.
 ROUND = np.cos(np.radians(20.0))
@@ -94,34 +96,24 @@ class Sight:
 
     def seen(self, camera, points, directions):
         """Whether edges with a direction are visible at points, and the points in the picture."""
-        rotation, center, focal, width, height = camera
-        local = (points - center) @ rotation.T
-        ahead = local[:, 2] > 0.01 * self.scale
-        depth = np.where(ahead, local[:, 2], 1.0)
-        at = local[:, :2] / depth[:, None] * focal + [width / 2, height / 2]
-        inside = ahead & (at > 2).all(1) & (at < [width - 2, height - 2]).all(1)
+        center = camera.center
+        at, depth = camera.projected(points)
+        inside = (depth > 0.01 * self.scale) & within(at, 2)
         result, chosen = np.zeros(len(points), bool), np.flatnonzero(inside)
         away = np.linalg.norm(points[chosen] - center, axis=1)
         free, _ = self.first(center, (points[chosen] - center) / away[:, None])
-        pixel = away / focal
-        chosen = chosen[free > away - np.maximum(0.25 * pixel, 1e-4 * self.scale)]
-        away = np.linalg.norm(points[chosen] - center, axis=1)
-        moved = (points[chosen] + 1e-3 * self.scale * directions[chosen] - center) @ rotation.T
-        across = moved[:, :2] / moved[:, 2:] * focal + [width / 2, height / 2] - at[chosen]
+        near = np.maximum(0.25 * away / camera.focal, 1e-4 * self.scale)
+        chosen = chosen[free > away - near]
+        moved, _ = camera.projected(points[chosen] + 1e-3 * self.scale * directions[chosen])
+        across = moved - at[chosen]
         length = np.linalg.norm(across, axis=1, keepdims=True)
         across = np.column_stack([-across[:, 1], across[:, 0]]) / np.maximum(length, 1e-12)
-        sides, rays_of = [], []
-        for side in (-1, 1):
-            rays = (at[chosen] + side * across - [width / 2, height / 2]) / focal
-            rays = np.column_stack([rays, np.ones(len(rays))]) @ rotation
-            rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-            rays_of.append(rays)
-            sides.append(self.first(center, rays))
+        rays = [camera.rays(at[chosen] + side * across) for side in (-1, 1)]
+        (near, one), (far, two) = (self.first(center, of_side) for of_side in rays)
         # Seen surfaces differ if they turn, or if what is on one side lies off the plane of the other.
-        (near, one), (far, two) = sides
         bent = (one * two).sum(1) < SHARP
         with np.errstate(invalid="ignore"):
-            apart = far[:, None] * rays_of[1] - near[:, None] * rays_of[0]
+            apart = far[:, None] * rays[1] - near[:, None] * rays[0]
             off = np.maximum(np.abs((apart * one).sum(1)), np.abs((apart * two).sum(1)))
             step = ~(off < OFF * self.scale)
         result[chosen[bent | step]] = True
