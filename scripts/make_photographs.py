@@ -90,15 +90,9 @@ def write_truth(folder, kind, seed, solid, everything, cameras, names, sight):
         edges.append(edge)
     save = lambda name, value: (folder / name).write_text(json.dumps(value))
     save("wireframe.json", {"junctions": junctions, "edges": edges, "cut_end": cut})
-    bent = []
-    for line in curved:
-        steps = np.stack([line[:-1], line[1:]], 1)
-        bent += (
-            [ends.round(6).tolist() for ends, _ in truth.visible(sight, cameras, steps, kind.SCALE)]
-            if len(steps)
-            else []
-        )
-    save("curved.json", bent)
+    bent = truth.visible(sight, cameras, curved, kind.SCALE) if curved else []
+    bent = [line.round(6) for line, _ in bent]
+    save("curved.json", [line.tolist() for line in bent])
     save("texture_lines.json", [])
     frames = []
     for name, camera in zip(names, cameras):
@@ -118,7 +112,7 @@ def write_truth(folder, kind, seed, solid, everything, cameras, names, sight):
     stats |= {"views": len(cameras), **SIZE, "f": kind.FOCAL, "triangles": len(everything[1])}
     stats |= {"junctions": len(junctions), "junctions_corner": cut.count(False)}
     stats |= {"edges": len(edges), "edge_length": length([ends for ends, _ in pieces])}
-    save("stats.json", stats | {"curved": len(bent), "curved_length": length(np.array(bent))})
+    save("stats.json", stats | {"curved": len(bent), "curved_length": length(bent)})
 
 
 if __name__ == "__main__":

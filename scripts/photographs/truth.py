@@ -39,7 +39,7 @@ def creases(vertices, triangles, endless):
             curved.append(line)
         else:
             straight.append(line[[0, -1]])
-    return np.array(straight), curved
+    return straight, curved
 
 
 def chained(points, edges):
@@ -121,30 +121,59 @@ class Sight:
 
 
 def visible(sight, cameras, lines, scale):
-    """Pieces of lines that enough views see: two points and whether each is an end of its line."""
-    counts = [max(int(np.ceil(np.linalg.norm(b - a) / (STEP * scale))), 2) for a, b in lines]
-    starts = np.concatenate([[0], np.cumsum(counts)])
-    share = np.concatenate([(np.arange(count) + 0.5) / count for count in counts])
-    of = np.repeat(np.arange(len(lines)), counts)
-    points = lines[of, 0] + share[:, None] * (lines[of, 1] - lines[of, 0])
-    directions = lines[:, 1] - lines[:, 0]
-    directions = (directions / np.linalg.norm(directions, axis=1, keepdims=True))[of]
+    """Pieces of polylines that enough views see, and whether each end is one of its line."""
+    places = [sampled(line, STEP * scale) for line in lines]
+    starts = np.concatenate([[0], np.cumsum([len(share) for share, _, _ in places])])
+    of = np.repeat(np.arange(len(lines)), np.diff(starts))
+    points = np.concatenate([points for _, points, _ in places])
+    directions = np.concatenate([directions for _, _, directions in places])
     votes = np.zeros(len(points), int)
     for camera in cameras:
         seen, at = sight.seen(camera, points, directions)
         for line in np.unique(of[seen]):
             here = slice(starts[line], starts[line + 1])
             for low, high in runs(seen[here]):
-                a, b = at[here][low], at[here][high - 1]
-                if np.linalg.norm(b - a) * (high - low) / max(high - low - 1, 1) >= PIXELS:
+                steps = np.linalg.norm(np.diff(at[here][low:high], axis=0), axis=1)
+                if steps.sum() * (high - low) / max(high - low - 1, 1) >= PIXELS:
                     votes[here][low:high] += 1
     pieces = []
-    for line, (a, b) in enumerate(lines):
-        count = counts[line]
-        for low, high in runs(votes[starts[line] : starts[line + 1]] >= VIEWS):
-            ends = a + np.array([[low], [high]]) / count * (b - a)
-            pieces.append((ends, (low == 0, high == count)))
+    for index, line in enumerate(lines):
+        count = starts[index + 1] - starts[index]
+        for low, high in runs(votes[starts[index] : starts[index + 1]] >= VIEWS):
+            piece = part(line, low / count, high / count)
+            pieces.append((piece, (low == 0, high == count)))
     return pieces
+
+
+def lengths_to(line):
+    """Of a polyline from its start to each of its points."""
+    return np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+
+
+def at_share(line, share):
+    """Points at shares of the length of a polyline."""
+    to = lengths_to(line)
+    return np.stack([np.interp(share * to[-1], to, line[:, axis]) for axis in range(3)], 1)
+
+
+def sampled(line, step):
+    """Shares of the length, points and directions along a polyline, two at least."""
+    to = lengths_to(line)
+    count = max(int(np.ceil(to[-1] / step)), 2)
+    share = (np.arange(count) + 0.5) / count
+    of = np.searchsorted(to, share * to[-1], side="right") - 1
+    directions = np.diff(line, axis=0)[of.clip(0, len(line) - 2)]
+    directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return share, at_share(line, share), directions
+
+
+def part(line, low, high):
+    """A polyline from one share of its length to another."""
+    to = lengths_to(line)
+    between = (to > low * to[-1]) & (to < high * to[-1])
+    between[[0, -1]] = False
+    start, end = at_share(line, np.array([low, high]))
+    return np.concatenate([[start], line[between], [end]])
 
 
 def runs(mask):
