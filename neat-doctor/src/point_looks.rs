@@ -9,7 +9,7 @@
 use crate::corners::Corner;
 use crate::descriptor::{Descriptor, describe, distance};
 use crate::evidence::evenly;
-use crate::working_copies::WorkingCopies;
+use crate::working_copies::{WorkingCopies, in_copy};
 use nalgebra::Vector2;
 use neat_core::{Scene, SceneError, SparsePoint};
 
@@ -143,21 +143,14 @@ fn looks(scene: &Scene, working: &WorkingCopies<'_>, view: usize) -> Result<Vec<
     let look = |index: usize| {
         let (point, pixel) = seen[index];
         let projection = camera.project(&scene.sparse_points[point].position_in_world);
-        let in_copy =
-            |full: f64| ((full - scene.pixel_center + 0.5) / f64::from(factor) - 0.5) as f32;
-        let at = |[x, y]: [f32; 2]| {
-            let (x, y) = (
-                in_copy(projection.pixel.x) + x,
-                in_copy(projection.pixel.y) + y,
-            );
-            describe(
-                &gradients,
-                &Corner {
-                    x,
-                    y,
-                    strength: 0.0,
-                },
-            )
+        let middle = in_copy(&projection.pixel, scene.pixel_center, factor);
+        let at = |x: f32, y: f32| {
+            let corner = Corner {
+                x: middle.x as f32 + x,
+                y: middle.y as f32 + y,
+                strength: 0.0,
+            };
+            describe(&gradients, &corner)
         };
         let side = if point.is_multiple_of(2) {
             BESIDE
@@ -167,8 +160,8 @@ fn looks(scene: &Scene, working: &WorkingCopies<'_>, view: usize) -> Result<Vec<
         Some(Look {
             point,
             in_place: (projection.pixel - pixel).norm() <= off,
-            here: (projection.depth > 0.0).then(|| at([0.0, 0.0]))??,
-            beside: [at([side, 0.0])?, at([0.0, side])?],
+            here: (projection.depth > 0.0).then(|| at(0.0, 0.0))??,
+            beside: [at(side, 0.0)?, at(0.0, side)?],
         })
     };
     Ok((evenly(seen.len(), POINTS).into_iter())

@@ -5,7 +5,7 @@ use crate::examination::{
     Cause, Check, Finding, Level, counted, listed, median, percent, views_where,
 };
 use crate::gray_image::GrayImage;
-use crate::working_copies::WorkingCopies;
+use crate::working_copies::{WorkingCopies, in_copy};
 use nalgebra::Vector2;
 use neat_core::{LineSegment2, Scene, SceneError, View};
 
@@ -179,10 +179,8 @@ fn meant_segments(scene: &Scene, view: usize, meant: Meant) -> Option<Vec<LineSe
 }
 
 fn in_working_pixels(segments: &[LineSegment2], scene: &Scene, factor: u32) -> Vec<LineSegment2> {
-    let working = |end: Vector2<f64>| {
-        (end.add_scalar(0.5 - scene.pixel_center) / f64::from(factor)).add_scalar(-0.5)
-    };
-    let map = |s: &LineSegment2| LineSegment2::new(working(s.start), working(s.end));
+    let working = |end: &Vector2<f64>| in_copy(end, scene.pixel_center, factor);
+    let map = |s: &LineSegment2| LineSegment2::new(working(&s.start), working(&s.end));
     segments.iter().map(map).collect()
 }
 

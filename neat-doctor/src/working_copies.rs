@@ -2,6 +2,7 @@
 //! looked at, so that few of them are in memory at once.
 
 use crate::gray_image::GrayImage;
+use nalgebra::Vector2;
 use neat_core::{MemoryLimit, Scene, SceneError};
 
 /// Bytes for each pixel of a photograph that lies in a file, while it is scaled down.
@@ -9,6 +10,11 @@ const BYTES_PER_PIXEL: u64 = 4;
 /// Bytes for a working copy of the largest size with what is derived from it: its blurred
 /// versions, gradients and descriptors.
 const BYTES_PER_COPY: u64 = 64 << 20;
+
+/// Where a point of an image lies in its working copy, which is scaled down by `factor`.
+pub(crate) fn in_copy(point: &Vector2<f64>, pixel_center: f64, factor: u32) -> Vector2<f64> {
+    (point.add_scalar(0.5 - pixel_center) / f64::from(factor)).add_scalar(-0.5)
+}
 
 /// Gives out the working copies of views.
 pub(crate) struct WorkingCopies<'a> {
