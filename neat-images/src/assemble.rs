@@ -132,9 +132,7 @@ impl Draft {
         let views = ViewObservation::from_scene(scene, min_segment_score);
         let assessed = |wireframe: &_| assess(wireframe, &views, hiding, scene_radius, config);
         let mut confidence = assessed(&self.wireframe)?;
-        let edges = confidence.edges.iter();
-        let shown: Vec<Vec<usize>> = edges.map(|edge| edge.showing_views.clone()).collect();
-        let kinds = edge_kinds(&self.wireframe, scene, &shown)?;
+        let kinds = edge_kinds(&self.wireframe, scene, &confidence.edges)?;
         let WithoutPaint {
             wireframe,
             kinds,

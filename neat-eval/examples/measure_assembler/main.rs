@@ -127,9 +127,7 @@ fn structure_of(built: &Assembled, scene: &Scene, least: f64) -> Result<Wirefram
     let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
     let config = ConfidenceConfig::default();
     let confidence = assess(&built.wireframe, &views, None, 1.0, &config)?;
-    let edges = confidence.edges.into_iter();
-    let shown: Vec<Vec<usize>> = edges.map(|edge| edge.showing_views).collect();
-    let kinds = edge_kinds(&built.wireframe, scene, &shown)?;
+    let kinds = edge_kinds(&built.wireframe, scene, &confidence.edges)?;
     Ok(without_paint(&built.wireframe, &built.arcs, &kinds, least).wireframe)
 }
 

@@ -89,7 +89,7 @@ pub struct JunctionConfidence {
 }
 
 /// How sure an edge is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct EdgeConfidence {
     /// The 2D segments that lie on the edge, by ascending view and segment.
     pub supports: Vec<EdgeSupport>,
@@ -107,6 +107,13 @@ pub struct EdgeConfidence {
     pub probability: f64,
     /// What that is made of; `None` where no view shows any edge.
     pub witnesses: Option<ExistenceWitnesses>,
+}
+
+impl EdgeConfidence {
+    /// Of the views that ought to show the edge those that do: 0 to 1.
+    pub fn share_of_views(&self) -> f64 {
+        self.showing_views.len() as f64 / self.expected_views.max(1) as f64
+    }
 }
 
 /// Asks the images, and the surface if there is one, about a wireframe.

@@ -10,11 +10,13 @@ pub(super) const HALF_PLANES: usize = 17;
 /// Angle between neighbours: a strip of eight pixels that is turned by it moves by half a
 /// pixel between views that are 20° apart.
 const STEP: f64 = PI / (HALF_PLANES + 1) as f64;
-/// A half-plane that is seen under a flatter angle than 20° is too foreshortened to compare.
-const GRAZING: f64 = PI / 9.0;
+/// A half-plane that is seen under a flatter angle than 4° is too foreshortened to compare.
+const GRAZING: f64 = PI / 45.0;
+/// What is foreshortened is followed farther, but not by more than this.
+const MAX_STRETCH: f64 = 10.0;
 /// Share of the views that must be in front of a plane. The others may be given a segment of
 /// something else.
-const MIN_IN_FRONT: f64 = 0.9;
+const MIN_IN_FRONT: f64 = 0.75;
 /// More views add time, but little that these do not say.
 const MAX_VIEWS: usize = 16;
 /// Shortest length that has a direction, relative to the distance of the camera.
@@ -30,10 +32,21 @@ pub(super) struct EdgeFrame {
     pub segment: LineSegment3,
     toward: Vector3<f64>,
     left: Vector3<f64>,
-    /// The views that show it and the azimuths of their cameras, in radians; by azimuth.
+    /// The views on the side from which most show it, and the azimuths of their cameras, in
+    /// radians; by azimuth.
     views: Vec<(usize, f64)>,
     /// Length of a pixel at the edge, in the unit of the world: the median of its views.
     pub pixel: f64,
+}
+
+/// The direction that the others are turned off least, of some of them; one that is shown a
+/// segment of something else may stand anywhere. `None` without any.
+fn middle_of(rays: impl ExactSizeIterator<Item = Vector3<f64>> + Clone) -> Option<Vector3<f64>> {
+    let step = rays.len().div_ceil(MAX_VIEWS).max(1);
+    let turned = |ray: &Vector3<f64>| rays.clone().map(|other| ray.angle(&other)).sum::<f64>();
+    let some = rays.clone().step_by(step).map(|ray| (turned(&ray), ray));
+    let middle = some.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(middle.1)
 }
 
 /// The two sides of an edge.
@@ -50,7 +63,6 @@ impl EdgeFrame {
         let middle = segment.point_at(0.5);
         let across = |v: Vector3<f64>| v - direction * direction.dot(&v);
         let mut rays = Vec::new();
-        let mut pixels = Vec::new();
         for &view in views {
             let camera = cameras.get(view)?;
             let offset = camera.center_in_world - middle;
@@ -58,19 +70,21 @@ impl EdgeFrame {
             if let Some(ray) = across(offset).try_normalize(MIN_LENGTH * offset.norm())
                 && depth > 0.0
             {
-                rays.push((view, ray));
-                pixels.push(depth / camera.intrinsics.fx);
+                rays.push((view, ray, depth / camera.intrinsics.fx));
             }
         }
-        let sum: Vector3<f64> = rays.iter().map(|(_, ray)| ray).sum();
+        let front = middle_of(rays.iter().map(|(_, ray, _)| *ray))?;
+        rays.retain(|(_, ray, _)| ray.dot(&front) > 0.0);
+        let sum: Vector3<f64> = rays.iter().map(|(_, ray, _)| ray).sum();
         let toward = across(sum).try_normalize(MIN_LENGTH)?;
         let left = toward.cross(&direction);
         let azimuth = |ray: &Vector3<f64>| ray.dot(&left).atan2(ray.dot(&toward));
         let mut views: Vec<(usize, f64)> = rays
             .iter()
-            .map(|(view, ray)| (*view, azimuth(ray)))
+            .map(|(view, ray, _)| (*view, azimuth(ray)))
             .collect();
         views.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let mut pixels: Vec<f64> = rays.iter().map(|(.., pixel)| *pixel).collect();
         Some(Self {
             segment,
             toward,
@@ -94,10 +108,19 @@ impl EdgeFrame {
         self.segment.length() / self.pixel
     }
 
-    /// Unit vector from the edge into a half-plane.
-    pub(super) fn direction_of(&self, side: Side, index: usize) -> Vector3<f64> {
+    /// From the edge into a half-plane, to what its median view shows a pixel beside the edge.
+    pub(super) fn pixel_into(&self, side: Side, index: usize) -> Vector3<f64> {
         let azimuth = azimuth(side, index);
-        self.toward * azimuth.cos() + self.left * azimuth.sin()
+        let seen = (self.views.iter()).filter(|(_, camera)| is_seen(side, index, *camera));
+        let mut sines: Vec<f64> = seen
+            .map(|(_, camera)| (azimuth - camera).sin().abs())
+            .collect();
+        let stretch = if sines.is_empty() {
+            1.0
+        } else {
+            upper_median(&mut sines).recip().min(MAX_STRETCH)
+        };
+        (self.toward * azimuth.cos() + self.left * azimuth.sin()) * (self.pixel * stretch)
     }
 
     /// The planes through the edge, by the index of their left half, that nearly all its

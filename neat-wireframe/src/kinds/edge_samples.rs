@@ -2,7 +2,7 @@
 //! bands of the image along it.
 
 use super::edge_frame::{EdgeFrame, HALF_PLANES, Side, is_seen};
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use neat_core::{Camera, Scene, SceneError};
 use rayon::prelude::*;
 
@@ -134,8 +134,9 @@ impl Image<'_> {
         for side in Side::BOTH {
             for index in 0..HALF_PLANES {
                 let seen = is_seen(side, index, azimuth);
+                let pixel = frame.pixel_into(side, index);
                 strips.extend(pieces.iter().map(|stations| {
-                    let strip = seen.then(|| self.strip(frame, side, index, stations));
+                    let strip = seen.then(|| self.strip(frame, &pixel, stations));
                     strip.flatten().unwrap_or_default()
                 }));
             }
@@ -147,22 +148,16 @@ impl Image<'_> {
         }
     }
 
-    /// The luminances of a strip; `None` if a part of it is out of the image.
-    fn strip(
-        &self,
-        frame: &EdgeFrame,
-        side: Side,
-        index: usize,
-        stations: &[f64],
-    ) -> Option<Vec<u8>> {
-        let into = frame.direction_of(side, index) * frame.pixel;
+    /// The luminances of a strip, a pixel of which is this long; `None` if a part of it is out of
+    /// the image.
+    fn strip(&self, frame: &EdgeFrame, pixel: &Vector3<f64>, stations: &[f64]) -> Option<Vec<u8>> {
         let rows = ROWS
             .iter()
             .flat_map(|row| stations.iter().map(move |s| (row, s)));
         rows.map(|(row, station)| {
             let shown = self
                 .camera
-                .project(&(frame.segment.point_at(*station) + into * *row));
+                .project(&(frame.segment.point_at(*station) + pixel * *row));
             let rgb = (shown.depth > 0.0).then(|| self.colour(&shown.pixel))??;
             Some(luminance(&rgb).round() as u8)
         })

@@ -31,6 +31,7 @@ pub use junctions::{JunctionType, junction_types};
 pub use model::{EdgeKind, EdgeKinds};
 pub use paint::{WithoutPaint, without_paint};
 
+use crate::confidence::EdgeConfidence;
 use coplanarity::coplanarity;
 use edge_frame::EdgeFrame;
 use edge_samples::{ViewSamples, edge_samples, sampled_bytes};
@@ -44,6 +45,9 @@ use side_colours::SideColours;
 /// Half the logarithm of the ratio of two sides that tells them apart: six percent. A tenth of
 /// the true edges of photographs differ by less, half of the joints of boards by a quarter of it.
 const CLEAR_CONTRAST: f64 = 0.03;
+/// Share of the views that ought to show an edge at which it is no longer rare to be shown: a
+/// tenth. An eighth and a twelfth do as well.
+const CLEAR_SHARE: f64 = 0.1;
 /// Samples of so many bytes are in memory at once; what takes more is taken in turns, for each of
 /// which the images are read again.
 const SAMPLED_AT_ONCE: usize = 256 << 20;
@@ -52,8 +56,7 @@ const SAMPLED_AT_ONCE: usize = 256 << 20;
 ///
 /// - `wireframe`: valid, in the world of the cameras, with edges cut where others meet them.
 /// - `scene`: images and cameras; one image at a time is in memory.
-/// - `shown`: for each edge the views that show it, as
-///   [`showing_views`](crate::confidence::EdgeConfidence::showing_views) says.
+/// - `edges`: what [`assess`](crate::confidence::assess) says of them.
 ///
 /// The result does not depend on the number of threads.
 ///
@@ -62,13 +65,13 @@ const SAMPLED_AT_ONCE: usize = 256 << 20;
 pub fn edge_kinds(
     wireframe: &Wireframe3d,
     scene: &Scene,
-    shown: &[Vec<usize>],
+    edges: &[EdgeConfidence],
 ) -> Result<Vec<EdgeKinds>, SceneError> {
     let _span = tracing::debug_span!("edge_kinds", edges = wireframe.edges.len()).entered();
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
     let segments = wireframe.segments();
-    let frames: Vec<Option<EdgeFrame>> = (segments.par_iter().zip(shown))
-        .map(|(segment, views)| EdgeFrame::new(*segment, views, &cameras))
+    let frames: Vec<Option<EdgeFrame>> = (segments.par_iter().zip(edges))
+        .map(|(segment, edge)| EdgeFrame::new(*segment, &edge.showing_views, &cameras))
         .collect();
     let directions: Vec<Option<Vector3<f64>>> = (segments.iter())
         .map(|segment| (segment.end - segment.start).try_normalize(0.0))
@@ -76,12 +79,18 @@ pub fn edge_kinds(
     let leaving = leaves_plane(wireframe, &directions);
     let mut kinds = Vec::with_capacity(frames.len());
     while kinds.len() < frames.len() {
-        let (frames, leaving) = (&frames[kinds.len()..], &leaving[kinds.len()..]);
+        let first = kinds.len();
+        let (frames, leaving, edges) = (&frames[first..], &leaving[first..], &edges[first..]);
         let count = so_many_at_once(frames, SAMPLED_AT_ONCE);
         let samples = edge_samples(&frames[..count], scene)?;
-        let of_edges = frames.par_iter().zip(leaving).zip(samples);
-        kinds.par_extend(of_edges.map(|((frame, leaves_plane), samples)| {
-            witnesses(frame.as_ref(), *leaves_plane, &samples).kinds()
+        let of_edges = frames.par_iter().zip(leaving).zip(edges).zip(samples);
+        kinds.par_extend(of_edges.map(|(((frame, leaves_plane), edge), samples)| {
+            let of_wireframe = Witnesses {
+                leaves_plane: *leaves_plane,
+                rarity: (-edge.share_of_views() / CLEAR_SHARE).exp(),
+                ..Witnesses::default()
+            };
+            witnesses(frame.as_ref(), of_wireframe, &samples).kinds()
         }));
     }
     Ok(kinds)
@@ -97,11 +106,13 @@ fn so_many_at_once(frames: &[Option<EdgeFrame>], most: usize) -> usize {
     sums.take_while(|sum| *sum <= most).count().max(1)
 }
 
-fn witnesses(frame: Option<&EdgeFrame>, leaves_plane: f64, samples: &[ViewSamples]) -> Witnesses {
-    let mut witnesses = Witnesses {
-        leaves_plane,
-        ..Witnesses::default()
-    };
+/// What the images say, beside what is known `of_wireframe`.
+fn witnesses(
+    frame: Option<&EdgeFrame>,
+    of_wireframe: Witnesses,
+    samples: &[ViewSamples],
+) -> Witnesses {
+    let mut witnesses = of_wireframe;
     let Some(frame) = frame else {
         return witnesses;
     };

@@ -68,13 +68,22 @@ fn scene_of(slope: f64, brightness: impl Fn(f64, f64) -> f64) -> Scene {
     }
 }
 
+/// An edge that the first views show, of twelve that ought to.
+fn shown_in(views: usize) -> EdgeConfidence {
+    EdgeConfidence {
+        showing_views: (0..views).collect(),
+        expected_views: 12,
+        ..EdgeConfidence::default()
+    }
+}
+
 /// The kinds of an edge along x through the origin.
 fn kinds_of(scene: &Scene) -> EdgeKinds {
     let wireframe = Wireframe3d {
         junctions: vec![Vector3::new(-0.4, 0.0, 0.0), Vector3::new(0.4, 0.0, 0.0)],
         edges: vec![[0, 1]],
     };
-    edge_kinds(&wireframe, scene, &[(0..12).collect()]).unwrap()[0]
+    edge_kinds(&wireframe, scene, &[shown_in(12)]).unwrap()[0]
 }
 
 /// A step of brightness along the edge, and grain on both sides.
@@ -125,9 +134,9 @@ fn probabilities_add_up_and_anything_may_be_asked() {
         ],
         edges: vec![[0, 1], [1, 2], [2, 2]],
     };
-    for views in [0..12, 0..0] {
-        let shown = vec![views.collect(); 3];
-        for kinds in edge_kinds(&wireframe, &scene, &shown).unwrap() {
+    for views in [12, 0] {
+        let edges = vec![shown_in(views); 3];
+        for kinds in edge_kinds(&wireframe, &scene, &edges).unwrap() {
             let rest = kinds.texture + kinds.shadow;
             assert!((kinds.structure() + rest - 1.0).abs() < 1e-12, "{kinds:?}");
             assert_eq!(kinds.most_likely().0, EdgeKind::Crease);
