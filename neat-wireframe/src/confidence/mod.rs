@@ -109,13 +109,6 @@ pub struct EdgeConfidence {
     pub witnesses: Option<ExistenceWitnesses>,
 }
 
-impl EdgeConfidence {
-    /// Of the views that ought to show the edge those that do: 0 to 1.
-    pub fn share_of_views(&self) -> f64 {
-        self.showing_views.len() as f64 / self.expected_views.max(1) as f64
-    }
-}
-
 /// Asks the images, and the surface if there is one, about a wireframe.
 ///
 /// - `wireframe`: in the world of the cameras, with junctions and edges in any

@@ -45,9 +45,10 @@ use side_colours::SideColours;
 /// Half the logarithm of the ratio of two sides that tells them apart: six percent. A tenth of
 /// the true edges of photographs differ by less, half of the joints of boards by a quarter of it.
 const CLEAR_CONTRAST: f64 = 0.03;
-/// Share of the views that ought to show an edge at which it is no longer rare to be shown: a
-/// tenth. An eighth and a twelfth do as well.
-const CLEAR_SHARE: f64 = 0.1;
+/// Views that show an edge at which this is no longer rare; 3 do nearly as well.
+const CLEAR_VIEWS: f64 = 4.0;
+/// Where so many views ought to show an edge, some do by chance; 20 and 40 are a little worse.
+const MANY_VIEWS: f64 = 30.0;
 /// Samples of so many bytes are in memory at once; what takes more is taken in turns, for each of
 /// which the images are read again.
 const SAMPLED_AT_ONCE: usize = 256 << 20;
@@ -87,7 +88,7 @@ pub fn edge_kinds(
         kinds.par_extend(of_edges.map(|(((frame, leaves_plane), edge), samples)| {
             let of_wireframe = Witnesses {
                 leaves_plane: *leaves_plane,
-                rarity: (-edge.share_of_views() / CLEAR_SHARE).exp(),
+                rarity: rarity(edge),
                 ..Witnesses::default()
             };
             witnesses(frame.as_ref(), of_wireframe, &samples).kinds()
@@ -104,6 +105,14 @@ fn so_many_at_once(frames: &[Option<EdgeFrame>], most: usize) -> usize {
         Some(*sum)
     });
     sums.take_while(|sum| *sum <= most).count().max(1)
+}
+
+/// From 0 to 1: few show the edge of many views that ought to. Lines that are none are found
+/// where two views agree by chance, and pairs of views are as the square of their number.
+fn rarity(edge: &EdgeConfidence) -> f64 {
+    let shown = edge.showing_views.len() as f64;
+    let many = (edge.expected_views as f64 / MANY_VIEWS).min(1.0);
+    (-shown / CLEAR_VIEWS).exp() * many * many
 }
 
 /// What the images say, beside what is known `of_wireframe`.

@@ -1,5 +1,6 @@
 //! Rendered edges whose kinds are known.
 
+use super::edge_frame::{HALF_PLANES, Side};
 use super::*;
 use crate::test_scenes::camera_looking_at_origin;
 use nalgebra::Vector2;
@@ -134,18 +135,74 @@ fn probabilities_add_up_and_anything_may_be_asked() {
         ],
         edges: vec![[0, 1], [1, 2], [2, 2]],
     };
-    for views in [12, 0] {
+    for (views, most_likely) in [(12, EdgeKind::Crease), (0, EdgeKind::Texture)] {
         let edges = vec![shown_in(views); 3];
         for kinds in edge_kinds(&wireframe, &scene, &edges).unwrap() {
             let rest = kinds.texture + kinds.shadow;
             assert!((kinds.structure() + rest - 1.0).abs() < 1e-12, "{kinds:?}");
-            assert_eq!(kinds.most_likely().0, EdgeKind::Crease);
+            assert_eq!(kinds.most_likely().0, most_likely);
         }
     }
     assert!(
         edge_kinds(&Wireframe3d::default(), &scene, &[])
             .unwrap()
             .is_empty()
+    );
+}
+
+#[test]
+fn what_few_of_many_views_show_is_hardly_structure() {
+    let scene = scene_of(0.8, step);
+    let wireframe = Wireframe3d {
+        junctions: vec![Vector3::new(-0.4, 0.0, 0.0), Vector3::new(0.4, 0.0, 0.0)],
+        edges: vec![[0, 1]],
+    };
+    let structure = |expected_views: usize| {
+        let edge = EdgeConfidence {
+            expected_views,
+            ..shown_in(2)
+        };
+        edge_kinds(&wireframe, &scene, &[edge]).unwrap()[0].structure()
+    };
+    assert!(structure(40) < 0.25, "{}", structure(40));
+    assert!(structure(5) > 0.6, "{}", structure(5));
+}
+
+#[test]
+fn views_from_behind_are_not_asked() {
+    let edge = LineSegment3::new(Vector3::zeros(), Vector3::new(0.5, 0.0, 0.0));
+    let mut all = cameras();
+    all.push(camera_looking_at_origin(&Vector3::new(0.3, 0.4, -2.5)));
+    let asked = |first: usize| {
+        let views: Vec<usize> = (first..13).collect();
+        let frame = EdgeFrame::new(edge, &views, &all).unwrap();
+        frame
+            .asked_views()
+            .map(|(view, _)| view)
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(asked(0).len(), 12);
+    assert!(!asked(0).contains(&12));
+    assert_eq!(asked(12), [12]);
+}
+
+#[test]
+fn what_is_seen_under_a_flat_angle_is_followed_farther() {
+    let edge = LineSegment3::new(Vector3::zeros(), Vector3::new(0.5, 0.0, 0.0));
+    // One camera, 30° above the plane z = 0 behind the edge.
+    let camera = camera_looking_at_origin(&Vector3::new(0.25, -3f64.sqrt(), 1.0));
+    let frame = EdgeFrame::new(edge, &[0], &[camera]).unwrap();
+    let into = Side::BOTH
+        .iter()
+        .flat_map(|side| (0..HALF_PLANES).map(|index| frame.pixel_into(*side, index)));
+    let shown = |into: Vector3<f64>| {
+        let middle = edge.point_at(0.5);
+        (camera.project(&(middle + into)).pixel - camera.project(&middle).pixel).norm()
+    };
+    let lengths: Vec<f64> = into.map(shown).collect();
+    assert!(
+        lengths.iter().all(|length| (length - 1.0).abs() < 0.01),
+        "{lengths:?}"
     );
 }
 
