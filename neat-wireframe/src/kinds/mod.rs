@@ -1,10 +1,11 @@
 //! What an edge is: a crease of the surface, its boundary, paint on it, or light.
 //!
 //! Images show painted lines, joints of planks and shadows as clearly as they show creases,
-//! and a wireframe holds them all. Four witnesses tell them apart: whether the two sides lie
-//! in one plane that looks the same from all views (`coplanarity.rs`), whether the edge is a
-//! dark line rather than a step and whether its sides differ at all (`side_colours.rs`),
-//! and whether the edges around it leave its plane (`junctions.rs`). `model.rs` weighs them.
+//! and a wireframe holds them all, and lines that are none. Five witnesses tell them apart: whether
+//! the two sides lie in one plane that looks the same from all views (`coplanarity.rs`), whether
+//! the edge is a dark line rather than a step and whether its sides differ at all
+//! (`side_colours.rs`), whether the edges around it leave its plane (`junctions.rs`), and whether
+//! as many views show it as ought to. `model.rs` weighs them.
 //! What is hardly structure can be left out (`paint.rs`).
 //! Without any, an edge is most likely a crease: an image without texture cannot say that
 //! two faces are one.
@@ -125,19 +126,13 @@ fn witnesses(
     let Some(frame) = frame else {
         return witnesses;
     };
-    // An edge that is seen all around lies within no plane.
-    let may_be_flat = frame.common_planes().next().is_some();
-    if may_be_flat {
-        witnesses.coplanarity = coplanarity(frame, samples);
-    }
+    witnesses.coplanarity = coplanarity(frame, samples);
     if let Some(colours) = SideColours::new(samples) {
         witnesses.chroma = colours.chroma;
         witnesses.step = colours.step;
         witnesses.instability = colours.instability;
         witnesses.evenness = (-(colours.contrast / CLEAR_CONTRAST).powi(2)).exp();
-        if may_be_flat {
-            witnesses.darkness = colours.darkness;
-        }
+        witnesses.darkness = colours.darkness;
     }
     witnesses
 }
