@@ -95,7 +95,34 @@ pub fn edge_kinds(
             witnesses(frame.as_ref(), of_wireframe, &samples).kinds()
         }));
     }
+    take_after_neighbours(wireframe, edges, &mut kinds);
     Ok(kinds)
+}
+
+/// An edge that no view shows was asked for by those that it joins, as the end of a slab: it is no
+/// more structure than they are, at each end the one that most likely is.
+fn take_after_neighbours(
+    wireframe: &Wireframe3d,
+    edges: &[EdgeConfidence],
+    kinds: &mut [EdgeKinds],
+) {
+    let is_shown = |edge: usize| !edges[edge].showing_views.is_empty();
+    let mut best: Vec<Option<EdgeKinds>> = vec![None; wireframe.junctions.len()];
+    for (edge, ends) in wireframe.edges.iter().enumerate() {
+        for end in ends.iter().filter(|_| is_shown(edge)) {
+            let is_better = |of: EdgeKinds| kinds[edge].structure() > of.structure();
+            if best[*end].is_none_or(is_better) {
+                best[*end] = Some(kinds[edge]);
+            }
+        }
+    }
+    for (edge, ends) in wireframe.edges.iter().enumerate() {
+        for of_end in ends.iter().filter_map(|end| best[*end]) {
+            if !is_shown(edge) && of_end.structure() < kinds[edge].structure() {
+                kinds[edge] = of_end;
+            }
+        }
+    }
 }
 
 /// How many of the first edges have samples of `most` bytes together, but one at least.

@@ -169,6 +169,38 @@ fn what_few_of_many_views_show_is_hardly_structure() {
 }
 
 #[test]
+fn what_no_view_shows_is_as_what_it_joins() {
+    let wireframe = Wireframe3d {
+        junctions: (0..5).map(|k| Vector3::ith(0, f64::from(k))).collect(),
+        edges: vec![[0, 1], [1, 2], [2, 3], [3, 4]],
+    };
+    let of = |structure: f64| EdgeKinds {
+        crease: structure,
+        boundary: 0.0,
+        texture: 1.0 - structure,
+        shadow: 0.0,
+    };
+    let left = |shown: [usize; 4], structure: [f64; 4]| {
+        let mut kinds = structure.map(of);
+        take_after_neighbours(&wireframe, &shown.map(shown_in), &mut kinds);
+        kinds.map(|kinds| kinds.structure())
+    };
+    assert_eq!(
+        left([6, 0, 6, 6], [0.2, 0.8, 0.6, 0.9]),
+        [0.2, 0.2, 0.6, 0.9]
+    );
+    assert_eq!(
+        left([6, 0, 6, 6], [0.9, 0.5, 0.8, 0.1]),
+        [0.9, 0.5, 0.8, 0.1]
+    );
+    // What is unknown itself says nothing.
+    assert_eq!(
+        left([0, 0, 0, 0], [0.1, 0.5, 0.2, 0.3]),
+        [0.1, 0.5, 0.2, 0.3]
+    );
+}
+
+#[test]
 fn views_from_behind_are_not_asked() {
     let edge = LineSegment3::new(Vector3::zeros(), Vector3::new(0.5, 0.0, 0.0));
     let mut all = cameras();
