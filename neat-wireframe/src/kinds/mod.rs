@@ -58,7 +58,7 @@ const SAMPLED_AT_ONCE: usize = 256 << 20;
 ///
 /// - `wireframe`: valid, in the world of the cameras, with edges cut where others meet them.
 /// - `scene`: images and cameras; one image at a time is in memory.
-/// - `edges`: what [`assess`](crate::confidence::assess) says of them.
+/// - `edges`: what [`assess`](crate::confidence::assess) says of each, in the same order.
 ///
 /// The result does not depend on the number of threads.
 ///
