@@ -109,18 +109,15 @@ impl EdgeFrame {
         self.segment.length() / self.pixel
     }
 
-    /// From the edge into a half-plane, to what its median view shows a pixel beside the edge.
+    /// From the edge into a half-plane, to what the median view that sees it shows a pixel
+    /// beside the edge.
     pub(super) fn pixel_into(&self, side: Side, index: usize) -> Vector3<f64> {
         let azimuth = azimuth(side, index);
         let seen = (self.views.iter()).filter(|(_, camera)| is_seen(side, index, *camera));
         let mut sines: Vec<f64> = seen
             .map(|(_, camera)| (azimuth - camera).sin().abs())
             .collect();
-        let stretch = if sines.is_empty() {
-            1.0
-        } else {
-            upper_median(&mut sines).recip().min(MAX_STRETCH)
-        };
+        let stretch = upper_median(&mut sines).recip().min(MAX_STRETCH);
         (self.toward * azimuth.cos() + self.left * azimuth.sin()) * (self.pixel * stretch)
     }
 

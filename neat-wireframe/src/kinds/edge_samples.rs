@@ -134,10 +134,10 @@ impl Image<'_> {
         for side in Side::BOTH {
             for index in 0..HALF_PLANES {
                 let seen = is_seen(side, index, azimuth);
-                let pixel = frame.pixel_into(side, index);
+                let pixel = seen.then(|| frame.pixel_into(side, index));
                 strips.extend(pieces.iter().map(|stations| {
-                    let strip = seen.then(|| self.strip(frame, &pixel, stations));
-                    strip.flatten().unwrap_or_default()
+                    let strip = pixel.and_then(|pixel| self.strip(frame, &pixel, stations));
+                    strip.unwrap_or_default()
                 }));
             }
         }
