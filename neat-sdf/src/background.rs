@@ -6,9 +6,9 @@
 use crate::ray_sampler::RayBundle;
 use crate::volume_rendering::{integrate, rendering_weights};
 use burn::module::Module;
-use burn::tensor::{Device, IndexingUpdateOp, Tensor, TensorData, activation};
-use neat_tensor::host::{index_tensor, point_tensor};
-use neat_tensor::{GridEncoding, NetworkSizeError, PointEncoding, ReluMlp};
+use burn::tensor::{Device, Tensor, TensorData, activation};
+use neat_tensor::host::point_tensor;
+use neat_tensor::{GridEncoding, NetworkSizeError, PointEncoding, ReluMlp, RowChoice};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -123,10 +123,11 @@ impl BackgroundNetwork {
         if open.is_empty() {
             return color;
         }
-        let rows = index_tensor(open.iter().copied(), device);
-        let passed = opacity.select(0, rows.clone()).neg().add_scalar(1.0);
+        let rows = RowChoice::new(open.iter().map(|ray| *ray as u32), rays.len());
+        let backend = self.mlp.kernels.of(&opacity);
+        let passed = backend.pick_rows(&rows, opacity).neg().add_scalar(1.0);
         let light = self.light(rays, open.iter().copied(), device);
-        color.select_assign(0, rows, light * passed, IndexingUpdateOp::Add)
+        color + backend.add_up_rows(&rows, light * passed)
     }
 
     fn crossings(&self, rays: &RayBundle, indices: impl Iterator<Item = usize>) -> Crossings {

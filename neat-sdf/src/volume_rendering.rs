@@ -1,8 +1,9 @@
 //! The rendering integral and its quadrature (paper eq. 1 and 4).
 
 use crate::ray_sampler::RaySamples;
-use burn::tensor::{IndexingUpdateOp, Int, Tensor, TensorData};
+use burn::tensor::{Tensor, TensorData};
 use neat_tensor::kernels::cpu::density::passed_shares;
+use neat_tensor::{Kernels, RowChoice};
 
 /// Weight of every sample: `w_i = (1 − exp(−δ_i σ_i)) · exp(−Σ_{j<i} δ_j σ_j)`.
 ///
@@ -55,22 +56,14 @@ pub fn integrate(weights: Tensor<2>, values: Tensor<2>) -> Tensor<2> {
         .reshape([rays, channels])
 }
 
-/// [`integrate`] over some of the samples only: `weights` `[M, 1]` and `values`
-/// `[M, C]` of samples that belong to the rays `ray_of_sample` `[M]` → `[R, C]`.
+/// [`integrate`] over some of the samples only: `weights` `[M, 1]` and `values` `[M, C]` of
+/// samples that belong to the rays `ray_of_sample`, `M` of `R` → `[R, C]`.
 pub fn integrate_selected(
+    kernels: &Kernels,
     weights: Tensor<2>,
     values: Tensor<2>,
-    ray_of_sample: Tensor<1, Int>,
-    rays: usize,
+    ray_of_sample: &RowChoice,
 ) -> Tensor<2> {
-    let channels = values.dims()[1];
     let weighted = values * weights;
-    let options =
-        burn::tensor::TensorCreationOptions::new(weighted.device()).with_dtype(weighted.dtype());
-    Tensor::zeros([rays, channels], options).select_assign(
-        0,
-        ray_of_sample,
-        weighted,
-        IndexingUpdateOp::Add,
-    )
+    kernels.of(&weighted).add_up_rows(ray_of_sample, weighted)
 }

@@ -6,6 +6,7 @@ use crate::kernels::gpu::adam::StepNumbers;
 use crate::kernels::gpu::operations::GpuOperations;
 use crate::kernels::gpu::{adam, error_bound, grid, primitive, tensor};
 use crate::neat_backend::{AdamNumbers, NeatBackend};
+use crate::row_choice::RowChoice;
 use crate::sampling::{DrawNumbers, GridNumbers, RefineNumbers};
 use burn::backend::Dispatch;
 use burn::tensor::{Device, Tensor};
@@ -86,6 +87,16 @@ impl NeatBackend for Gpu {
         let gradient = gradient.into_dispatch();
         let shape = grid.shape.clone();
         Tensor::from_dispatch(Dispatch::gpu_pull_back_grid(x, table, gradient, shape))
+    }
+
+    fn pick_rows(&self, choice: &RowChoice, values: Tensor<2>) -> Tensor<2> {
+        let value = Dispatch::gpu_pick_rows(values.into_dispatch(), choice.clone());
+        Tensor::from_dispatch(value)
+    }
+
+    fn add_up_rows(&self, choice: &RowChoice, rows: Tensor<2>) -> Tensor<2> {
+        let value = Dispatch::gpu_add_up_rows(rows.into_dispatch(), choice.clone());
+        Tensor::from_dispatch(value)
     }
 
     fn adam(

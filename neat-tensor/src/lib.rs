@@ -41,6 +41,7 @@ pub mod parameters;
 mod point_encoding;
 pub mod random;
 mod relu_mlp;
+mod row_choice;
 pub mod sampling;
 mod sine;
 pub mod softplus;
@@ -57,3 +58,4 @@ pub use neat_backend::{
 };
 pub use point_encoding::PointEncoding;
 pub use relu_mlp::ReluMlp;
+pub use row_choice::RowChoice;

@@ -5,6 +5,7 @@ use crate::encoding::PositionalEncoding;
 use crate::grid_encoding::GridEncoding;
 use crate::kernels::cpu::KnownRows;
 use crate::linear::{Linear, affine};
+use crate::row_choice::RowChoice;
 use crate::sampling::{DrawNumbers, GridNumbers, RefineNumbers};
 use crate::softplus;
 use burn::tensor::Tensor;
@@ -80,6 +81,16 @@ pub trait NeatBackend: Debug + Send + Sync {
     /// [`GridEncoding::pull_back`].
     fn pull_back_grid(&self, grid: &GridEncoding, x: Tensor<2>, gradient: Tensor<2>) -> Tensor<2> {
         grid.pull_back(x, gradient)
+    }
+
+    /// The rows `[M, C]` of `values` `[total, C]`: [`RowChoice::pick`].
+    fn pick_rows(&self, choice: &RowChoice, values: Tensor<2>) -> Tensor<2> {
+        choice.pick(values)
+    }
+
+    /// The sums `[total, C]` of `rows` `[M, C]`: [`RowChoice::add_up`].
+    fn add_up_rows(&self, choice: &RowChoice, rows: Tensor<2>) -> Tensor<2> {
+        choice.add_up(rows)
     }
 
     /// A softplus network with the gradient of its first output at `points` `[N, 3]`, as

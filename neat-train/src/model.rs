@@ -12,9 +12,9 @@ use neat_sdf::{
     ImplicitNetworkConfig, ImplicitOutput, LaplaceDensity, RayBundle, RaySamples, RenderingNetwork,
     RenderingNetworkConfig,
 };
-use neat_tensor::host::{constant_on, host_vec, index_tensor, point_tensor};
+use neat_tensor::host::{constant_on, host_vec, point_tensor};
 use neat_tensor::random::{Purpose, stream};
-use neat_tensor::{Kernels, NetworkSizeError};
+use neat_tensor::{Kernels, NetworkSizeError, RowChoice};
 use serde::{Deserialize, Serialize};
 
 /// The networks; by default as published for ABC.
@@ -210,14 +210,9 @@ impl NeatModel {
                     total - full.len(),
                     known.clone(),
                 );
-                let mut place = vec![0; total];
-                for (position, i) in order.iter().enumerate() {
-                    place[*i as usize] = position;
-                }
-                (
-                    sdf.select(0, index_tensor(place.into_iter(), device)),
-                    output,
-                )
+                // In the order of their rays again.
+                let order = RowChoice::new(order.iter().copied(), total);
+                (self.kernels().of(&sdf).add_up_rows(&order, sdf), output)
             }
         };
         let deltas = TensorData::new(samples.deltas.clone(), [count, per_ray]);
@@ -238,15 +233,12 @@ impl NeatModel {
             None => integrate(weights.narrow(0, 0, ray_count), values),
             Some(full) => {
                 let full = &full[..values.dims()[0]];
-                let rows = index_tensor(full.iter().map(|i| *i as usize), device);
-                let weights = weights.reshape([total, 1]).select(0, rows);
-                let ray_of_sample = full.iter().map(|i| *i as usize / per_ray);
-                integrate_selected(
-                    weights,
-                    values,
-                    index_tensor(ray_of_sample, device),
-                    ray_count,
-                )
+                let rows = RowChoice::new(full.iter().copied(), total);
+                let weights = weights.reshape([total, 1]);
+                let weights = self.kernels().of(&weights).pick_rows(&rows, weights);
+                let rays = full.iter().map(|i| i / per_ray as u32);
+                let rays = RowChoice::new(rays, ray_count);
+                integrate_selected(self.kernels(), weights, values, &rays)
             }
         };
         let evaluated = Evaluated {

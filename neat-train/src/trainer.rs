@@ -250,6 +250,7 @@ impl Trainer {
             loss = losses.total,
             targets = outcome.targets,
             milliseconds = self.timings.total().as_millis() as u64,
+            timings = ?self.timings,
             "step"
         );
         Ok(StepReport {

@@ -7,7 +7,7 @@ use burn::tensor::{DType, Device, Tensor, TensorData};
 use neat_tensor::adam::{Adam, AdamConfig};
 use neat_tensor::random::{Purpose, standard_normal, stream};
 use neat_tensor::softplus::{softplus, times_softplus_slope};
-use neat_tensor::{GridEncoding, Kernels, NeatBackend, Plain, PositionalEncoding};
+use neat_tensor::{GridEncoding, Kernels, NeatBackend, Plain, PositionalEncoding, RowChoice};
 use neat_tests::backends::{flex, on_each_gpu_backend};
 use neat_tests::comparison::assert_relatively_close;
 use neat_tests::grids::small_grids;
@@ -162,6 +162,35 @@ fn products_of_many_rows() {
         |[x, matrix]| kernels.of(&x).linear(x, matrix),
         |[x, matrix]| x.matmul(matrix),
     );
+}
+
+/// Rows that belong to many others, to one, and to none.
+#[test]
+fn rows_that_are_picked_and_added_up() {
+    let kernels = Kernels::default();
+    // Squares leave residues out.
+    let squares =
+        |count: u32, total: usize| RowChoice::new((0..count).map(|i| i * i % total as u32), total);
+    for (total, columns) in [(17, 1), (401, 6), (5003, 3)] {
+        let choice = squares(ROWS as u32, total);
+        compare(
+            &format!("rows of {total}"),
+            &[matrix(total, columns, 1.0, 3)],
+            1e-5,
+            |[values]| kernels.of(&values).pick_rows(&choice, values),
+            |[values]| choice.pick(values),
+        );
+    }
+    for (count, columns) in [(400, 1), (3000, 6)] {
+        let choice = squares(count, ROWS);
+        compare(
+            &format!("sums of {count} rows"),
+            &[matrix(count as usize, columns, 1.0, 4)],
+            1e-5,
+            |[rows]| kernels.of(&rows).add_up_rows(&choice, rows),
+            |[rows]| choice.add_up(rows),
+        );
+    }
 }
 
 /// Dense levels and one with a hash; many points share entries, some lie outside.

@@ -1,9 +1,9 @@
 //! Density, rendering weights and the rendering integral.
 
-use burn::tensor::{Int, Tensor, TensorData};
+use burn::tensor::Tensor;
 use neat_sdf::density::laplace_density;
 use neat_sdf::volume_rendering::{integrate, integrate_selected, rendering_weights};
-use neat_tests::backends::flex;
+use neat_tensor::{Kernels, RowChoice};
 use neat_tests::comparison::assert_close;
 use neat_tests::finite_differences::{assert_differentiates, constant, normal};
 use neat_tests::tensors::numbers;
@@ -71,9 +71,10 @@ fn weights_are_opacity_times_what_the_samples_before_let_through() {
 
 #[test]
 fn the_integral_over_selected_samples_is_that_of_all_with_the_others_weight_zero() {
-    let rows: [i64; 6] = [1, 2, 6, 7, 9, 15];
-    let rays = rows.map(|row| row / SAMPLES as i64);
-    let indices = |values: [i64; 6]| Tensor::<1, Int>::from_data(TensorData::from(values), &flex());
+    let rows: [u32; 6] = [1, 2, 6, 7, 9, 15];
+    let samples = RowChoice::new(rows, RAYS * SAMPLES);
+    let rays = RowChoice::new(rows.map(|row| row / SAMPLES as u32), RAYS);
+    let kernels = Kernels::plain();
     let weights = positive(0.1, 4);
     let mut masked = vec![0.0; weights.len()];
     rows.iter()
@@ -85,14 +86,8 @@ fn the_integral_over_selected_samples_is_that_of_all_with_the_others_weight_zero
         constant(values.clone(), [RAYS * SAMPLES, 2]),
     );
     let selected = |weights: Tensor<2>, values: Tensor<2>| {
-        integrate_selected(
-            weights
-                .reshape([RAYS * SAMPLES, 1])
-                .select(0, indices(rows)),
-            values.select(0, indices(rows)),
-            indices(rays),
-            RAYS,
-        )
+        let weights = weights.reshape([RAYS * SAMPLES, 1]);
+        integrate_selected(&kernels, samples.pick(weights), samples.pick(values), &rays)
     };
     let rendered = selected(
         constant(weights.clone(), SHAPE),

@@ -13,6 +13,7 @@ pub(crate) mod grid;
 mod grid_features;
 pub(crate) mod operations;
 mod products;
+mod rows;
 
 use burn::Tensor;
 use burn::backend::TensorMetadata;

@@ -1,10 +1,11 @@
-//! Products, activations and encodings as operations that burn differentiates.
+//! Products, activations, encodings and choices of rows as operations that burn differentiates.
 //!
 //! burn reaches the tensors of a backend, and the graph of its derivatives, through an
 //! extension trait. A derivative is one function per input, of the adjoint and the inputs.
 
-use super::{activations, encoding, grid_features, products};
+use super::{activations, encoding, grid_features, products, rows};
 use crate::kernels::cpu::grid::GridShape;
+use crate::row_choice::RowChoice;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, backend_extension};
 use burn_autodiff::Autodiff;
@@ -16,7 +17,8 @@ use burn_cubecl::CubeBackend;
 use burn_cubecl::tensor::CubeTensor;
 use std::fmt::Debug;
 
-/// The operations; see [`products`], [`activations`], [`encoding`] and [`grid_features`].
+/// The operations; see [`products`], [`activations`], [`encoding`], [`grid_features`] and
+/// [`rows`].
 #[backend_extension(Cube, Autodiff)]
 pub trait GpuOperations: Backend {
     /// Softplus of `z`.
@@ -59,6 +61,12 @@ pub trait GpuOperations: Backend {
         gradient: FloatTensor<Self>,
         shape: GridShape,
     ) -> FloatTensor<Self>;
+
+    /// The rows of `values` that are chosen.
+    fn gpu_pick_rows(values: FloatTensor<Self>, choice: RowChoice) -> FloatTensor<Self>;
+
+    /// The sums of what belongs to the same row.
+    fn gpu_add_up_rows(rows: FloatTensor<Self>, choice: RowChoice) -> FloatTensor<Self>;
 }
 
 impl GpuOperations for CubeBackend {
@@ -109,6 +117,14 @@ impl GpuOperations for CubeBackend {
         shape: GridShape,
     ) -> FloatTensor<Self> {
         grid_features::pull_back([points, table, gradient], &shape)
+    }
+
+    fn gpu_pick_rows(values: FloatTensor<Self>, choice: RowChoice) -> FloatTensor<Self> {
+        rows::pick([values], &choice)
+    }
+
+    fn gpu_add_up_rows(rows: FloatTensor<Self>, choice: RowChoice) -> FloatTensor<Self> {
+        rows::add_up([rows], &choice)
     }
 }
 
@@ -187,6 +203,18 @@ impl<C: CheckpointStrategy> GpuOperations for Autodiff<CubeBackend, C> {
         let derivatives = [to_points, to_table, to_gradient];
         let value = |inputs, shape| grid_features::pull_back(inputs, &shape);
         recorded::<C, _, 3>([points, table, gradient], shape, value, derivatives)
+    }
+
+    fn gpu_pick_rows(values: FloatTensor<Self>, choice: RowChoice) -> FloatTensor<Self> {
+        let to_values: Derivative<RowChoice, 1> = |a, _, choice| rows::add_up([a], &choice);
+        let value = |inputs, choice| rows::pick(inputs, &choice);
+        recorded::<C, _, 1>([values], choice, value, [to_values])
+    }
+
+    fn gpu_add_up_rows(rows: FloatTensor<Self>, choice: RowChoice) -> FloatTensor<Self> {
+        let to_rows: Derivative<RowChoice, 1> = |a, _, choice| rows::pick([a], &choice);
+        let value = |inputs, choice| rows::add_up(inputs, &choice);
+        recorded::<C, _, 1>([rows], choice, value, [to_rows])
     }
 }
 
