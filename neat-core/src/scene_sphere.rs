@@ -168,9 +168,11 @@ const LOOKS_AT: f64 = 0.15;
 
 /// Fewer points than this do not tell where a scene is.
 const MIN_POINTS: usize = 20;
-/// Points seen by fewer views are often wrong; they count only if the others are
-/// too few.
+/// Points seen by fewer views are often wrong …
 const MIN_OBSERVATIONS: usize = 3;
+/// … and do not count, unless most are: then the others lie where some views happen to be near
+/// each other.
+const SEEN_OFTEN: f64 = 0.5;
 /// Stray points: further from the middle than so many times the median distance.
 const STRAY_DISTANCE: f64 = 4.0;
 /// The share of the remaining points within the sphere, before the margin.
@@ -213,7 +215,8 @@ pub(crate) fn from_points(points: &[SparsePoint]) -> Option<Ball> {
     let mut chosen: Vec<Vector3<f64>> = (points.iter().filter(seen_often))
         .map(|point| point.position_in_world)
         .collect();
-    if chosen.len() < MIN_POINTS {
+    let enough = (SEEN_OFTEN * points.len() as f64).max(MIN_POINTS as f64);
+    if (chosen.len() as f64) < enough {
         chosen = points.iter().map(|point| point.position_in_world).collect();
     }
     if chosen.len() < MIN_POINTS {
@@ -306,8 +309,8 @@ fn nearest_to(rays: &[Ray], weights: &[f64]) -> Option<Vector3<f64>> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::Intrinsics;
-    use nalgebra::{Matrix4, Rotation3};
+    use crate::{Intrinsics, Observation};
+    use nalgebra::{Matrix4, Rotation3, Vector2};
 
     /// A camera at `position` that looks at `target`.
     pub fn camera(position: Vector3<f64>, target: Vector3<f64>) -> Camera {
@@ -429,6 +432,26 @@ pub(crate) mod tests {
         assert_eq!(from_points(&points[..MIN_POINTS - 1]), None);
         // Points in one place have no extent.
         assert_eq!(from_points(&vec![point(center); 50]), None);
+    }
+
+    #[test]
+    fn points_of_two_views_count_where_most_are() {
+        let seen_by = |views: usize, x: f64| SparsePoint {
+            position_in_world: Vector3::x() * x,
+            observations: (0..views)
+                .map(|view| Observation {
+                    view,
+                    pixel: Vector2::zeros(),
+                })
+                .collect(),
+        };
+        // Views that happen to be near each other see one end of a scene thrice.
+        let at_end = |count: usize| (0..count).map(|i| seen_by(3, 9.0 + i as f64 / 100.0));
+        let all_over = |count: usize| (0..count).map(|i| seen_by(2, 10.0 * i as f64 / 100.0));
+        let few: Vec<_> = at_end(30).chain(all_over(100)).collect();
+        assert!(from_points(&few).unwrap().0.x < 7.0);
+        let many: Vec<_> = at_end(100).chain(all_over(30)).collect();
+        assert!(from_points(&many).unwrap().0.x > 9.0);
     }
 
     #[test]
