@@ -47,6 +47,19 @@ impl ViewDirection {
 
 /// Share of the width that stays free on each side.
 const MARGIN: f64 = 0.04;
+/// Strays are among this share of the points at each end of an axis …
+const STRAY: f64 = 0.01;
+/// … and farther from the others than this share of their extent.
+const BEYOND: f64 = 0.5;
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Frame {
+    /// All points.
+    All,
+    /// All but strays, for which it would be small.
+    Most,
+}
 
 /// An orthographic view of points, fitted into a picture.
 pub struct Drawing {
@@ -66,15 +79,18 @@ pub struct Drawing {
 impl Drawing {
     /// Fits finite points into a picture of this width; `None` if their extent is
     /// no finite number.
-    pub fn new(junctions: &[Vector3<f64>], direction: ViewDirection, width: u32) -> Option<Self> {
+    pub fn new(
+        junctions: &[Vector3<f64>],
+        frame: Frame,
+        direction: ViewDirection,
+        width: u32,
+    ) -> Option<Self> {
         let [right, up] = direction.right_and_up();
         let projected: Vec<_> = junctions
             .iter()
             .map(|p| Vector2::new(right.dot(p), up.dot(p)))
             .collect();
-        let first = projected.first().copied().unwrap_or_default();
-        let low = projected.iter().fold(first, |low, p| low.inf(p));
-        let high = projected.iter().fold(first, |high, p| high.sup(p));
+        let [low, high] = frame.corners(&projected);
         let extent = high - low;
         if !extent.iter().all(|x| x.is_finite()) {
             return None;
@@ -111,6 +127,27 @@ impl Drawing {
     }
 }
 
+impl Frame {
+    /// The corners of a picture of these points.
+    fn corners(self, points: &[Vector2<f64>]) -> [Vector2<f64>; 2] {
+        let axes = [0, 1].map(|axis| {
+            let mut along: Vec<f64> = points.iter().map(|point| point[axis]).collect();
+            along.sort_by(f64::total_cmp);
+            let (Some(&first), Some(&last)) = (along.first(), along.last()) else {
+                return [0.0; 2];
+            };
+            if self == Self::All {
+                return [first, last];
+            }
+            let strays = (STRAY * along.len() as f64) as usize;
+            let (low, high) = (along[strays], along[along.len() - 1 - strays]);
+            let beyond = BEYOND * (high - low);
+            [first.max(low - beyond), last.min(high + beyond)]
+        });
+        [0, 1].map(|end| Vector2::from(axes.map(|axis| axis[end])))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -135,7 +172,7 @@ mod tests {
             Vector3::new(500_000.0, 0.0, 1.0),
             Vector3::new(500_004.0, 7.0, 2.0),
         ];
-        let drawing = Drawing::new(&points, ViewDirection::Front, 1000).unwrap();
+        let drawing = Drawing::new(&points, Frame::All, ViewDirection::Front, 1000).unwrap();
         assert_eq!((drawing.width, drawing.height), (1000, 310));
         let expected = [[40.0, 270.0], [960.0, 40.0]].map(Vector2::from);
         for (point, expected) in points.iter().zip(expected) {
@@ -143,7 +180,7 @@ mod tests {
             assert!((pixel - expected).norm() < 1e-9, "{pixel}");
         }
         // Taller than wide: the height is limited, the margin stays.
-        let drawing = Drawing::new(&points, ViewDirection::Side, 1000).unwrap();
+        let drawing = Drawing::new(&points, Frame::All, ViewDirection::Side, 1000).unwrap();
         for point in &points {
             let pixel = drawing.project(point);
             assert!(pixel.min() > 39.9 && pixel.max() < 960.1);
@@ -151,17 +188,30 @@ mod tests {
     }
 
     #[test]
+    fn a_stray_point_does_not_shrink_the_others() {
+        let mut points: Vec<_> = (0..200)
+            .map(|i| Vector3::new(f64::from(i), 0.0, f64::from(i % 20)))
+            .collect();
+        let all = Drawing::new(&points, Frame::Most, ViewDirection::Front, 1000).unwrap();
+        points.push(Vector3::new(1e4, 0.0, 5.0));
+        let drawing = Drawing::new(&points, Frame::Most, ViewDirection::Front, 1000).unwrap();
+        assert!(drawing.scale > 0.6 * all.scale, "{}", drawing.scale);
+        let inside = |p: &&Vector3<f64>| (0.0..1000.0).contains(&drawing.project(p).x);
+        assert_eq!(points.iter().filter(inside).count(), 200);
+    }
+
+    #[test]
     fn few_and_far_points_are_no_problem() {
         for points in [vec![], vec![Vector3::new(3.0, 4.0, 5.0)]] {
-            let drawing = Drawing::new(&points, ViewDirection::Top, 100).unwrap();
+            let drawing = Drawing::new(&points, Frame::All, ViewDirection::Top, 100).unwrap();
             assert!(points.iter().all(|p| drawing.project(p).x == 50.0));
         }
         let close = [Vector3::zeros(), Vector3::repeat(5e-324)];
-        let drawing = Drawing::new(&close, ViewDirection::Isometric, 100).unwrap();
+        let drawing = Drawing::new(&close, Frame::All, ViewDirection::Isometric, 100).unwrap();
         for point in &close {
             assert!(drawing.project(point).iter().all(|x| x.is_finite()));
         }
         let far = [Vector3::repeat(f64::MAX), Vector3::repeat(-f64::MAX)];
-        assert!(Drawing::new(&far, ViewDirection::Isometric, 100).is_none());
+        assert!(Drawing::new(&far, Frame::All, ViewDirection::Isometric, 100).is_none());
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::ExportError;
 use crate::drawn::Drawn;
-use crate::orthographic::Drawing;
+use crate::orthographic::{Drawing, Frame};
 use crate::target::Target;
 use image::{Rgb, RgbImage};
 use nalgebra::Vector2;
@@ -13,7 +13,7 @@ const JUNCTION_COLOR: [u8; 3] = [0x11; 3];
 
 /// Writes a PNG.
 pub fn write(to: &mut Target) -> Result<(), ExportError> {
-    let image = draw(to.document, &to.drawing()?);
+    let image = draw(to.document, &to.drawing(Frame::Most)?);
     Ok(file::write_png(to.path, &image)?)
 }
 

@@ -50,6 +50,7 @@ pub fn elliptical_path(arc: &CircularArc, drawing: &Drawing) -> String {
 mod tests {
     use super::*;
     use crate::ViewDirection;
+    use crate::orthographic::Frame;
     use nalgebra::Vector3;
 
     #[test]
@@ -67,7 +68,8 @@ mod tests {
                 radius: 1.0,
                 angles: ends,
             };
-            let drawing = Drawing::new(&arc.points(0.1), ViewDirection::Top, 1000).unwrap();
+            let drawing =
+                Drawing::new(&arc.points(0.1), Frame::All, ViewDirection::Top, 1000).unwrap();
             let path = elliptical_path(&arc, &drawing);
             assert_eq!(path.matches('A').count(), pieces, "{path}");
         }

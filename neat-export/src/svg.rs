@@ -6,6 +6,7 @@
 //! right = center₀ + (x − width / 2) / scale, up = center₁ − (y − height / 2) / scale.
 
 use crate::drawn::{ARC_COLOR, ARCS};
+use crate::orthographic::Frame;
 use crate::projected_arc::elliptical_path;
 use crate::target::Target;
 use crate::{Confidence, ExportError};
@@ -13,7 +14,7 @@ use std::fmt::Write;
 
 /// Writes an SVG file.
 pub fn write(to: &mut Target) -> Result<(), ExportError> {
-    let (document, drawing) = (to.document, to.drawing()?);
+    let (document, drawing) = (to.document, to.drawing(Frame::All)?);
     let (width, height) = (drawing.width, drawing.height);
     let [right, up] = drawing.direction.right_and_up();
     let line_width = drawing.line_width(document.edges.len());

@@ -1,6 +1,6 @@
 //! What a format is given to write.
 
-use crate::orthographic::Drawing;
+use crate::orthographic::{Drawing, Frame};
 use crate::{ExportError, ExportOptions};
 use neat_core::file;
 use neat_wireframe::export::WireframeDocument;
@@ -52,10 +52,11 @@ impl Target<'_> {
     ///
     /// # Errors
     /// If no picture can hold the extent of the wireframe.
-    pub fn drawing(&self) -> Result<Drawing, ExportError> {
+    pub fn drawing(&self, frame: Frame) -> Result<Drawing, ExportError> {
         let options = self.options;
         Drawing::new(
             &self.document.drawn().junctions,
+            frame,
             options.direction,
             options.width,
         )
