@@ -13,8 +13,9 @@ pub struct AssembleConfig {
     /// joints and shadows; 0 keeps all. One edge more raises F, the mean of precision and recall,
     /// if it is true with more than half of F, which is about two thirds on photographs.
     pub min_structure: f64,
-    /// Evidence that a line needs beyond what its own position takes, in nats: the
-    /// logarithm of how much likelier the images are with the line than without it.
+    /// Evidence that an edge needs beyond what its own position takes, in nats: the
+    /// logarithm of how much likelier the images are with it than without it. Lines that views
+    /// propose need as much where forty do with ten neighbours each, and with fewer views less.
     pub min_evidence: f64,
     /// Shorter 2D segments propose no line.
     pub min_segment_length_in_pixels: f64,
@@ -22,6 +23,21 @@ pub struct AssembleConfig {
     pub ball_margin: f64,
     /// Views that each view is compared with, at most.
     pub neighbours: usize,
+}
+
+/// Pairs of views that propose lines in the scene that [`AssembleConfig::min_evidence`] is of:
+/// forty views with ten neighbours each.
+const USUAL_PAIRS: f64 = 400.0;
+
+impl AssembleConfig {
+    /// Evidence that a line needs which some pair of `views` proposes, in nats: each pair has
+    /// its share of wrong proposals, while the edges of a scene do not become more.
+    pub(super) fn evidence_of_proposal(&self, views: usize) -> f64 {
+        let neighbours = views.saturating_sub(1).min(self.neighbours);
+        let pairs = (views * neighbours).max(1) as f64;
+        // Where the images say no, there is no line.
+        (self.min_evidence + (pairs / USUAL_PAIRS).ln()).max(0.0)
+    }
 }
 
 impl Default for AssembleConfig {
@@ -57,5 +73,15 @@ mod tests {
             config
         );
         assert!(serde_json::from_str::<AssembleConfig>(r#"{"min_view": 4}"#).is_err());
+    }
+
+    #[test]
+    fn fewer_views_need_less_evidence_and_never_evidence_to_the_contrary() {
+        let config = AssembleConfig::default();
+        let of = |views| config.evidence_of_proposal(views);
+        assert!((of(40) - config.min_evidence).abs() < 1e-12);
+        assert!((of(20) - (config.min_evidence - 2f64.ln())).abs() < 1e-12);
+        assert!(of(8) < of(20) && of(400) > of(40));
+        assert_eq!([of(0), of(2)], [0.0; 2]);
     }
 }

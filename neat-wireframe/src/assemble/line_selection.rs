@@ -96,7 +96,7 @@ pub(super) fn sure_lines(
 ) -> ControlFlow<(), Vec<ChosenLine>> {
     let some = candidates(&images, alternatives, SEGMENTS_FOR_SURE_LINES);
     let wanted = Wanted {
-        min_evidence: config.min_evidence,
+        min_evidence: config.evidence_of_proposal(images.views.len()),
         most: SURE_LINES,
         noise: LEAST_NOISE,
         kind,
@@ -120,7 +120,7 @@ pub(super) fn select_lines<'a>(
     let all = candidates(&images, alternatives, 1);
     tracing::debug!(noise, candidates = all.len(), "lines are proposed");
     let wanted = Wanted {
-        min_evidence: config.min_evidence,
+        min_evidence: config.evidence_of_proposal(images.views.len()),
         most: usize::MAX,
         noise,
         kind,
