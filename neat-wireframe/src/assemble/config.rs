@@ -15,7 +15,8 @@ pub struct AssembleConfig {
     pub min_structure: f64,
     /// Evidence that an edge needs beyond what its own position takes, in nats: the
     /// logarithm of how much likelier the images are with it than without it. Lines that views
-    /// propose need as much where forty do with ten neighbours each, and with fewer views less.
+    /// propose need as much where fifteen do with ten neighbours each or more, and with fewer
+    /// less.
     pub min_evidence: f64,
     /// Shorter 2D segments propose no line.
     pub min_segment_length_in_pixels: f64,
@@ -25,10 +26,10 @@ pub struct AssembleConfig {
     pub neighbours: usize,
 }
 
-/// Pairs of views that propose lines in the scene that [`AssembleConfig::min_evidence`] is of:
-/// forty views with ten neighbours each. With more of them F changes by less than a point, up
-/// or down.
-const USUAL_PAIRS: f64 = 400.0;
+/// Pairs of views that propose lines in the scene with the fewest views of those that
+/// [`AssembleConfig::min_evidence`] was chosen on: fifteen with ten neighbours each. With more
+/// pairs more evidence brings nothing.
+const FEWEST_PAIRS: f64 = 150.0;
 
 impl AssembleConfig {
     /// Evidence that a line needs which some pair of `views` proposes, in nats: each pair has
@@ -37,7 +38,7 @@ impl AssembleConfig {
         let neighbours = views.saturating_sub(1).min(self.neighbours);
         let pairs = (views * neighbours).max(1) as f64;
         // Where the images say no, there is no line.
-        (self.min_evidence + (pairs / USUAL_PAIRS).ln().min(0.0)).max(0.0)
+        (self.min_evidence + (pairs / FEWEST_PAIRS).ln().min(0.0)).max(0.0)
     }
 }
 
@@ -80,9 +81,9 @@ mod tests {
     fn fewer_views_need_less_evidence_and_never_evidence_to_the_contrary() {
         let config = AssembleConfig::default();
         let of = |views| config.evidence_of_proposal(views);
-        assert_eq!([of(40), of(400)], [config.min_evidence; 2]);
-        assert!((of(20) - (config.min_evidence - 2f64.ln())).abs() < 1e-12);
-        assert!(of(8) < of(20));
+        assert_eq!([of(15), of(400)], [config.min_evidence; 2]);
+        assert!((of(10) - (config.min_evidence + 0.6f64.ln())).abs() < 1e-12);
+        assert!(of(4) < of(8) && of(8) < of(10));
         assert_eq!([of(0), of(2)], [0.0; 2]);
     }
 }
