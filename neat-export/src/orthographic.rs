@@ -1,6 +1,7 @@
 //! Orthographic views: where a junction lies in a picture.
 
 use nalgebra::{Vector2, Vector3};
+use neat_core::extent_of_most;
 
 /// From where an orthographic view looks, in the frame of the document, with its
 /// +z axis up.
@@ -47,10 +48,6 @@ impl ViewDirection {
 
 /// Share of the width that stays free on each side.
 const MARGIN: f64 = 0.04;
-/// Strays are among this share of the points at each end of an axis …
-const STRAY: f64 = 0.01;
-/// … and farther from the others than this share of their extent.
-const BEYOND: f64 = 0.5;
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,19 +127,15 @@ impl Drawing {
 impl Frame {
     /// The corners of a picture of these points.
     fn corners(self, points: &[Vector2<f64>]) -> [Vector2<f64>; 2] {
+        let first = points.first().copied().unwrap_or_default();
+        let low = points.iter().fold(first, |low, p| low.inf(p));
+        let high = points.iter().fold(first, |high, p| high.sup(p));
+        if self == Self::All {
+            return [low, high];
+        }
         let axes = [0, 1].map(|axis| {
-            let mut along: Vec<f64> = points.iter().map(|point| point[axis]).collect();
-            along.sort_by(f64::total_cmp);
-            let (Some(&first), Some(&last)) = (along.first(), along.last()) else {
-                return [0.0; 2];
-            };
-            if self == Self::All {
-                return [first, last];
-            }
-            let strays = (STRAY * along.len() as f64) as usize;
-            let (low, high) = (along[strays], along[along.len() - 1 - strays]);
-            let beyond = BEYOND * (high - low);
-            [first.max(low - beyond), last.min(high + beyond)]
+            let most = extent_of_most(points.iter().map(|point| point[axis]));
+            most.unwrap_or([0.0; 2])
         });
         [0, 1].map(|end| Vector2::from(axes.map(|axis| axis[end])))
     }

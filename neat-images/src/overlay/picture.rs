@@ -4,8 +4,7 @@ use super::line_drawing::{Pen, draw_disc, draw_segment};
 use super::{segments_of, thinness, visible_part};
 use image::{Rgb, RgbImage};
 use nalgebra::{Matrix3, Vector3};
-use neat_core::{Camera, CircularArc, Intrinsics, Scene, Wireframe3d};
-
+use neat_core::{Camera, CircularArc, Intrinsics, Scene, Wireframe3d, extent_of_most};
 use neat_wireframe::export::WireframeDocument;
 
 /// Width and height of the picture.
@@ -13,7 +12,7 @@ const SIZE: u32 = 1200;
 /// The camera stands so many radii of the object away: near enough for a little
 /// perspective.
 const DISTANCE: f64 = 4.0;
-/// The object fills so much of the picture's half width.
+/// The object, but for strays, fills so much of the picture's longer side.
 const FILLED: f64 = 0.88;
 const NEAR: Pen = Pen {
     color: [18.0, 44.0, 92.0],
@@ -35,14 +34,15 @@ const JUNCTION: Pen = Pen {
 /// appear least foreshortened.
 pub fn draw_wireframe(wireframe: &Wireframe3d, arcs: &[CircularArc], scene: &Scene) -> RgbImage {
     let mut picture = RgbImage::from_pixel(SIZE, SIZE, Rgb([255; 3]));
-    let Some((center, radius)) = bounding_ball(wireframe, arcs) else {
+    let points = points_of(wireframe, arcs);
+    let Some((center, radius)) = ball_around(&points) else {
         return picture;
     };
     let orientations = scene.views.iter().map(|view| view.camera.world_from_camera);
     let orientation = orientations
         .max_by(|a, b| openness(wireframe, a).total_cmp(&openness(wireframe, b)))
         .unwrap_or_else(Matrix3::identity);
-    let camera = camera_at(&orientation, &center, radius);
+    let camera = camera_at(&orientation, &center, radius, &points);
 
     let depth = |point: &Vector3<f64>| camera.to_camera(point).z;
     let thinness = thinness(wireframe);
@@ -59,27 +59,31 @@ pub fn draw_wireframe(wireframe: &Wireframe3d, arcs: &[CircularArc], scene: &Sce
         }
     }
     for junction in &wireframe.junctions {
-        let pixel = camera.project(junction).pixel;
-        draw_disc(&mut picture, &pixel, &JUNCTION.scaled(thinness));
+        let seen = camera.project(junction);
+        if seen.depth > 0.0 {
+            draw_disc(&mut picture, &seen.pixel, &JUNCTION.scaled(thinness));
+        }
     }
     picture
 }
 
-/// Centre and radius of a ball around all junctions; `None` without any.
-fn bounding_ball(wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Option<(Vector3<f64>, f64)> {
+/// Junctions, and arcs in pieces.
+fn points_of(wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Vec<Vector3<f64>> {
     let mut points = wireframe.junctions.clone();
     for arc in arcs {
         points.extend(arc.points(WireframeDocument::TURN_OF_DRAWN_ARCS));
     }
-    let first = points.first()?;
-    let (low, high) =
-        (points.iter()).fold((*first, *first), |(low, high), p| (low.inf(p), high.sup(p)));
-    let center = (low + high) / 2.0;
-    let radius = (points.iter())
-        .map(|p| (p - center).norm())
-        .fold(0.0, f64::max);
+    points
+}
+
+/// Centre and radius of a ball around all points but strays; `None` without any.
+fn ball_around(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
+    let along = |axis: usize| extent_of_most(points.iter().map(|point| point[axis]));
+    let axes = [along(0)?, along(1)?, along(2)?];
+    let [low, high] = [0, 1].map(|end| Vector3::from(axes.map(|axis| axis[end])));
+    let radius = (high - low).norm() / 2.0;
     // One junction alone has no extent.
-    Some((center, if radius > 0.0 { radius } else { 1.0 }))
+    Some(((low + high) / 2.0, if radius > 0.0 { radius } else { 1.0 }))
 }
 
 /// Mean logarithm of the factor by which the viewing direction shortens an edge:
@@ -96,25 +100,52 @@ fn openness(wireframe: &Wireframe3d, world_from_camera: &Matrix3<f64>) -> f64 {
     logarithms.sum()
 }
 
-/// The camera of the picture, turned like `world_from_camera`, with the ball in
-/// its middle.
-fn camera_at(world_from_camera: &Matrix3<f64>, center: &Vector3<f64>, radius: f64) -> Camera {
+/// The camera of the picture, turned like `world_from_camera`, with the ball in front of it, and
+/// the points but for strays in the middle of the picture.
+fn camera_at(
+    world_from_camera: &Matrix3<f64>,
+    center: &Vector3<f64>,
+    radius: f64,
+    points: &[Vector3<f64>],
+) -> Camera {
     let half = f64::from(SIZE) / 2.0;
-    // A ball at distance d appears with the tangent 1 / √(d² − 1).
-    let focal = FILLED * half * (DISTANCE * DISTANCE - 1.0).sqrt();
-    Camera {
+    let mut camera = Camera {
         intrinsics: Intrinsics {
-            fx: focal,
-            fy: focal,
-            cx: half - 0.5,
-            cy: half - 0.5,
+            fx: 1.0,
+            fy: 1.0,
+            cx: 0.0,
+            cy: 0.0,
             skew: 0.0,
         },
         world_from_camera: *world_from_camera,
         center_in_world: center - world_from_camera.column(2) * (DISTANCE * radius),
         width: SIZE,
         height: SIZE,
-    }
+    };
+    let seen: Vec<_> = (points.iter())
+        .map(|point| camera.project(point))
+        .filter(|seen| seen.depth > 0.0)
+        .collect();
+    let along = |axis: usize| {
+        let most = extent_of_most(seen.iter().map(|seen| seen.pixel[axis]));
+        most.unwrap_or([0.0; 2])
+    };
+    let [x, y] = [along(0), along(1)];
+    let extent = (x[1] - x[0]).max(y[1] - y[0]);
+    let focal = if extent > 0.0 {
+        FILLED * f64::from(SIZE) / extent
+    } else {
+        half
+    };
+    let middle = |[low, high]: [f64; 2]| half - 0.5 - focal * (low + high) / 2.0;
+    camera.intrinsics = Intrinsics {
+        fx: focal,
+        fy: focal,
+        cx: middle(x),
+        cy: middle(y),
+        skew: 0.0,
+    };
+    camera
 }
 
 #[cfg(test)]
@@ -139,6 +170,42 @@ mod tests {
         let (first, last) = (columns[0], columns[columns.len() - 1]);
         assert!(first > 0 && last < SIZE - 1, "{first} {last}");
         assert!(last - first > SIZE / 3, "{first} {last}");
+    }
+
+    /// It neither shrinks the others nor is it drawn where it is not.
+    #[test]
+    fn a_stray_edge_leaves_the_picture_as_it_is() {
+        let config = SyntheticScene {
+            solid: Solid::LPrism,
+            views: 5,
+            image_size: 32,
+            ..SyntheticScene::default()
+        };
+        let data = generate(&config).unwrap();
+        let pieces = data.truth.segments().into_iter().flat_map(|edge| {
+            let of_edge = move |i: u32| edge.point_at(f64::from(i) / 12.0);
+            (0..12).map(move |i| [of_edge(i), of_edge(i + 1)])
+        });
+        let mut wireframe = Wireframe3d::default();
+        for ends in pieces {
+            let first = wireframe.junctions.len();
+            wireframe.junctions.extend(ends);
+            wireframe.edges.push([first, first + 1]);
+        }
+        let alone = draw_wireframe(&wireframe, &[], &data.scene);
+        let orientation = data.scene.views[0].camera.world_from_camera;
+        let [right, forward] = [0, 2].map(|axis| orientation.column(axis).into_owned());
+        for far in [right, forward, -forward] {
+            let mut with_stray = wireframe.clone();
+            let first = with_stray.junctions.len();
+            let stray = [100.0, 100.1].map(|distance| far * distance);
+            with_stray.junctions.extend(stray);
+            with_stray.edges.push([first, first + 1]);
+            let picture = draw_wireframe(&with_stray, &[], &data.scene);
+            let inked = |picture: &RgbImage| picture.pixels().filter(|p| p.0 != [255; 3]).count();
+            let share = inked(&picture) as f64 / inked(&alone) as f64;
+            assert!((0.5..1.2).contains(&share), "{share}");
+        }
     }
 
     #[test]
