@@ -151,17 +151,21 @@ fn camera_at(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use neat_core::synthetic::{Solid, SyntheticScene, generate};
+    use neat_core::synthetic::{Solid, SyntheticData, SyntheticScene, generate};
 
-    #[test]
-    fn the_object_fills_the_picture_without_leaving_it() {
+    fn l_prism() -> SyntheticData {
         let config = SyntheticScene {
             solid: Solid::LPrism,
             views: 5,
             image_size: 32,
             ..SyntheticScene::default()
         };
-        let data = generate(&config).unwrap();
+        generate(&config).unwrap()
+    }
+
+    #[test]
+    fn the_object_fills_the_picture_without_leaving_it() {
+        let data = l_prism();
         let picture = draw_wireframe(&data.truth, &[], &data.scene);
         let inked = |x: u32, y: u32| picture.get_pixel(x, y).0 != [255; 3];
         let columns: Vec<u32> = (0..SIZE)
@@ -175,13 +179,7 @@ mod tests {
     /// It neither shrinks the others nor is it drawn where it is not.
     #[test]
     fn a_stray_edge_leaves_the_picture_as_it_is() {
-        let config = SyntheticScene {
-            solid: Solid::LPrism,
-            views: 5,
-            image_size: 32,
-            ..SyntheticScene::default()
-        };
-        let data = generate(&config).unwrap();
+        let data = l_prism();
         let pieces = data.truth.segments().into_iter().flat_map(|edge| {
             let of_edge = move |i: u32| edge.point_at(f64::from(i) / 12.0);
             (0..12).map(move |i| [of_edge(i), of_edge(i + 1)])
