@@ -128,16 +128,13 @@ impl Frame {
     /// The corners of a picture of these points.
     fn corners(self, points: &[Vector2<f64>]) -> [Vector2<f64>; 2] {
         let first = points.first().copied().unwrap_or_default();
-        let low = points.iter().fold(first, |low, p| low.inf(p));
-        let high = points.iter().fold(first, |high, p| high.sup(p));
-        if self == Self::All {
-            return [low, high];
+        match self {
+            Self::All => [
+                points.iter().fold(first, |low, p| low.inf(p)),
+                points.iter().fold(first, |high, p| high.sup(p)),
+            ],
+            Self::Most => extent_of_most(points).unwrap_or([first; 2]),
         }
-        let axes = [0, 1].map(|axis| {
-            let most = extent_of_most(points.iter().map(|point| point[axis]));
-            most.unwrap_or([0.0; 2])
-        });
-        [0, 1].map(|end| Vector2::from(axes.map(|axis| axis[end])))
     }
 }
 

@@ -3,7 +3,7 @@
 use super::line_drawing::{Pen, draw_disc, draw_segment};
 use super::{segments_of, thinness, visible_part};
 use image::{Rgb, RgbImage};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 use neat_core::{Camera, CircularArc, Intrinsics, Scene, Wireframe3d, extent_of_most};
 use neat_wireframe::export::WireframeDocument;
 
@@ -78,9 +78,7 @@ fn points_of(wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Vec<Vector3<f64>>
 
 /// Centre and radius of a ball around all points but strays; `None` without any.
 fn ball_around(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
-    let along = |axis: usize| extent_of_most(points.iter().map(|point| point[axis]));
-    let axes = [along(0)?, along(1)?, along(2)?];
-    let [low, high] = [0, 1].map(|end| Vector3::from(axes.map(|axis| axis[end])));
+    let [low, high] = extent_of_most(points)?;
     let radius = (high - low).norm() / 2.0;
     // One junction alone has no extent.
     Some(((low + high) / 2.0, if radius > 0.0 { radius } else { 1.0 }))
@@ -122,27 +120,24 @@ fn camera_at(
         width: SIZE,
         height: SIZE,
     };
-    let seen: Vec<_> = (points.iter())
+    let seen: Vec<Vector2<f64>> = (points.iter())
         .map(|point| camera.project(point))
         .filter(|seen| seen.depth > 0.0)
+        .map(|seen| seen.pixel)
         .collect();
-    let along = |axis: usize| {
-        let most = extent_of_most(seen.iter().map(|seen| seen.pixel[axis]));
-        most.unwrap_or([0.0; 2])
-    };
-    let [x, y] = [along(0), along(1)];
-    let extent = (x[1] - x[0]).max(y[1] - y[0]);
+    let [low, high] = extent_of_most(&seen).unwrap_or_default();
+    let extent = (high - low).max();
     let focal = if extent > 0.0 {
         FILLED * f64::from(SIZE) / extent
     } else {
         half
     };
-    let middle = |[low, high]: [f64; 2]| half - 0.5 - focal * (low + high) / 2.0;
+    let middle = (low + high) / 2.0;
     camera.intrinsics = Intrinsics {
         fx: focal,
         fy: focal,
-        cx: middle(x),
-        cy: middle(y),
+        cx: half - 0.5 - focal * middle.x,
+        cy: half - 0.5 - focal * middle.y,
         skew: 0.0,
     };
     camera
