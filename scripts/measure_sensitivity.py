@@ -46,7 +46,7 @@ CONSTANT = re.compile(
 NOT_READ = re.compile(r'^\s*(?:pub(?:\(\w+\))? )?use [^;]*;|//.*|"[^"\n]*"', re.M)
 # Where a value has to be known when the program is built.
 KNOWN_EARLY = re.compile(
-    r"^.*\b(?:const|static) [A-Z_]+: (?P<item>[^;=]*(?:;[^=]*)?= [^;]*)"
+    r"^\s*(?:pub(?:\(\w+\))? )?(?:const|static) [A-Z_]+: (?P<item>[^;=]*(?:;[^=]*)?= [^;]*)"
     r"|; (?P<length>[A-Z_0-9]+)\b|(?P<pattern>[A-Z_0-9]+)(?:\.\.)? =>",
     re.M,
 )
@@ -77,16 +77,18 @@ def main():
         git("worktree", "add", "--detach", copy, "HEAD")
     known = json.loads(results.read_text()) if results.exists() else {}
     git("checkout", "--quiet", ".", where=copy)
-    constants = [found for found in defined(copy) if found.name in (arguments.only or [found.name])]
+    every = defined(copy)
+    chosen = {found.key for found in every if {found.name, found.key} & set(arguments.only)}
+    constants = [found for found in every if found.key in chosen or not arguments.only]
     early = known_early(copy)
-    made_functions(copy, [found for found in constants if found.name not in early])
+    made_functions(copy, [found for found in every if found.key not in early])
     changes = [
         (key, found, factor)
         for found in constants
         for factor in (0.5, 2.0)
         if (key := f"{found.key} × {factor}") not in known
     ]
-    at_once = [change for change in changes if change[1].name not in early]
+    at_once = [change for change in changes if change[1].key not in early]
 
     def measure(key, binary, environment):
         print(f"{len(known)} done: {key}", file=sys.stderr, flush=True)
@@ -110,7 +112,7 @@ def main():
                 keep(*done.result())
     # Those that need a build each, in the source as it is.
     for key, found, factor in changes:
-        if found.name in early:
+        if found.key in early:
             git("checkout", "--quiet", ".", where=copy)
             found.path.write_text(with_value(found, changed(found.value, factor)))
             keep(*measure(key, build(copy, out), {}))
@@ -124,7 +126,7 @@ def parsed():
     )
     parser.add_argument("out", type=pathlib.Path, help="folder for the results")
     parser.add_argument("scenes", type=pathlib.Path, nargs="+", help="scenes with truth")
-    parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these constants")
+    parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these constants, by name or by file and name")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="measure so many values at once")
     return parser.parse_args()
 
@@ -162,13 +164,25 @@ def defined(copy):
 
 
 def known_early(copy):
-    """Names whose values are needed when the program is built, or that two modules share."""
-    names = set()
+    """Keys of those whose values are needed when the program is built."""
+    every = defined(copy)
+    own = collections.defaultdict(set)
+    for found in every:
+        own[found.path].add(found.name)
+    early = set()
     for path in sources(copy):
+        names = set()
         for found in KNOWN_EARLY.finditer(path.read_text()):
             names |= set(re.findall(r"\b[A-Z][A-Z0-9_]+\b", " ".join(filter(None, found.groups()))))
-    shared = collections.Counter(found.name for found in defined(copy) if found.visibility)
-    return names | {name for name, count in shared.items() if count > 1}
+        imported = names - own[path]
+        early |= {
+            found.key
+            for found in every
+            if (found.name in names if found.path == path else found.visibility and found.name in imported)
+        }
+    # Other files cannot tell which of two with one name is a function.
+    shared = {found.name for found in every if found.visibility and found.key in early}
+    return early | {found.key for found in every if found.visibility and found.name in shared}
 
 
 def made_functions(copy, constants):
