@@ -3,8 +3,8 @@
 
     scripts/make_parts.py OUT [--set first|second] [NAME...]
 
-Each scene is a folder of OUT: 60 grey pictures on black, cameras.json and
-gt_wireframe.json, for `neat reconstruct` and
+Each scene is a folder of OUT: 60 grey pictures on black, cameras.json,
+gt_wireframe.json and mesh.obj, for `neat reconstruct` and
 `cargo run --release -p neat-eval --example measure_assembler -- OUT/*`.
 Needs what scripts/requirements-parts.txt names; a part takes about 20 seconds.
 """
@@ -28,6 +28,7 @@ def main():
     parser.add_argument("out", type=pathlib.Path, help="folder for the scenes")
     parser.add_argument("names", nargs="*", help="parts, all unless some are named")
     parser.add_argument("--set", choices=sets, help="one of the two sets of parts alone")
+    parser.add_argument("--truth", action="store_true", help="write the truth alone")
     options = parser.parse_args()
     of_set = sets[options.set] if options.set else shapes.FIRST + shapes.SECOND
     parts = {part.__name__: part for part in of_set}
@@ -36,17 +37,24 @@ def main():
         sys.exit(f"no part {', '.join(unknown)}; there are {', '.join(parts)}")
     for seed, name in enumerate(parts):
         if not options.names or name in options.names:
-            write(parts[name](), options.out / name, seed)
+            write(parts[name](), options.out / name, seed, options.truth)
             print(options.out / name, flush=True)
 
 
-def write(part, folder, seed):
+def write(part, folder, seed, truth_alone):
     shape = part.part.solids()[0].wrapped
     mesh = truth.mesh(shape, 1e-4 * max(part.part.bounding_box().size))
     low, high = mesh.vertices.min(0), mesh.vertices.max(0)
     place = lambda points: (points - (low + high) / 2) / (high - low).max()
     mesh.vertices = place(mesh.vertices)
     (folder / "images").mkdir(parents=True, exist_ok=True)
+    wireframe = truth.wireframe(shape, place) | {"faces": truth.faces(shape, place)}
+    (folder / "gt_wireframe.json").write_text(json.dumps(wireframe))
+    rows = ["v {} {} {}".format(*point) for point in mesh.vertices.round(7)]
+    rows += ["f {} {} {}".format(*triangle) for triangle in mesh.triangles + 1]
+    (folder / "mesh.obj").write_text("\n".join(rows) + "\n")
+    if truth_alone:
+        return
     middle = pictures.SIZE / 2
     intrinsics = [[pictures.FOCAL, 0, middle], [0, pictures.FOCAL, middle], [0, 0, 1]]
     frames = []
@@ -58,7 +66,6 @@ def write(part, folder, seed):
     convention = "corner-origin K (pixel centre at +0.5)"
     text = json.dumps({"convention": convention, "frames": frames})
     (folder / "cameras.json").write_text(text)
-    (folder / "gt_wireframe.json").write_text(json.dumps(truth.wireframe(shape, place)))
 
 
 if __name__ == "__main__":

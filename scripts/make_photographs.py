@@ -3,7 +3,7 @@
 
     scripts/make_photographs.py OUT KIND SEED...
 
-KIND is house, facade or table; each seed is another one. A scene is a folder
+KIND is house, facade, room or table; each seed is another one. A scene is a folder
 of OUT with images, a COLMAP model with noise in sparse/0 and truth/, for
 `scripts/measure_photographs.py OUT RUNS` and `neat eval --truth OUT/house_7`.
 Needs what scripts/requirements-photographs.txt names; a picture takes 5 to 30
@@ -17,12 +17,12 @@ import time
 
 import numpy as np
 import trimesh
-from photographs import colmap, facades, houses, render, tables, truth
+from photographs import colmap, facades, houses, render, rooms, tables, truth
 from photographs.cameras import HEIGHT, MIDDLE, WIDTH, Camera
 
 ENDLESS = ["grass", "asphalt", "floor"]
 SIZE = {"width": WIDTH, "height": HEIGHT}
-KINDS = {"house": houses, "facade": facades, "table": tables}
+KINDS = {"house": houses, "facade": facades, "room": rooms, "table": tables}
 
 
 def main():

@@ -5,11 +5,20 @@ import math
 
 import numpy as np
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Curve
-from OCP.BRepGProp import BRepGProp_Face
+from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Surface
+from OCP.BRepGProp import BRepGProp, BRepGProp_Face
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.GeomAbs import GeomAbs_BSplineCurve, GeomAbs_Circle, GeomAbs_Ellipse, GeomAbs_Line
+from OCP.GeomAbs import (
+    GeomAbs_BSplineCurve,
+    GeomAbs_Circle,
+    GeomAbs_Cone,
+    GeomAbs_Cylinder,
+    GeomAbs_Ellipse,
+    GeomAbs_Line,
+    GeomAbs_Plane,
+)
 from OCP.gp import gp_Pnt, gp_Vec
+from OCP.GProp import GProp_GProps
 from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_REVERSED
 from OCP.TopExp import TopExp
 from OCP.TopLoc import TopLoc_Location
@@ -84,6 +93,40 @@ def wireframe(shape, place):
         points = points_of(curve, max(8, int(length / SPACING) + 1), place)
         curves.append((KINDS.get(curve.GetType(), "other"), length, points))
     return document(straight, curves)
+
+
+def faces(shape, place):
+    """Faces as `gt_wireframe.json` holds them, without the edges around them."""
+    found = TopTools_IndexedMapOfShape()
+    TopExp.MapShapes_s(shape, TopAbs_FACE, found)
+    return [face_of(TopoDS.Face_s(found.FindKey(index)), place) for index in range(1, found.Extent() + 1)]
+
+
+def face_of(face, place):
+    at = lambda point: place(np.array([[point.X(), point.Y(), point.Z()]]))[0]
+    way = lambda direction: np.array([direction.X(), direction.Y(), direction.Z()])
+    scale = np.linalg.norm(at(gp_Pnt(1, 0, 0)) - at(gp_Pnt(0, 0, 0)))
+    measured = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(face, measured)
+    area = measured.Mass() * scale**2
+    surface = BRepAdaptor_Surface(face)
+    kind = surface.GetType()
+    if kind == GeomAbs_Plane:
+        normal = way(surface.Plane().Axis().Direction())
+        normal *= -1 if face.Orientation() == TopAbs_REVERSED else 1
+        offset = float(normal @ at(surface.Plane().Location()))
+        return {"type": "plane", "area": area, "normal": normal.tolist(), "offset": offset}
+    if kind == GeomAbs_Cylinder:
+        cylinder = surface.Cylinder()
+        point, axis = at(cylinder.Location()), way(cylinder.Axis().Direction())
+        numbers = {"axis_point": point.tolist(), "axis": axis.tolist()}
+        return {"type": "cylinder", "area": area, **numbers, "radius": cylinder.Radius() * scale}
+    if kind == GeomAbs_Cone:
+        cone = surface.Cone()
+        angle, axis = cone.SemiAngle(), way(cone.Axis().Direction())
+        numbers = {"apex": at(cone.Apex()).tolist(), "axis": (axis * np.sign(angle)).tolist()}
+        return {"type": "cone", "area": area, **numbers, "half_angle": abs(angle)}
+    return {"type": "other", "area": area}
 
 
 def is_sharp(edge, faces):

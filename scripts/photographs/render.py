@@ -47,7 +47,10 @@ PLAIN = {
     "blue": (0.03, 0.10, 0.45),
     "yellow": (0.65, 0.48, 0.04),
     "oak": (0.45, 0.27, 0.12),
+    "lamp": (0.9, 0.85, 0.7),
 }
+# Of a square metre, as that of the sky.
+LIGHT = {"lamp": 60.0}
 ROUGHNESS = {"glass": 0.03, "metal": 0.35, "dark metal": 0.4, "paint": 0.4, "slate": 0.5}
 
 
@@ -82,6 +85,9 @@ def material(name, scale):
     else:
         mixed.inputs["Color1"].default_value = (*PLAIN[name], 1)
     links.new(mixed.outputs["Color"], shader.inputs["Base Color"])
+    if name in LIGHT:
+        shader.inputs["Emission Color"].default_value = (*PLAIN[name], 1)
+        shader.inputs["Emission Strength"].default_value = LIGHT[name]
     return made
 
 

@@ -49,7 +49,10 @@ pub struct CadFaceScores {
     pub planes: FaceShare,
     /// The cylinders.
     pub cylinders: FaceShare,
-    /// Cones, spheres and all others: what is found has no such face.
+    /// The cones.
+    #[serde(default)]
+    pub cones: FaceShare,
+    /// Spheres and all others: what is found has no such face.
     pub others: FaceShare,
     /// Of the true area, what is found.
     pub recall: f64,
@@ -109,6 +112,7 @@ impl CadFaces {
             truth: FaceCounts::of(truth.iter().map(|face| face.area)),
             planes: FaceShare::default(),
             cylinders: FaceShare::default(),
+            cones: FaceShare::default(),
             others: FaceShare::default(),
             recall: 0.0,
             precision: None,
@@ -118,6 +122,7 @@ impl CadFaces {
             let share = match face.surface {
                 Some(Surface::Plane { .. }) => &mut scores.planes,
                 Some(Surface::Cylinder { .. }) => &mut scores.cylinders,
+                Some(Surface::Cone { .. }) => &mut scores.cones,
                 None => &mut scores.others,
             };
             share.all.add(face.area);
@@ -125,7 +130,8 @@ impl CadFaces {
                 share.found.add(face.area);
             }
         }
-        let recalled = scores.planes.found.area + scores.cylinders.found.area;
+        let kinds = [&scores.planes, &scores.cylinders, &scores.cones];
+        let recalled = total(kinds.into_iter().map(|kind| kind.found.area));
         let right = total(partners.iter().flatten().map(|face| found[*face].area));
         scores.recall = recalled / scores.truth.area;
         scores.precision = (scores.found.area > 0.0).then(|| right / scores.found.area);
@@ -157,7 +163,7 @@ impl CadFaces {
         let corners = || found.triangles.iter().flatten();
         let same = self.same_direction(&found.surface, surface)
             && (found.area / truth.area - 1.0).abs() <= self.max_area_error
-            && corners().all(|corner| distance(surface, corner) <= self.max_distance);
+            && corners().all(|corner| surface.height_of(corner).0.abs() <= self.max_distance);
         let shift = match (same, truth.boundary.is_empty()) {
             (false, _) => return None,
             (true, true) => 0.0,
@@ -180,20 +186,23 @@ impl CadFaces {
                     axis: b, radius: s, ..
                 },
             ) => a.dot(b).abs() >= cosine && (r - s).abs() <= self.max_distance,
+            (
+                Surface::Cone {
+                    axis: a,
+                    half_angle: one,
+                    ..
+                },
+                Surface::Cone {
+                    axis: b,
+                    half_angle: other,
+                    ..
+                },
+            ) => {
+                let opens_alike = (one - other).abs() <= self.max_angle.to_radians();
+                a.dot(b) >= cosine && opens_alike
+            }
             _ => false,
         }
-    }
-}
-
-fn distance(surface: &Surface, corner: &Vector3<f64>) -> f64 {
-    match surface {
-        Surface::Plane { normal, offset } => (normal.dot(corner) - offset).abs(),
-        Surface::Cylinder {
-            point,
-            axis,
-            radius,
-            ..
-        } => ((corner - point).cross(axis).norm() - radius).abs(),
     }
 }
 
@@ -215,6 +224,7 @@ impl CadFaceScores {
         let kinds = [
             ("planes", self.planes),
             ("cylinders", self.cylinders),
+            ("cones", self.cones),
             ("others", self.others),
         ];
         for (name, share) in kinds.into_iter().filter(|(_, share)| share.all.faces > 0) {

@@ -9,7 +9,7 @@ use std::path::Path;
 /// A true face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrueFace {
-    /// What it is a part of; `None` where that is neither a plane nor a cylinder. The side of its
+    /// What it is a part of; `None` where that is no plane, cylinder or cone. The side of its
     /// normal plays no role.
     pub surface: Option<Surface>,
     /// Its area.
@@ -47,6 +47,8 @@ struct FaceJson {
     axis_point: Option<Vector3<f64>>,
     axis: Option<Vector3<f64>>,
     radius: Option<f64>,
+    apex: Option<Vector3<f64>>,
+    half_angle: Option<f64>,
     #[serde(default)]
     edges: Vec<BoundaryJson>,
 }
@@ -61,7 +63,7 @@ impl TrueFace {
     /// Reads the `faces` of a true wireframe, with the edges around them; none where it has none.
     ///
     /// # Errors
-    /// If the file is missing or no such JSON, a plane or a cylinder lacks its numbers, or a face
+    /// If the file is missing or no such JSON, a plane, a cylinder or a cone lacks its numbers, or a face
     /// names an edge that is not there.
     pub fn read(path: &Path) -> Result<Vec<Self>, SceneError> {
         Self::parse(
@@ -115,6 +117,14 @@ impl FaceJson {
                         convex: true,
                     },
                 ),
+                "cone" => self.apex.zip(self.axis).zip(self.half_angle).map(
+                    |((apex, axis), half_angle)| Surface::Cone {
+                        apex,
+                        axis,
+                        half_angle,
+                        convex: true,
+                    },
+                ),
                 _ => return Ok(None),
             };
         let missing = || format!("is a {} without its numbers", self.kind);
@@ -145,7 +155,7 @@ mod tests {
         "curves": [{"points": [[1, 0, 0], [0, 0, 0]]}], "smooth_edges": [],
         "faces": [{"type": "plane", "normal": [0, 0, 1], "offset": 0, "area": 0.5,
                    "edges": [{"kind": "line", "index": 0}, {"kind": "curve", "index": 0}]},
-                  {"type": "cone", "area": 2}]}"#;
+                  {"type": "torus", "area": 2}]}"#;
 
     #[test]
     fn faces_have_their_surface_and_boundary() {

@@ -2,7 +2,7 @@
 //!
 //! Each closed shell is a `Building` whose geometry is a `Solid`; the faces of all others are the
 //! `MultiSurface` of one more. Junctions lie on all planes of their faces, as in STEP; what is
-//! round has chains of straight pieces, and cylinders are triangles. A shell has no cavities
+//! round has chains of straight pieces, and round faces are triangles. A shell has no cavities
 //! here, so no solid has an inner shell.
 //!
 //! The format means metres and z upward, in a reference system that the file names. No scene
@@ -118,7 +118,7 @@ fn geometry(building: &Building, bottom: f64, vertices: &mut Vertices) -> Value 
         let Some(rings) = vertices.rings(&polygon.rings) else {
             continue;
         };
-        // The triangles of a cylinder that are alike are one surface.
+        // The triangles of a round face that are alike are one surface.
         let surface = json!({"type": surface_type.name(), "face": polygon.face});
         if surfaces.last() != Some(&surface) {
             surfaces.push(surface);

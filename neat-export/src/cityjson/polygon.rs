@@ -5,7 +5,7 @@ use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::faces::{CurveIndex, Face, Shell, ShellGeometry, Surface};
 use std::collections::BTreeMap;
 
-/// A planar face, or a triangle of a cylinder.
+/// A planar face, or a triangle of a round one.
 pub(super) struct Polygon {
     /// The outer ring first; the others are holes. Seen from outside, the polygon lies on the left
     /// of each. No ring comes back to its first point.
@@ -41,15 +41,15 @@ pub(super) fn polygons(
     turn: &Matrix3<f64>,
 ) -> Vec<Polygon> {
     let geometry = ShellGeometry::new(shell, &document.wireframe(), &document.arcs);
-    let is_round = |face: &Face| matches!(face.surface, Surface::Cylinder { .. });
-    let mut cylinders = match shell.faces.iter().any(is_round) {
+    let is_round = |face: &Face| !matches!(face.surface, Surface::Plane { .. });
+    let mut round = match shell.faces.iter().any(is_round) {
         true => triangles(shell, document, &geometry),
         false => BTreeMap::new(),
     };
     let mut polygons = Vec::new();
     for (place, face) in shell.faces.iter().enumerate() {
         let of_face = if is_round(face) {
-            cylinders.remove(&place).unwrap_or_default()
+            round.remove(&place).unwrap_or_default()
         } else {
             let ring = |steps: &Vec<_>| {
                 let points = steps.iter().flat_map(|step| {

@@ -112,7 +112,9 @@ impl<'a> ShellWriter<'a> {
     fn face(&mut self, face: &Face) -> String {
         let (surface, same_sense) = self.surface(face);
         let loops: Vec<Vec<String>> = match (&face.surface, &face.loops[..]) {
-            (Surface::Cylinder { .. }, [first, second]) => vec![self.seamed(first, second)],
+            (Surface::Cylinder { .. } | Surface::Cone { .. }, [first, second]) => {
+                vec![self.seamed(first, second)]
+            }
             (_, loops) => loops.iter().map(|steps| self.oriented(steps)).collect(),
         };
         let mut bounds = Vec::new();
@@ -158,6 +160,21 @@ impl<'a> ShellWriter<'a> {
                     .add(&format!("CYLINDRICAL_SURFACE('',{placement},{radius})"));
                 (surface, *convex)
             }
+            Surface::Cone {
+                apex,
+                axis,
+                half_angle,
+                convex,
+            } => {
+                let along = axis.dot(&(points[0] - apex));
+                let x = x_axis(axis, &(points[0] - apex));
+                let placement = self.step.placement(&(apex + axis * along), axis, &x);
+                let [radius, angle] = [along * half_angle.tan(), *half_angle].map(real);
+                let surface = self
+                    .step
+                    .add(&format!("CONICAL_SURFACE('',{placement},{radius},{angle})"));
+                (surface, *convex)
+            }
         }
     }
 
@@ -175,7 +192,7 @@ impl<'a> ShellWriter<'a> {
         written
     }
 
-    /// A cylinder between two circles as one loop, cut open along a line between their vertices.
+    /// A cylinder or a cone between two circles as one loop, cut open along a line between their vertices.
     fn seamed(&mut self, first: &[Step], second: &[Step]) -> Vec<String> {
         let corner = |steps: &[Step]| Some(self.edges.get(&steps.first()?.curve)?.1[0].clone());
         let corners = corner(first).zip(corner(second));

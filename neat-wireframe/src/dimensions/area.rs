@@ -3,7 +3,7 @@
 //!
 //! A plane's is the integral of x × dx / 2 around it, along its normal; that the normal is off
 //! changes it in second order only. A cylinder's is the mean of its rims' lengths times the
-//! distance between them.
+//! distance between them, a cone's that times the way along it.
 
 use super::Place;
 use crate::export::WireframeDocument;
@@ -80,7 +80,8 @@ pub(super) fn value(document: &WireframeDocument, face: &Face, points: &[Vector3
                 .sum();
             normal.dot(&sum).abs()
         }
-        Surface::Cylinder { axis, .. } => cylinder(&axis, &pieces),
+        Surface::Cylinder { axis, .. } => round(&axis, false, &pieces),
+        Surface::Cone { axis, .. } => round(&axis, true, &pieces),
     }
 }
 
@@ -137,8 +138,9 @@ impl Piece {
     }
 }
 
-fn cylinder(axis: &Vector3<f64>, pieces: &[(bool, Piece)]) -> f64 {
+fn round(axis: &Vector3<f64>, widens: bool, pieces: &[(bool, Piece)]) -> f64 {
     let (mut rims, mut centers, mut heights) = (Vec::new(), Vec::new(), Vec::new());
+    let mut radii = Vec::new();
     for (_, piece) in pieces {
         match piece {
             Piece::Edge([a, b]) => heights.push(axis.dot(&(b - a)).abs()),
@@ -149,6 +151,7 @@ fn cylinder(axis: &Vector3<f64>, pieces: &[(bool, Piece)]) -> f64 {
                 ..
             } => {
                 rims.push(radius * sweep);
+                radii.push(*radius);
                 centers.push(axis.dot(center));
             }
         }
@@ -157,5 +160,7 @@ fn cylinder(axis: &Vector3<f64>, pieces: &[(bool, Piece)]) -> f64 {
         heights.extend(centers.windows(2).map(|pair| (pair[1] - pair[0]).abs()));
     }
     let mean = |numbers: &[f64]| numbers.iter().sum::<f64>() / numbers.len() as f64;
-    mean(&rims) * mean(&heights)
+    // What two measured radii of one cylinder differ by is no slope.
+    let growth = if widens { radii[1] - radii[0] } else { 0.0 };
+    mean(&rims) * mean(&heights).hypot(growth)
 }

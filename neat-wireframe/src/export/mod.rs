@@ -64,7 +64,7 @@ pub enum ExportError {
     },
     /// A shell has a face that is none.
     #[error(
-        "{path}: shell {shell} has a face that is none: it needs a plane or a cylinder, and loops \
+        "{path}: shell {shell} has a face that is none: it needs a plane, a cylinder or a cone, and loops \
          of edges and arcs that exist and join end to end"
     )]
     BadShell {

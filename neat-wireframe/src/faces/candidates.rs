@@ -1,14 +1,16 @@
-//! All faces that the curves might bound: the cells of planes, and cylinders between two rims.
+//! All faces that the curves might bound: the cells of planes, and cylinders and cones between two
+//! rims.
 
 use super::cells::cells;
 use super::curves::{Curve, Curves};
-use super::face::{CurveIndex, Face, Step, Surface};
+use super::face::{CurveIndex, Face, Step};
 use super::plane_fit::{PlaneFit, PlaneFrame};
 use super::planes::coplanar_curves;
+use super::surface::Surface;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Rims of one cylinder agree within so many standard deviations of an arc, of both together: as
+/// Rims of one cylinder or cone agree within so many standard deviations of an arc, of both together: as
 /// one point of a thousand does not.
 const AGREEMENT: f64 = 3.29 * std::f64::consts::SQRT_2;
 
@@ -21,7 +23,7 @@ pub(super) fn candidates(curves: &Curves) -> Vec<Face> {
         let cells = cells(curves, &plane.curves, &frame).into_iter();
         cells.filter_map(move |loops| planar_face(curves, loops, &frame))
     });
-    for face in planar.chain(cylinders(curves)) {
+    for face in planar.chain(round_faces(curves)) {
         let mut boundary: Vec<CurveIndex> = face.steps().map(|step| step.curve).collect();
         boundary.sort_unstable();
         if known.insert(boundary) {
@@ -53,8 +55,9 @@ fn planar_face(curves: &Curves, loops: Vec<Vec<Step>>, frame: &PlaneFrame) -> Op
     })
 }
 
-/// Cylinders between two whole circles, or two arcs whose ends edges or inferred lines join.
-fn cylinders(curves: &Curves) -> Vec<Face> {
+/// Cylinders and cones between two whole circles, or two arcs whose ends edges or inferred lines
+/// join.
+fn round_faces(curves: &Curves) -> Vec<Face> {
     let (arcs, edges): (Vec<&Curve>, Vec<&Curve>) =
         (curves.all.iter()).partition(|curve| curve.arc.is_some());
     let by_ends: BTreeMap<[usize; 2], &Curve> = (edges.into_iter())
@@ -63,16 +66,15 @@ fn cylinders(curves: &Curves) -> Vec<Face> {
     let pairs = (0..arcs.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
     let face = |(i, j): (usize, usize)| {
         let rims = [arcs[i], arcs[j]];
-        let surface = common_cylinder(curves, rims)?;
-        let loops = loops_between(&surface, rims, &by_ends)?;
+        let surface = common_surface(curves, rims)?;
+        let loops = loops_between(rims, &by_ends)?;
         Some(Face { surface, loops })
     };
     pairs.filter_map(face).collect()
 }
 
-/// The cylinder on which both arcs are rims, with its normal away from the axis, which points
-/// from the first rim to the second.
-pub(super) fn common_cylinder(curves: &Curves, rims: [&Curve; 2]) -> Option<Surface> {
+/// The cylinder or cone on which both arcs are rims, with its normal away from the axis.
+pub(super) fn common_surface(curves: &Curves, rims: [&Curve; 2]) -> Option<Surface> {
     let [a, b] = [rims[0].arc?, rims[1].arc?];
     let tolerance = AGREEMENT * curves.arc_sigma();
     let between = b.center - a.center;
@@ -80,28 +82,39 @@ pub(super) fn common_cylinder(curves: &Curves, rims: [&Curve; 2]) -> Option<Surf
     let axis = (a.normal() + turned).normalize();
     let height = axis.dot(&between);
     let tilt = a.normal().cross(&b.normal()).norm();
-    let agree = (a.radius - b.radius).abs() <= tolerance
-        && (between - axis * height).norm() <= tolerance
+    let coaxial = (between - axis * height).norm() <= tolerance
         && tilt * a.radius.min(b.radius) <= tolerance
         && height.abs() > tolerance;
-    agree.then(|| Surface::Cylinder {
-        point: a.center,
-        axis: between.normalize(),
-        radius: 0.5 * (a.radius + b.radius),
-        convex: true,
+    if !coaxial {
+        return None;
+    }
+    let direction = between.normalize();
+    let widens = b.radius - a.radius;
+    Some(if widens.abs() <= tolerance {
+        Surface::Cylinder {
+            point: a.center,
+            axis: direction,
+            radius: 0.5 * (a.radius + b.radius),
+            convex: true,
+        }
+    } else {
+        let height = between.norm();
+        Surface::Cone {
+            apex: a.center - direction * (a.radius * height / widens),
+            axis: direction * widens.signum(),
+            half_angle: (widens.abs() / height).atan(),
+            convex: true,
+        }
     })
 }
 
 /// Around the axis along the first rim and the other way along the second: in two loops of
 /// circles, or in one that edges close.
 fn loops_between(
-    surface: &Surface,
     rims: [&Curve; 2],
     edges: &BTreeMap<[usize; 2], &Curve>,
 ) -> Option<Vec<Vec<Step>>> {
-    let Surface::Cylinder { axis, .. } = surface else {
-        return None;
-    };
+    let axis = rims[1].arc?.center - rims[0].arc?.center;
     let around = |curve: &Curve, axis: Vector3<f64>| {
         let reversed = curve.arc?.normal().dot(&axis) < 0.0;
         let ends = curve
@@ -110,7 +123,7 @@ fn loops_between(
         let curve = curve.index;
         Some((Step { curve, reversed }, ends))
     };
-    let (first, ends) = around(rims[0], *axis)?;
+    let (first, ends) = around(rims[0], axis)?;
     let (second, other_ends) = around(rims[1], -axis)?;
     match (ends, other_ends) {
         (None, None) => Some(vec![vec![first], vec![second]]),

@@ -1,6 +1,7 @@
 //! Faces and shells: what a boundary representation is made of.
 
 use super::curves::nearest_junctions;
+use super::surface::Surface;
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Wireframe3d};
 use serde::{Deserialize, Serialize};
@@ -24,30 +25,6 @@ pub struct Face {
     /// Closed chains of curves, the outer one of a plane first; the others are holes. Seen from the
     /// side to which the normal points, the face lies on the left of each.
     pub loops: Vec<Vec<Step>>,
-}
-
-/// The surfaces of faces.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Surface {
-    /// The points x with `normal · x = offset`.
-    Plane {
-        /// Of length 1.
-        normal: Vector3<f64>,
-        /// Distance from the origin along the normal.
-        offset: f64,
-    },
-    /// The points at a distance from an axis.
-    Cylinder {
-        /// A point of the axis.
-        point: Vector3<f64>,
-        /// Its direction, of length 1.
-        axis: Vector3<f64>,
-        /// The distance.
-        radius: f64,
-        /// Whether the normal points away from the axis, as on a pin; in a hole it points to it.
-        convex: bool,
-    },
 }
 
 /// A curve of a loop, in the direction in which the loop runs.
@@ -128,7 +105,7 @@ impl Shell {
 
 impl Face {
     /// Whether its surface is one, and its loops are closed chains of curves that exist: any
-    /// number on a plane; on a cylinder two arcs, which are loops of their own or joined by two
+    /// number on a plane; on a cylinder or a cone two arcs, which are loops of their own or joined by two
     /// edges or inferred lines.
     pub(crate) fn is_valid(&self, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> bool {
         let exists = |step: &Step| match step.curve {
@@ -136,32 +113,20 @@ impl Face {
             CurveIndex::Arc(arc) => arc < arcs.len(),
             CurveIndex::Smooth([a, b]) => a < b && b < wireframe.junctions.len(),
         };
-        let unit = |v: &Vector3<f64>| (v.norm() - 1.0).abs() < 1e-6;
         let is_arc = |step: &Step| matches!(step.curve, CurveIndex::Arc(_));
         let shape: Vec<Vec<bool>> = (self.loops.iter())
             .map(|steps| steps.iter().map(is_arc).collect())
             .collect();
-        let surface = match &self.surface {
-            Surface::Plane { normal, offset } => {
-                unit(normal) && offset.is_finite() && !self.loops.is_empty()
-            }
-            Surface::Cylinder {
-                point,
-                axis,
-                radius,
-                ..
-            } => {
-                let finite = point.iter().all(|x| x.is_finite());
+        let has_shape = match &self.surface {
+            Surface::Plane { .. } => !self.loops.is_empty(),
+            Surface::Cylinder { .. } | Surface::Cone { .. } => {
                 let joined =
                     shape == [[true, false, true, false]] || shape == [[false, true, false, true]];
-                unit(axis)
-                    && finite
-                    && radius.is_normal()
-                    && *radius > 0.0
-                    && (joined || shape == [[true], [true]])
+                joined || shape == [[true], [true]]
             }
         };
-        surface
+        self.surface.is_valid()
+            && has_shape
             && self.steps().all(exists)
             && (self.loops.iter()).all(|steps| is_closed(steps, wireframe, arcs))
     }
@@ -174,57 +139,23 @@ impl Face {
     fn map(&self, f: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
         let origin = f(&Vector3::zeros());
         let scale = (f(&Vector3::x()) - origin).x;
-        let surface = match self.surface {
-            Surface::Plane { normal, offset } => {
-                let outward = normal * scale.signum();
-                Surface::Plane {
-                    normal: outward,
-                    offset: outward.dot(&f(&(normal * offset))),
-                }
-            }
-            Surface::Cylinder {
-                point,
-                axis,
-                radius,
-                convex,
-            } => Surface::Cylinder {
-                point: f(&point),
-                axis: axis * scale.signum(),
-                radius: radius * scale.abs(),
-                convex,
-            },
-        };
         // In the mirror, left is right.
         let loops = if scale < 0.0 {
             self.turned().loops
         } else {
             self.loops.clone()
         };
-        Self { surface, loops }
+        Self {
+            surface: self.surface.map(f),
+            loops,
+        }
     }
 
     /// The same face with its normal on the other side.
     pub(super) fn turned(&self) -> Self {
-        let surface = match self.surface {
-            Surface::Plane { normal, offset } => Surface::Plane {
-                normal: -normal,
-                offset: -offset,
-            },
-            Surface::Cylinder {
-                point,
-                axis,
-                radius,
-                convex,
-            } => Surface::Cylinder {
-                point,
-                axis,
-                radius,
-                convex: !convex,
-            },
-        };
         let turned = |steps: &Vec<Step>| steps.iter().rev().map(Step::turned).collect();
         Self {
-            surface,
+            surface: self.surface.turned(),
             loops: self.loops.iter().map(turned).collect(),
         }
     }

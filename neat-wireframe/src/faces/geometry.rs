@@ -6,16 +6,20 @@
 //! there.
 
 use super::curves::nearest_junctions;
-use super::face::{CurveIndex, Face, Shell, Step, Surface};
+use super::face::{CurveIndex, Face, Shell, Step};
 use super::plane_fit::across;
+use super::surface::Surface;
 use nalgebra::{DMatrix, DVector, Vector3};
 use neat_core::{CircularArc, Wireframe3d};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+/// No direction that objects prefer. Whole circles begin where it points to from their axis, so that
+/// those of one axis begin beside each other, however little their planes are turned.
+pub(super) const NO_AXIS: [f64; 3] = [0.5381, 0.2837, 0.7937];
 /// Surfaces whose normals differ by a smaller sine do not say where along them they meet.
 const MIN_SINGULAR: f64 = 0.05;
-/// Cylinders are not flat: the way to them is gone in so many steps.
+/// Round surfaces are not flat: the way to them is gone in so many steps.
 const STEPS: usize = 4;
 
 /// A curve as a shell has it.
@@ -135,7 +139,7 @@ impl ShellGeometry {
     pub fn area(&self, face: &Face) -> f64 {
         match face.surface {
             Surface::Plane { normal, .. } => normal.dot(&self.area_vector(face)),
-            Surface::Cylinder { .. } => self.moments_of_cylinder(face).0,
+            Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face).0,
         }
     }
 
@@ -146,7 +150,7 @@ impl ShellGeometry {
             Surface::Plane { normal, offset } => {
                 (offset - normal.dot(&self.origin)) * normal.dot(&self.area_vector(face))
             }
-            Surface::Cylinder { .. } => self.moments_of_cylinder(face).1,
+            Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face).1,
         };
         shell.faces.iter().map(flux).sum::<f64>() / 3.0
     }
@@ -173,29 +177,46 @@ impl ShellGeometry {
         face.steps().map(of_step).sum()
     }
 
-    /// Area of a cylinder, and the flux of x through it.
-    fn moments_of_cylinder(&self, face: &Face) -> (f64, f64) {
-        let Surface::Cylinder {
-            point,
-            axis,
-            radius,
-            convex,
-        } = face.surface
-        else {
-            return (0.0, 0.0);
-        };
+    /// Area of a cylinder or a cone, and the flux of x through it.
+    fn moments_of_round(&self, face: &Face) -> (f64, f64) {
         let rims = face.steps().filter_map(|step| self.curves[&step.curve].arc);
         let rims: Vec<CircularArc> = rims.collect();
         let [one, other] = rims[..] else {
             return (0.0, 0.0);
         };
-        let height = axis.dot(&(other.center - one.center)).abs();
-        let area = radius * one.sweep() * height;
         // The integral of the direction from the axis, over the angle.
         let [start, end] = one.angles;
         let outward = one.toward(end - 0.25 * TAU) - one.toward(start - 0.25 * TAU);
-        let flux = radius * area + radius * height * (point - self.origin).dot(&outward);
-        (area, if convex { flux } else { -flux })
+        let between = other.center - one.center;
+        match face.surface {
+            Surface::Plane { .. } => (0.0, 0.0),
+            Surface::Cylinder {
+                point,
+                axis,
+                radius,
+                convex,
+            } => {
+                let height = axis.dot(&between).abs();
+                let area = radius * one.sweep() * height;
+                let flux = radius * area + radius * height * (point - self.origin).dot(&outward);
+                (area, if convex { flux } else { -flux })
+            }
+            Surface::Cone {
+                apex,
+                axis,
+                half_angle,
+                convex,
+            } => {
+                let (sine, cosine) = half_angle.sin_cos();
+                let slant = axis.dot(&between).abs() / cosine;
+                let radius = 0.5 * (one.radius + other.radius);
+                let area = radius * one.sweep() * slant;
+                // Every plane that touches a cone passes through its apex.
+                let normals = outward * (radius * slant * cosine) - axis * (area * sine);
+                let flux = (apex - self.origin).dot(&normals);
+                (area, if convex { flux } else { -flux })
+            }
+        }
     }
 }
 
@@ -203,12 +224,10 @@ impl ShellGeometry {
 fn on_surfaces(start: Vector3<f64>, surfaces: &[Surface]) -> Vector3<f64> {
     let mut position = start;
     for _ in 0..STEPS {
-        let rows = surfaces
-            .iter()
-            .map(|surface| height_over(surface, &position));
-        let rows: Vec<(Vector3<f64>, f64)> = rows.collect();
-        let normals = DMatrix::from_fn(rows.len(), 3, |i, k| rows[i].0[k]);
-        let heights = DVector::from_fn(rows.len(), |i, _| -rows[i].1);
+        let rows = surfaces.iter().map(|surface| surface.height_of(&position));
+        let rows: Vec<(f64, Vector3<f64>)> = rows.collect();
+        let normals = DMatrix::from_fn(rows.len(), 3, |i, k| rows[i].1[k]);
+        let heights = DVector::from_fn(rows.len(), |i, _| -rows[i].0);
         let Ok(step) = normals.svd(true, true).solve(&heights, MIN_SINGULAR) else {
             break;
         };
@@ -217,52 +236,76 @@ fn on_surfaces(start: Vector3<f64>, surfaces: &[Surface]) -> Vector3<f64> {
     position
 }
 
-/// The normal of a surface near a point, and how far over it the point lies.
-fn height_over(surface: &Surface, at: &Vector3<f64>) -> (Vector3<f64>, f64) {
+/// The radius of a round surface where its axis passes a point, and by how much it grows along a
+/// direction of the axis.
+fn radius_at(surface: &Surface, center: &Vector3<f64>, along: &Vector3<f64>) -> Option<[f64; 2]> {
     match surface {
-        Surface::Plane { normal, offset } => (*normal, normal.dot(at) - offset),
-        Surface::Cylinder {
-            point,
+        Surface::Plane { .. } => None,
+        Surface::Cylinder { radius, .. } => Some([*radius, 0.0]),
+        Surface::Cone {
+            apex,
             axis,
-            radius,
+            half_angle,
             ..
         } => {
-            let offset = at - point;
-            let across = offset - axis * axis.dot(&offset);
-            let outward = across.try_normalize(0.0).unwrap_or_default();
-            (outward, across.norm() - radius)
+            let slope = half_angle.tan();
+            let growth = slope * axis.dot(along).signum();
+            Some([slope * axis.dot(&(center - apex)), growth])
         }
     }
 }
 
-/// The circle of an arc in the plane of a face and around the axis of another. A whole one begins
-/// where all circles around this axis do.
+/// The circle of an arc in the plane of a face and around the axis of another, or where two round
+/// faces of one axis meet. A whole one begins where all circles around this axis do.
 fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> CircularArc {
     let (mut center, mut radius) = (arc.center, arc.radius);
-    let (mut axis, mut plane) = (None, None);
-    for surface in surfaces {
-        match surface {
-            Surface::Plane { normal, offset } => plane = plane.or(Some((*normal, *offset))),
-            Surface::Cylinder {
-                point,
-                axis: along,
-                radius: of_cylinder,
-                ..
-            } => {
-                center = point + along * along.dot(&(center - point));
-                radius = *of_cylinder;
-                axis = Some(*along);
+    let plane = surfaces.iter().find_map(|surface| match surface {
+        Surface::Plane { normal, offset } => Some((*normal, *offset)),
+        Surface::Cylinder { .. } | Surface::Cone { .. } => None,
+    });
+    let axis = surfaces
+        .iter()
+        .find_map(Surface::axis)
+        .map(|(point, axis)| {
+            center = point + axis * axis.dot(&(center - point));
+            axis
+        });
+    let mut profiles = (surfaces.iter()).filter_map(|s| radius_at(s, &center, &axis?));
+    let (first, second) = (profiles.next(), profiles.next());
+    let normal = match (plane, first, second, axis) {
+        (Some((normal, offset)), ..) => {
+            // A plane along the axis cuts no circle out of a round surface.
+            let along = axis.filter(|axis| normal.dot(axis).abs() > MIN_SINGULAR);
+            let by = |along: Vector3<f64>| (offset - normal.dot(&center)) / normal.dot(&along);
+            if let Some([here, growth]) = first {
+                radius = here + along.map_or(0.0, |along| growth * by(along));
             }
+            let along = along.unwrap_or(normal);
+            center += along * by(along);
+            normal
         }
-    }
-    let (normal, offset) = plane.unwrap_or((arc.normal(), arc.normal().dot(&center)));
-    // A plane along the axis cuts no circle out of a cylinder.
-    let along = axis.filter(|axis| normal.dot(axis).abs() > MIN_SINGULAR);
-    let along = along.unwrap_or(normal);
-    center += along * (offset - normal.dot(&center)) / normal.dot(&along);
+        (None, Some([here, growth]), Some([other, of_other]), Some(along)) => {
+            // Where one surface goes on as the same one, the arc knows where it is.
+            let apart = growth - of_other;
+            let by = if apart.abs() > MIN_SINGULAR {
+                (other - here) / apart
+            } else {
+                0.0
+            };
+            center += along * by;
+            radius = here + growth * by;
+            along
+        }
+        _ => {
+            if let Some([here, _]) = first {
+                radius = here;
+            }
+            arc.normal()
+        }
+    };
     let up = normal * normal.dot(&arc.normal()).signum();
     let toward = if whole {
-        across(&along)[0]
+        Vector3::from(NO_AXIS)
     } else {
         arc.axes[0]
     };

@@ -1,8 +1,8 @@
-//! Faces and solids from a wireframe: planes and cylinders between its edges and arcs, closed to
-//! shells where they close.
+//! Faces and solids from a wireframe: planes, cylinders and cones between its edges and arcs,
+//! closed to shells where they close.
 //!
 //! Curves that lie in one plane within their covariances divide it into cells, and two coaxial
-//! circles are the rims of a cylinder: each is a face that may be there (`candidates.rs`). Where a
+//! circles are the rims of a cylinder or a cone: each is a face that may be there (`candidates.rs`). Where a
 //! cylinder goes on without a crease, the line between them is inferred (`tangency.rs`). Images
 //! speak against a face through which they show what lies behind it (`visibility.rs`); among the
 //! others those are chosen that give the most edges two faces (`selection.rs`). What hangs
@@ -52,6 +52,7 @@ mod region;
 mod selection;
 mod sheets;
 mod shells;
+mod surface;
 mod surface_points;
 mod tangency;
 mod triangulation;
@@ -64,10 +65,11 @@ mod tests;
 
 pub use curves::MeasuredGraph;
 pub(crate) use curves::nearest_junctions;
-pub use face::{CurveIndex, Face, Shell, Step, Surface};
+pub use face::{CurveIndex, Face, Shell, Step};
 pub(crate) use triangulation::triangles;
 
 pub use geometry::{ShellCurve, ShellGeometry};
+pub use surface::Surface;
 pub use surface_points::{SurfacePoint, surface_points};
 
 use crate::ViewObservation;

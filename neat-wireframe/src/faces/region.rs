@@ -2,9 +2,10 @@
 
 use super::cells::polygon_of;
 use super::curves::Curves;
-use super::face::{Face, Surface};
+use super::face::Face;
 use super::plane_fit::PlaneFrame;
 use super::polygon::contains;
+use super::surface::Surface;
 use nalgebra::{Vector2, Vector3};
 use neat_core::CircularArc;
 
@@ -17,10 +18,13 @@ pub(super) enum Region {
         frame: PlaneFrame,
         polygons: Vec<Vec<Vector2<f64>>>,
     },
-    Cylinder {
+    /// Of a cylinder or a cone.
+    Round {
         /// The rim at height 0, around the axis.
         rim: CircularArc,
         height: f64,
+        /// By how much the radius grows with the height.
+        slope: f64,
     },
 }
 
@@ -36,12 +40,8 @@ impl Region {
                     polygons: face.loops.iter().map(polygon).collect(),
                 })
             }
-            Surface::Cylinder {
-                axis,
-                point,
-                radius,
-                ..
-            } => {
+            round => {
+                let (point, axis) = round.axis()?;
                 let mut rims = face.steps().filter_map(|step| curves.find(step.curve)?.arc);
                 let [one, other] = [rims.next()?, rims.next()?];
                 let center = |arc: &CircularArc| point + axis * axis.dot(&(arc.center - point));
@@ -50,6 +50,15 @@ impl Region {
                 // Angles run as on the arc, wherever the axis points.
                 let normal = one.normal().dot(&along).signum() * along / height;
                 let x = (one.axes[0] - normal * normal.dot(&one.axes[0])).normalize();
+                let (radius, slope) = match round {
+                    Surface::Cone { half_angle, .. } => {
+                        let slope = half_angle.tan();
+                        let radius = slope * axis.dot(&(one.center - point));
+                        (radius, slope * axis.dot(&normal).signum())
+                    }
+                    Surface::Cylinder { radius, .. } => (radius, 0.0),
+                    Surface::Plane { .. } => return None,
+                };
                 let rim = CircularArc {
                     center: center(&one),
                     axes: [x, normal.cross(&x)],
@@ -57,12 +66,12 @@ impl Region {
                     angles: one.angles,
                 };
                 let height = along.dot(&rim.normal());
-                Some(Self::Cylinder { rim, height })
+                Some(Self::Round { rim, height, slope })
             }
         }
     }
 
-    /// Where a ray hits the face, by its parameter; ascending on a cylinder.
+    /// Where a ray hits the face, by its parameter; ascending on what is round.
     pub fn hits(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> [Option<f64>; 2] {
         match self {
             Self::Plane { frame, polygons } => {
@@ -72,15 +81,24 @@ impl Region {
                 let inside = polygons.iter().filter(|p| contains(p, &point)).count() % 2 == 1;
                 [(t.is_finite() && inside).then_some(t), None]
             }
-            Self::Cylinder { rim, height } => {
+            Self::Round { rim, height, slope } => {
                 let axis = rim.normal();
                 let flat = |v: Vector3<f64>| v - axis * axis.dot(&v);
-                let (from, along) = (flat(origin - rim.center), flat(*direction));
-                let (a, b) = (along.norm_squared(), from.dot(&along));
-                let root = (b * b - a * (from.norm_squared() - rim.radius.powi(2))).sqrt();
+                let (from, along) = (origin - rim.center, *direction);
+                // Distance from the axis less radius, both squared, is a t² + 2 b t + c.
+                let (radius, widens) = (
+                    rim.radius + slope * axis.dot(&from),
+                    slope * axis.dot(&along),
+                );
+                let (from, along) = (flat(from), flat(along));
+                let a = along.norm_squared() - widens * widens;
+                let b = from.dot(&along) - radius * widens;
+                let c = from.norm_squared() - radius * radius;
+                let root = (b * b - a * c).sqrt().copysign(b);
+                let mut hits = [-(b + root) / a, -c / (b + root)];
+                hits.sort_by(f64::total_cmp);
                 let range = [height.min(0.0), height.max(0.0)];
-                [-1.0, 1.0].map(|sign| {
-                    let t = (sign * root - b) / a;
+                hits.map(|t| {
                     let point = origin + direction * t;
                     let h = axis.dot(&(point - rim.center));
                     let on_face = t.is_finite()
@@ -98,7 +116,7 @@ impl Region {
         hits.iter().flatten().any(|t| (0.0..1.0).contains(t))
     }
 
-    /// Points all over a plane face; none of a cylinder.
+    /// Points all over a plane face; none of a round one.
     pub fn points(&self) -> Vec<Vector3<f64>> {
         let Self::Plane { frame, polygons } = self else {
             return Vec::new();
@@ -119,10 +137,11 @@ impl Region {
     pub fn distance_to_surface(&self, point: &Vector3<f64>) -> f64 {
         match self {
             Self::Plane { frame, .. } => (frame.normal.dot(point) - frame.offset).abs(),
-            Self::Cylinder { rim, .. } => {
+            Self::Round { rim, slope, .. } => {
                 let offset = point - rim.center;
-                let from_axis = (offset - rim.normal() * rim.normal().dot(&offset)).norm();
-                (from_axis - rim.radius).abs()
+                let along = rim.normal().dot(&offset);
+                let from_axis = (offset - rim.normal() * along).norm();
+                (from_axis - rim.radius - slope * along).abs() / slope.hypot(1.0)
             }
         }
     }
@@ -131,7 +150,7 @@ impl Region {
     pub fn is_near(&self, point: &Vector3<f64>, distance: f64) -> bool {
         let toward = match self {
             Self::Plane { frame, .. } => frame.normal,
-            Self::Cylinder { rim, .. } => rim.toward(rim.angle_of(point)),
+            Self::Round { rim, .. } => rim.toward(rim.angle_of(point)),
         };
         let hits = self.hits(point, &toward);
         hits.iter().flatten().any(|t| t.abs() <= distance)

@@ -8,8 +8,9 @@
 //! faces, and no two faces lie on each other. The minimum is found by branch and bound.
 
 use super::curves::Curves;
-use super::face::{CurveIndex, Face, Step, Surface};
+use super::face::{CurveIndex, Face, Step};
 use super::groups::groups;
+use super::surface::Surface;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -73,24 +74,12 @@ pub(super) fn select(curves: &Curves, faces: &[Face], against: &[f64]) -> Vec<us
 fn inward(curves: &Curves, face: &Face, step: &Step) -> Option<Vector3<f64>> {
     let points = curves.find(step.curve)?.points_along(step);
     let along = (points[1] - points[0]).normalize();
-    let normal = match face.surface {
-        Surface::Plane { normal, .. } => normal,
-        Surface::Cylinder {
-            point,
-            axis,
-            convex,
-            ..
-        } => {
-            let offset = 0.5 * (points[0] + points[1]) - point;
-            let outward = (offset - axis * axis.dot(&offset)).normalize();
-            if convex { outward } else { -outward }
-        }
-    };
+    let normal = face.surface.normal_at(&(0.5 * (points[0] + points[1])));
     Some(normal.cross(&along))
 }
 
 fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
-    // A plane that touches a cylinder goes on as another surface: the end of a slot.
+    // A plane that touches a cylinder or a cone goes on as another surface: the end of a slot.
     let is_plane = |face: &Face| matches!(face.surface, Surface::Plane { .. });
     if is_plane(faces[0]) != is_plane(faces[1]) {
         return Pair::Crease;

@@ -3,7 +3,7 @@
 
 use super::curves::Curves;
 use super::explained_planes::explained_planes;
-use super::face::{Face, Surface};
+use super::face::Face;
 use super::groups::groups;
 use super::min_cut::chosen;
 use super::plane_fit::{CHI_SQUARE, FittedPlane};
@@ -13,6 +13,7 @@ use super::point_evidence::{
 };
 use super::region::Region;
 use super::selection::{MISSING_FACE, MOST_AGAINST};
+use super::surface::Surface;
 use nalgebra::Vector3;
 use neat_core::Camera;
 use rayon::prelude::*;

@@ -3,16 +3,15 @@
 use super::bounds::Bounds;
 use super::chain::{distance_to_chain, point_along};
 use super::curves::{Curve, Curves, MeasuredGraph, TURN};
-use super::face::{CurveIndex, Face, Shell, Step, Surface};
-use super::geometry::ShellGeometry;
+use super::face::{CurveIndex, Face, Shell, Step};
+use super::geometry::{NO_AXIS, ShellGeometry};
 use super::groups::groups;
 use super::region::Region;
+use super::surface::Surface;
 use crate::ViewObservation;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-/// Rays along it hardly meet edges: it is no direction that objects prefer.
-const RAY: [f64; 3] = [0.5381, 0.2837, 0.7937];
 /// Points of each curve that are asked whether they lie within a solid or on it.
 const POINTS: usize = 7;
 /// Points are on a face or an edge that are so near to it, by the extent of the shell.
@@ -168,7 +167,8 @@ fn leave_out_where_curves_are(shell: &mut Shell, curves: &Curves) -> bool {
     let regions: Vec<Option<Region>> = (shell.faces.iter())
         .map(|face| Region::new(curves, face))
         .collect();
-    let ray = Vector3::from(RAY);
+    // Rays along it hardly meet edges.
+    let ray = Vector3::from(NO_AXIS);
     let within = |point: &Vector3<f64>| {
         let hits = regions
             .iter()

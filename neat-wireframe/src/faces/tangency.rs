@@ -1,18 +1,20 @@
-//! Lines where a cylinder goes on without a crease: no image shows them, but faces end there.
+//! Lines where a cylinder or a cone goes on without a crease: no image shows them, but faces end
+//! there.
 //!
-//! Two arcs are rims of a cylinder, and from an end of each a curve goes on in the same direction:
-//! between these two ends the cylinder touches the next surface. Such a line is inferred. It costs
+//! Two arcs are its rims, and from an end of each a curve goes on in the same direction: between
+//! these two ends it touches the next surface. Such a line is inferred. It costs
 //! nothing by itself, but wants a face on both sides like any other (`selection.rs`).
 
-use super::candidates::common_cylinder;
+use super::candidates::common_surface;
 use super::curves::{Curve, Curves};
-use super::face::{CurveIndex, Surface};
+use super::face::CurveIndex;
+use super::surface::Surface;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Sine of the angle by which a curve that goes on may turn: 10°.
 const MAX_TURN: f64 = 0.174;
-/// The line runs along the axis within so many standard deviations of an arc.
+/// The line runs along the surface within so many standard deviations of an arc.
 const REACH: f64 = 4.0;
 
 /// The inferred lines between ends of arcs that no curve joins yet, in the order of their ends.
@@ -27,10 +29,10 @@ pub(super) fn smooth_lines(curves: &Curves) -> Vec<Curve> {
     let mut lines: BTreeMap<CurveIndex, Curve> = BTreeMap::new();
     for (k, one) in arcs.iter().enumerate() {
         for other in &arcs[..k] {
-            let Some(Surface::Cylinder { axis, .. }) = common_cylinder(curves, [one, other]) else {
+            let Some(surface) = common_surface(curves, [one, other]) else {
                 continue;
             };
-            for ends in pairs_of_ends(curves, [one, other], &axis) {
+            for ends in pairs_of_ends(curves, [one, other], &surface) {
                 let goes_on = leaving.goes_on(one, ends[0].0) && leaving.goes_on(other, ends[1].0);
                 let mut ends = ends;
                 ends.sort_by_key(|(junction, _)| *junction);
@@ -47,8 +49,8 @@ pub(super) fn smooth_lines(curves: &Curves) -> Vec<Curve> {
 /// A junction and where it is.
 type End = (usize, Vector3<f64>);
 
-/// An end of each of two rims, for those that lie along the axis from each other.
-fn pairs_of_ends(curves: &Curves, rims: [&Curve; 2], axis: &Vector3<f64>) -> Vec<[End; 2]> {
+/// An end of each of two rims, for those at the same angle around the axis.
+fn pairs_of_ends(curves: &Curves, rims: [&Curve; 2], surface: &Surface) -> Vec<[End; 2]> {
     let reach = REACH * curves.arc_sigma();
     let ends = |rim: &Curve| -> Vec<End> {
         let last = rim.points.len() - 1;
@@ -56,11 +58,16 @@ fn pairs_of_ends(curves: &Curves, rims: [&Curve; 2], axis: &Vector3<f64>) -> Vec
         rim.ends.into_iter().flatten().zip(points).collect()
     };
     let mut pairs = Vec::new();
+    let Some((origin, axis)) = surface.axis() else {
+        return pairs;
+    };
     for (a, from) in ends(rims[0]) {
         for (b, to) in ends(rims[1]) {
-            let way = to - from;
-            let beside = (way - axis * axis.dot(&way)).norm();
-            if a != b && beside <= reach && axis.dot(&way).abs() > reach {
+            let [start, end] = [from, to].map(|p| p - origin);
+            let [low, high] = [start, end].map(|offset| offset - axis * axis.dot(&offset));
+            let (turn, side) = (low.cross(&high).dot(&axis), low.dot(&high));
+            let beside = turn.atan2(side).abs() * low.norm().max(high.norm());
+            if a != b && beside <= reach && axis.dot(&(end - start)).abs() > reach {
                 pairs.push([(a, from), (b, to)]);
             }
         }

@@ -1,7 +1,8 @@
-//! Triangles of faces, for what knows neither planes nor cylinders.
+//! Triangles of faces, for what knows no surfaces.
 
-use super::face::{CurveIndex, Face, Shell, Step, Surface};
+use super::face::{CurveIndex, Face, Shell, Step};
 use super::plane_fit::{PlaneFrame, across};
+use super::surface::Surface;
 use earcut::Earcut;
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::{PI, TAU};
@@ -40,7 +41,7 @@ pub(crate) fn triangles(
                 let loops: Vec<Vec<Corner>> = face.loops.iter().map(flat).collect();
                 cut(&loops, &mut triangles);
             }
-            Surface::Cylinder { .. } => {
+            Surface::Cylinder { .. } | Surface::Cone { .. } => {
                 let rims: Vec<Vec<usize>> = (face.loops.iter())
                     .flat_map(|steps| (0..steps.len()).map(move |place| (steps, place)))
                     .filter(|(steps, place)| matches!(steps[*place].curve, CurveIndex::Arc(_)))
@@ -90,7 +91,7 @@ fn indices_along(
     indices
 }
 
-/// Appends the triangles between two rims of a cylinder, from angle to angle: each shares its side
+/// Appends the triangles between two rims of a cylinder or a cone, from angle to angle: each shares its side
 /// along the axis with the next.
 fn strip(
     surface: &Surface,
@@ -99,16 +100,13 @@ fn strip(
     points: &[Vector3<f64>],
     triangles: &mut Vec<[usize; 3]>,
 ) {
-    let Surface::Cylinder {
-        point,
-        axis,
-        convex,
-        ..
-    } = surface
-    else {
+    let (Surface::Cylinder { convex, .. } | Surface::Cone { convex, .. }) = surface else {
         return;
     };
-    let [u, v] = across(axis);
+    let Some((point, axis)) = surface.axis() else {
+        return;
+    };
+    let [u, v] = across(&axis);
     // Along one rim the angle grows; from within it is seen the other way round.
     let sign = if *convex { 1.0 } else { -1.0 };
     let angle = |index: usize| {
