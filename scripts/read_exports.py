@@ -108,15 +108,23 @@ def volume(shell, wireframe):
             area = sum((area_of_step(step, wireframe) for loop in face["loops"] for step in loop),
                        np.zeros(3))
             return face["plane"]["offset"] * float(np.dot(face["plane"]["normal"], area))
-        cylinder = face["cylinder"]
         one, other = (wireframe.arcs[step["arc"]] for loop in face["loops"] for step in loop
                       if "arc" in step)
-        height = abs(float(np.dot(cylinder["axis"], other.center - one.center)))
         # The integral of the direction from the axis over the angle.
         sine, cosine = np.diff(np.sin(one.angles)), np.diff(np.cos(one.angles))
-        outward = float(np.dot(cylinder["point"], sine * one.axes[0] - cosine * one.axes[1]))
-        sign, radius = 1.0 if cylinder["convex"] else -1.0, cylinder["radius"]
-        return sign * radius * height * (radius * one.sweep + outward)
+        outward = sine * one.axes[0] - cosine * one.axes[1]
+        surface = face.get("cylinder") or face["cone"]
+        sign = 1.0 if surface["convex"] else -1.0
+        axis = np.array(surface["axis"])
+        height = abs(float(np.dot(axis, other.center - one.center)))
+        if "cylinder" in face:
+            radius = surface["radius"]
+            beside = float(np.dot(surface["point"], outward))
+            return sign * radius * height * (radius * one.sweep + beside)
+        radius, angle = 0.5 * (one.radius + other.radius), surface["half_angle"]
+        # Every plane that touches a cone passes through its apex.
+        normals = radius * height * (outward - math.tan(angle) * one.sweep * axis)
+        return sign * float(np.dot(surface["apex"], normals))
 
     return sum(flux(face) for face in shell["faces"]) / 3.0
 

@@ -120,15 +120,24 @@ fn scene_sphere(scene: &Scene) -> Finding {
     }
     if !inside.is_empty() {
         let message = of_cameras(&inside, "stand inside");
-        let mut finding = Finding::warning(Check::SceneSphere, message, remedy);
         let apart = (scene.views.iter())
             .map(|view| (view.camera.center_in_world - camera(0).center_in_world).norm())
             .fold(0.0, f64::max);
-        // From one place, as seen from what it holds.
         if inside.len() == scene.views.len() && apart < MIN_BASELINE * scene.sphere_radius {
+            // From one place, as seen from what it holds.
+            let mut finding = Finding::warning(Check::SceneSphere, message, remedy);
             finding.level = Level::Problem;
+            return finding.of_views(inside);
         }
-        return finding.of_views(inside);
+        if 2 * inside.len() > scene.views.len() {
+            let all = counted(scene.views.len(), "camera");
+            let message = format!(
+                "{} of {all} stand inside {ball}, as in a room",
+                inside.len()
+            );
+            return Finding::new(Check::SceneSphere, Level::Note, message).of_views(inside);
+        }
+        return Finding::warning(Check::SceneSphere, message, remedy).of_views(inside);
     }
     let seen = median(shares.into_iter());
     let message = format!("cameras see {} of {ball} (median)", percent(seen));

@@ -200,7 +200,7 @@ fn crossing(edge: &LineSegment3, end: usize, found: &FoundArc, gap: f64) -> Opti
 }
 
 /// An angle between -π and π.
-fn wrapped(angle: f64) -> f64 {
+pub(super) fn wrapped(angle: f64) -> f64 {
     (angle + PI).rem_euclid(TAU) - PI
 }
 

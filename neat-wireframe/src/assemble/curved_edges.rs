@@ -61,7 +61,7 @@ pub(super) struct CurvedEdge {
     /// Its junctions.
     pub ends: [usize; 2],
     /// Where it has its middle.
-    middle: Vector3<f64>,
+    pub middle: Vector3<f64>,
     gain: f64,
     pixel: f64,
 }

@@ -19,6 +19,7 @@
 //! All steps work in a world whose scene ball is the unit ball around the origin.
 
 mod arc_covariance;
+mod arc_ends;
 mod arc_joints;
 mod arc_tubes;
 mod arcs;
@@ -77,6 +78,7 @@ pub use report::{AssembleReport, Assembled};
 
 use crate::paper::NeatLine;
 use crate::{ViewObservation, Wireframe3d};
+use arc_ends::end_at_junctions;
 use arc_joints::{end_on_arcs, join_tangents};
 use arc_tubes::KnownArcs;
 use circle_fitting::FoundArc;
@@ -355,10 +357,11 @@ fn graph_of(
     if let Some(light) = photographs.zip(response) {
         drop_gaps(&images, light, &lines, &mut wireframe, &mut sources);
     }
-    let curved = take_curved_edges(&images, &mut wireframe, &mut sources);
+    let mut curved = take_curved_edges(&images, &mut wireframe, &mut sources);
+    report.curved_lines += curved.len();
+    end_at_junctions(&images, &mut wireframe, &mut sources, &mut curved, arcs);
     fit_edges(&images, &lines, &sources, &mut wireframe);
     add_as_arcs(&curved, &wireframe.junctions, arcs);
-    report.curved_lines += curved.len();
     let ends_of_curves = curved.iter().flat_map(|edge| edge.ends).collect();
     ControlFlow::Continue(in_order(&wireframe, ends_of_curves))
 }

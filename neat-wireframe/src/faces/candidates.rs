@@ -2,10 +2,11 @@
 //! rims.
 
 use super::cells::cells;
+use super::creases::missing_creases;
 use super::curves::{Curve, Curves};
 use super::face::{CurveIndex, Face, Step};
 use super::plane_fit::{PlaneFit, PlaneFrame};
-use super::planes::coplanar_curves;
+use super::planes::{CoplanarCurves, coplanar_curves};
 use super::surface::Surface;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,23 +15,50 @@ use std::collections::{BTreeMap, BTreeSet};
 /// one point of a thousand does not.
 const AGREEMENT: f64 = 3.29 * std::f64::consts::SQRT_2;
 
-/// Faces with different boundaries; none knows its outer side yet.
-pub(super) fn candidates(curves: &Curves) -> Vec<Face> {
+/// All curves, inferred ones among them, and faces with different boundaries; none knows its outer
+/// side yet.
+pub(super) fn candidates(curves: Curves) -> (Curves, Vec<Face>) {
+    let planes = coplanar_curves(&curves);
+    let missing = missing_creases(&curves, &planes);
+    let observed: Vec<BTreeSet<CurveIndex>> = (planes.iter())
+        .map(|plane| {
+            plane
+                .curves
+                .iter()
+                .map(|place| curves.all[*place].index)
+                .collect()
+        })
+        .collect();
+    let curves = curves.with_inferred(missing.lines);
     let mut known: BTreeSet<Vec<CurveIndex>> = BTreeSet::new();
     let mut faces = Vec::new();
-    let planar = coplanar_curves(curves).into_iter().flat_map(|plane| {
+    let faces_of = |plane: &CoplanarCurves, members: &BTreeSet<CurveIndex>| -> Vec<Face> {
         let frame = PlaneFrame::new(plane.normal, plane.offset);
-        let cells = cells(curves, &plane.curves, &frame).into_iter();
-        cells.filter_map(move |loops| planar_face(curves, loops, &frame))
-    });
-    for face in planar.chain(round_faces(curves)) {
+        let members: Vec<&Curve> = members
+            .iter()
+            .filter_map(|curve| curves.find(*curve))
+            .collect();
+        let cells = cells(&curves, members, &frame).into_iter();
+        cells
+            .filter_map(|loops| planar_face(&curves, loops, &frame))
+            .collect()
+    };
+    let mut planar = Vec::new();
+    for ((plane, members), change) in planes.iter().zip(&observed).zip(&missing.changes) {
+        planar.extend(faces_of(plane, members));
+        if !change.gained.is_empty() {
+            let with_gained = &(members | &change.gained) - &change.replaced;
+            planar.extend(faces_of(plane, &with_gained));
+        }
+    }
+    for face in planar.into_iter().chain(round_faces(&curves)) {
         let mut boundary: Vec<CurveIndex> = face.steps().map(|step| step.curve).collect();
         boundary.sort_unstable();
         if known.insert(boundary) {
             faces.push(face);
         }
     }
-    faces
+    (curves, faces)
 }
 
 /// The face in the plane of its own curves, if there is one that holds all of them.

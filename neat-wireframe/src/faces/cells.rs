@@ -22,9 +22,8 @@ struct Cycle {
     component: usize,
 }
 
-/// The bounded cells between some curves of a plane, by their places among all curves.
-pub(super) fn cells(curves: &Curves, members: &[usize], frame: &PlaneFrame) -> Vec<Cell> {
-    let members: Vec<&Curve> = members.iter().map(|place| &curves.all[*place]).collect();
+/// The bounded cells between some curves of a plane.
+pub(super) fn cells(curves: &Curves, members: Vec<&Curve>, frame: &PlaneFrame) -> Vec<Cell> {
     let (circles, mut open): (Vec<&Curve>, Vec<&Curve>) =
         members.into_iter().partition(|curve| curve.ends.is_none());
     let mut cycles: Vec<Cycle> = Vec::new();

@@ -110,9 +110,10 @@ impl Curves {
         Self { all, loose, extent }
     }
 
-    /// The same with lines that are inferred from them, ascending.
+    /// The same with lines that are inferred from them.
     pub fn with_inferred(mut self, lines: Vec<Curve>) -> Self {
         self.all.extend(lines);
+        self.all.sort_by_key(|curve| curve.index);
         self
     }
 

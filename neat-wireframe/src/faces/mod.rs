@@ -3,7 +3,8 @@
 //!
 //! Curves that lie in one plane within their covariances divide it into cells, and two coaxial
 //! circles are the rims of a cylinder or a cone: each is a face that may be there (`candidates.rs`). Where a
-//! cylinder goes on without a crease, the line between them is inferred (`tangency.rs`). Images
+//! cylinder goes on without a crease, the line between them is inferred (`tangency.rs`), and where
+//! two planes meet at corners that lack an edge, that edge (`creases.rs`). Images
 //! speak against a face through which they show what lies behind it (`visibility.rs`); among the
 //! others those are chosen that give the most edges two faces (`selection.rs`). What hangs
 //! together is a shell; it bounds a solid if each of its curves has a face on both sides
@@ -37,6 +38,7 @@ mod bounds;
 mod candidates;
 mod cells;
 mod chain;
+mod creases;
 mod curves;
 mod explained_planes;
 mod face;
@@ -95,19 +97,20 @@ pub fn find_shells(
 ) -> Vec<Shell> {
     let observed = Curves::new(graph);
     let smooth = tangency::smooth_lines(&observed);
-    let curves = observed.with_inferred(smooth);
-    let faces = candidates::candidates(&curves);
+    let (curves, faces) = candidates::candidates(observed.with_inferred(smooth));
     let _span = tracing::debug_span!("find_shells", faces = faces.len()).entered();
     let sightings = Sightings::new(&curves, views);
-    let against: Vec<f64> = (faces.par_iter())
+    let (regions, against): (Vec<Option<Region>>, Vec<f64>) = (faces.par_iter())
         .map(|face| {
             let of_steps = face.steps().filter_map(|step| curves.find(step.curve));
             let outline: Vec<_> = of_steps.flat_map(|curve| curve.points.clone()).collect();
             let region = Region::new(&curves, face);
-            region.map_or(f64::MAX, |region| sightings.against(&region, &outline))
+            let against =
+                (region.as_ref()).map_or(f64::MAX, |region| sightings.against(region, &outline));
+            (region, against)
         })
-        .collect();
-    let chosen = selection::select(&curves, &faces, &against);
+        .unzip();
+    let chosen = selection::select(&curves, &faces, &regions, &against);
     let chosen = chosen.into_iter().map(|face| faces[face].clone()).collect();
     let shells = shells::shells(graph, &curves, chosen, views);
     if points.is_empty() || views.is_empty() {

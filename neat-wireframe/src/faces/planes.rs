@@ -15,8 +15,9 @@ const REACH: f64 = 4.0;
 /// After so many rounds the curves of a plane are taken as they are.
 const ROUNDS: usize = 4;
 
-/// The curves of one plane, by their places among all, ascending.
+/// The curves of one plane.
 pub(super) struct CoplanarCurves {
+    /// Their places among all, ascending.
     pub curves: Vec<usize>,
     pub normal: Vector3<f64>,
     pub offset: f64,

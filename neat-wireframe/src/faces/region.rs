@@ -9,6 +9,12 @@ use super::surface::Surface;
 use nalgebra::{Vector2, Vector3};
 use neat_core::CircularArc;
 
+/// A round face is asked about along so many straight lines on it …
+const RULINGS: usize = 16;
+/// … without this share at each end …
+const AT_END: f64 = 0.02;
+/// … and passes through another one if more of them do.
+const FEW_RULINGS: usize = 4;
 /// A face is asked about on a grid of so many points to each side of the box around it.
 const GRID: usize = 8;
 
@@ -114,6 +120,23 @@ impl Region {
     pub fn is_between(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
         let hits = self.hits(from, &(to - from));
         hits.iter().flatten().any(|t| (0.0..1.0).contains(t))
+    }
+
+    /// Whether a round face passes through another one.
+    pub fn passes_through(&self, other: &Self) -> bool {
+        let Self::Round { rim, height, slope } = self else {
+            return false;
+        };
+        let passes = |ruling: &usize| {
+            let angle = rim.angles[0] + rim.sweep() * (*ruling as f64 + 0.5) / RULINGS as f64;
+            let outward = rim.toward(angle);
+            let at = |share: f64| {
+                let along = share * height;
+                rim.center + outward * (rim.radius + slope * along) + rim.normal() * along
+            };
+            other.is_between(&at(AT_END), &at(1.0 - AT_END))
+        };
+        (0..RULINGS).filter(passes).count() > FEW_RULINGS
     }
 
     /// Points all over a plane face; none of a round one.

@@ -4,14 +4,16 @@
 //! The energy is a sum over faces and curves, in nats. A face costs what images say against it
 //! ([`super::visibility`]). A curve that lacks a face costs [`MISSING_FACE`], twice if it has none;
 //! a curve between two faces of one plane is no crease and costs [`FLAT`]. An inferred line that has
-//! no face is none, and costs nothing. No curve has three
-//! faces, and no two faces lie on each other. The minimum is found by branch and bound.
+//! no face is none, and costs nothing. Round faces cost [`ROUND`]. No curve has three faces, no two faces
+//! lie on each other, and no cylinder or cone passes through another face. The minimum is found by branch and bound.
 
 use super::curves::Curves;
 use super::face::{CurveIndex, Face, Step};
 use super::groups::groups;
+use super::region::Region;
 use super::surface::Surface;
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Edges of a solid have two faces: that one lacks one is as likely as that a line of the
@@ -19,6 +21,10 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) const MISSING_FACE: f64 = 3.0;
 /// More than a face can win by one curve: a circle on a face is a hole before it is a lid.
 const FLAT: f64 = 2.0 * MISSING_FACE;
+/// What a cylinder and a cone cost: rims alone do not tell a pin with chamfers from a tube with
+/// sharp rims, or a step from a cone, and of what would explain them as well the flatter is likelier.
+/// Less than a rim without a face.
+const ROUND: [f64; 2] = [0.5, 1.0];
 /// Faces against which images speak more than this are out whatever they would close.
 pub(super) const MOST_AGAINST: f64 = 3.0;
 /// Cosine of the angle of two faces that go on as one plane, or lie on each other: 3°.
@@ -27,16 +33,21 @@ pub(super) const SAME_PLANE: f64 = 0.9986;
 /// is taken.
 const MOST_STATES: usize = 20_000;
 
-/// How two faces at one curve lie to each other.
+/// How two faces lie to each other: at one curve, or one through the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Pair {
     Crease,
     Flat,
-    Folded,
+    Excluding,
 }
 
 /// The places of the chosen faces, ascending; `against` is what images say against each.
-pub(super) fn select(curves: &Curves, faces: &[Face], against: &[f64]) -> Vec<usize> {
+pub(super) fn select(
+    curves: &Curves,
+    faces: &[Face],
+    regions: &[Option<Region>],
+    against: &[f64],
+) -> Vec<usize> {
     let possible: Vec<usize> = (0..faces.len())
         .filter(|face| against[*face] <= MOST_AGAINST)
         .collect();
@@ -63,11 +74,29 @@ pub(super) fn select(curves: &Curves, faces: &[Face], against: &[f64]) -> Vec<us
             }
         }
     }
+    for [one, other] in crossing(regions, &possible) {
+        beside[one].push((other, Pair::Excluding));
+        beside[other].push((one, Pair::Excluding));
+        contended.push(vec![one, other]);
+    }
     let mut chosen: Vec<usize> = (groups(&contended).into_iter())
         .flat_map(|group| Search::new(faces, against, &beside, group).best())
         .collect();
     chosen.sort_unstable();
     chosen
+}
+
+/// Pairs of faces of which a round one passes through the other.
+fn crossing(regions: &[Option<Region>], possible: &[usize]) -> Vec<[usize; 2]> {
+    let known: Vec<(usize, &Region)> = (possible.iter())
+        .filter_map(|face| Some((*face, regions[*face].as_ref()?)))
+        .collect();
+    let of_face = |(one, region): &(usize, &Region)| -> Vec<[usize; 2]> {
+        let others = known.iter().filter(|(other, _)| other != one);
+        let crossed = others.filter(|(_, other)| region.passes_through(other));
+        crossed.map(|(other, _)| [*one, *other]).collect()
+    };
+    known.par_iter().flat_map_iter(of_face).collect()
 }
 
 /// Into which direction a face goes from the start of a curve of its boundary.
@@ -99,7 +128,7 @@ fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
         inward(curves, &forward, &step)
     });
     match one.zip(other).map(|(one, other)| one.dot(&other)) {
-        Some(cosine) if cosine > SAME_PLANE => Pair::Folded,
+        Some(cosine) if cosine > SAME_PLANE => Pair::Excluding,
         Some(cosine) if cosine < -SAME_PLANE => Pair::Flat,
         _ => Pair::Crease,
     }
@@ -125,7 +154,14 @@ impl<'a> Search<'a> {
         beside: &'a [Vec<(usize, Pair)>],
         group: Vec<usize>,
     ) -> Self {
-        let gain = |face: usize| MISSING_FACE * faces[face].steps().count() as f64 - against[face];
+        let gain = |face: usize| {
+            let round = match faces[face].surface {
+                Surface::Plane { .. } => 0.0,
+                Surface::Cylinder { .. } => ROUND[0],
+                Surface::Cone { .. } => ROUND[1],
+            };
+            MISSING_FACE * faces[face].steps().count() as f64 - against[face] - round
+        };
         let gains = group.into_iter().map(|face| (gain(face), face));
         let mut order: Vec<(f64, usize)> = gains.filter(|(gain, _)| *gain > 0.0).collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -183,7 +219,7 @@ impl<'a> Search<'a> {
             .iter()
             .filter(|(other, _)| self.taken.contains(other));
         let flat: Option<f64> = beside
-            .map(|(_, pair)| (*pair != Pair::Folded).then_some(FLAT))
+            .map(|(_, pair)| (*pair != Pair::Excluding).then_some(FLAT))
             .sum();
         // A line is inferred for the first face, which wins nothing by it and lacks the other.
         let is_first = |step: &&Step| {

@@ -138,8 +138,12 @@ fn middle(face: &Face, geometry: &ShellGeometry) -> Option<(Vector3<f64>, Vector
 /// The faces on which they lie are left out; returns whether there are such.
 fn leave_out_where_curves_are(shell: &mut Shell, curves: &Curves) -> bool {
     let own: BTreeSet<CurveIndex> = shell.curves().collect();
-    let (bounding, others): (Vec<&Curve>, Vec<&Curve>) =
-        (curves.observed()).partition(|curve| own.contains(&curve.index));
+    let bounding: Vec<&Curve> = (curves.all.iter())
+        .filter(|curve| own.contains(&curve.index))
+        .collect();
+    let others = curves
+        .observed()
+        .filter(|curve| !own.contains(&curve.index));
     let bounds = Bounds::of(bounding.iter().flat_map(|curve| &curve.points));
     let margin = MARGIN * bounds.extent();
     let around = bounds.widened(margin);
@@ -148,7 +152,6 @@ fn leave_out_where_curves_are(shell: &mut Shell, curves: &Curves) -> bool {
         (bounding.iter()).all(|curve| distance_to_chain(&curve.points, point) > margin)
     };
     let chains = others
-        .iter()
         .map(|curve| &curve.points)
         .chain(&curves.loose)
         .filter(|points| Bounds::of(*points).meets(&around));

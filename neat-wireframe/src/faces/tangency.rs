@@ -34,10 +34,8 @@ pub(super) fn smooth_lines(curves: &Curves) -> Vec<Curve> {
             };
             for ends in pairs_of_ends(curves, [one, other], &surface) {
                 let goes_on = leaving.goes_on(one, ends[0].0) && leaving.goes_on(other, ends[1].0);
-                let mut ends = ends;
-                ends.sort_by_key(|(junction, _)| *junction);
-                if goes_on && !joined.contains(&ends.map(|(junction, _)| junction)) {
-                    let line = line(curves, ends);
+                if goes_on && !joined.contains(&sorted(ends.map(|(junction, _)| junction))) {
+                    let line = inferred_line(curves, ends);
                     lines.insert(line.index, line);
                 }
             }
@@ -75,8 +73,9 @@ fn pairs_of_ends(curves: &Curves, rims: [&Curve; 2], surface: &Surface) -> Vec<[
     pairs
 }
 
-/// Known as well as arcs are.
-fn line(curves: &Curves, ends: [End; 2]) -> Curve {
+/// Between two junctions; known as well as arcs are.
+pub(super) fn inferred_line(curves: &Curves, mut ends: [End; 2]) -> Curve {
+    ends.sort_by_key(|(junction, _)| *junction);
     let junctions = ends.map(|(junction, _)| junction);
     Curve {
         index: CurveIndex::Smooth(junctions),

@@ -187,6 +187,88 @@ fn rounded_ends_are_parts_of_cylinders() {
     assert_solid(rounded_block(), 7, 1.0 - 0.09 + 0.25 * PI * 0.09);
 }
 
+/// Volume of a frustum.
+fn frustum(height: f64, [r, s]: [f64; 2]) -> f64 {
+    PI * height * (r * r + r * s + s * s) / 3.0
+}
+
+#[test]
+fn rims_of_different_radii_bound_cones() {
+    let block = || Model::default().prism(&SQUARE, [0.0, 0.8]);
+    let at = |z: f64| [0.4, 0.5, z];
+    let pin = Model::default()
+        .circle(at(0.0), 0.3, WHOLE)
+        .circle(at(0.5), 0.1, WHOLE);
+    assert_solid(pin, 3, frustum(0.5, [0.3, 0.1]));
+    // A countersunk hole, and a cone on a block.
+    let hole = block()
+        .circle(at(0.0), 0.1, WHOLE)
+        .circle(at(0.6), 0.1, WHOLE)
+        .circle(at(0.8), 0.3, WHOLE);
+    let volume = 0.8 - 0.6 * PI * 0.01 - frustum(0.2, [0.1, 0.3]);
+    assert_solid(hole, 8, volume);
+    let cone = block()
+        .circle(at(0.8), 0.3, WHOLE)
+        .circle(at(1.1), 0.2, WHOLE);
+    assert_solid(cone, 8, 0.8 + frustum(0.3, [0.3, 0.2]));
+    // A quarter of one, between flat sides.
+    let mut quarter = Model::default();
+    let (radii, heights) = ([0.5, 0.2], [0.0, 0.4]);
+    for (radius, z) in radii.into_iter().zip(heights) {
+        let corners = [[0.0, 0.0, z], [radius, 0.0, z], [0.0, radius, z]];
+        quarter
+            .wireframe
+            .junctions
+            .extend(corners.map(Vector3::from));
+        quarter = quarter.circle([0.0, 0.0, z], radius, [0.0, 0.5 * PI]);
+    }
+    quarter.wireframe.edges = vec![[0, 1], [0, 2], [3, 4], [3, 5], [0, 3], [1, 4], [2, 5]];
+    assert_solid(quarter, 5, 0.25 * frustum(0.4, radii));
+}
+
+#[test]
+fn steps_are_no_cones_and_chamfers_are() {
+    let shaft = |rims: [(f64, f64); 4]| {
+        rims.into_iter()
+            .fold(Model::default(), |model, (radius, z)| {
+                model.circle([0.0, 0.0, z], radius, WHOLE)
+            })
+    };
+    let stepped = shaft([(0.3, 0.0), (0.3, 0.4), (0.2, 0.4), (0.2, 0.8)]);
+    assert_solid(stepped, 5, PI * (0.4 * 0.09 + 0.4 * 0.04));
+    let chamfered = shaft([(0.25, 0.0), (0.3, 0.05), (0.3, 0.75), (0.25, 0.8)]);
+    let volume = 2.0 * frustum(0.05, [0.25, 0.3]) + 0.7 * PI * 0.09;
+    assert_solid(chamfered, 5, volume);
+}
+
+#[test]
+fn missing_creases_are_inferred_between_corners() {
+    let l_profile = [
+        [0.0, 0.0],
+        [1.0, 0.0],
+        [1.0, 0.3],
+        [0.3, 0.3],
+        [0.3, 1.0],
+        [0.0, 1.0],
+    ];
+    let instead = |ends: &[[f64; 3]]| {
+        let mut model = Model::default().prism(&l_profile, [0.0, 0.5]);
+        model.wireframe.edges.retain(|edge| *edge != [3, 9]);
+        for end in ends {
+            model
+                .wireframe
+                .edges
+                .push([3, model.wireframe.junctions.len()]);
+            model.wireframe.junctions.push(Vector3::from(*end));
+        }
+        model
+    };
+    // The edge in the inner corner is missing, stops short, or runs past its end.
+    assert_solid(instead(&[]), 8, 0.255);
+    assert_solid(instead(&[[0.3, 0.3, 0.2]]), 8, 0.255);
+    assert_solid(instead(&[[0.3, 0.3, 0.7]]), 8, 0.255);
+}
+
 #[test]
 fn small_solids_far_apart_have_planes_of_their_own() {
     // At the noise of so large a scene, each side may lie in a plane with those of others.
@@ -207,13 +289,13 @@ fn small_solids_far_apart_have_planes_of_their_own() {
 
 #[test]
 fn what_does_not_close_is_a_sheet() {
-    // A box without the edge at one corner has three faces, or a hole whose bottom is missing.
+    // A box without the edges at one corner has three faces, or a hole whose bottom is missing.
     let mut open = Model::default().prism(&SQUARE, [0.0, 1.0]);
-    open.wireframe.edges.retain(|edge| *edge != [0, 1]);
+    (open.wireframe.edges).retain(|edge| !edge.contains(&0));
     let shells = open.shells();
     assert_eq!(
         (shells.len(), shells[0].closed, shells[0].faces.len()),
-        (1, false, 4)
+        (1, false, 3)
     );
     let half = Model::default()
         .prism(&SQUARE, [0.0, 0.8])
@@ -280,15 +362,7 @@ fn geometry_lies_on_the_surfaces() {
     let geometry = ShellGeometry::new(shell, &block.wireframe, &block.arcs);
     for face in &shell.faces {
         for point in face.steps().flat_map(|step| geometry.points(step, 0.1)) {
-            let off = match face.surface {
-                Surface::Plane { normal, offset } => normal.dot(&point) - offset,
-                Surface::Cylinder {
-                    point: on_axis,
-                    axis,
-                    radius,
-                    ..
-                } => (point - on_axis).cross(&axis).norm() - radius,
-            };
+            let (off, _) = face.surface.height_of(&point);
             assert!(off.abs() < 1e-5, "{off} {:?}", face.surface);
         }
     }

@@ -1,0 +1,253 @@
+//! Where arcs end: at junctions of the graph, or nowhere, as whole circles.
+//!
+//! Edgels say within a sector where an arc ends, and nothing where it is hidden. But curves end
+//! where others do. So an end of an arc moves along its circle to a junction near it; an edge that
+//! goes on from there as a chord of the circle, within what edgels tell, is a part of the arc; a
+//! circle without any junction on it is closed; and an arc is cut where junctions lie on it, and
+//! loses the pieces that hardly any edgel shows.
+
+use super::arc_joints::wrapped;
+use super::circle_fitting::FoundArc;
+use super::corners::{MAX_GAP, WINDOW_IN_PIXELS};
+use super::curved_edges::CurvedEdge;
+use super::edge_cutting::retain_edges;
+use super::edge_samples::Images;
+use nalgebra::Vector3;
+use neat_core::Wireframe3d;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::f64::consts::{PI, TAU};
+
+/// An end at which nothing else ends is as likely as an edge that no face is beside, 1 in 20: in
+/// nats.
+const OPEN_END: f64 = 3.0;
+/// An end within so many pixels of a junction is there, as for 2D segments.
+const AT_JUNCTION: f64 = 5.0;
+/// Pixels of an arc that are asked at once, as in circles that are followed.
+const PIECE_IN_PIXELS: f64 = 12.0;
+/// A piece between junctions is there if its images say this much of what they say of the whole
+/// arc, by length. Of a circle with eight scallops (`knob`) pieces that are there say .9 of it at
+/// least, those across scallops .02 at most.
+const OF_WHOLE: f64 = 0.1;
+
+/// Ends the arcs at the junctions of edges, straight and curved ones. Edges that are parts of arcs
+/// are taken away; `sources` belong to the straight ones.
+pub(super) fn end_at_junctions(
+    images: &Images,
+    wireframe: &mut Wireframe3d,
+    sources: &mut Vec<Option<usize>>,
+    curved: &mut Vec<CurvedEdge>,
+    arcs: &mut Vec<FoundArc>,
+) {
+    let Wireframe3d { junctions, edges } = wireframe;
+    let points_of = |ends: [usize; 2], middle: Option<Vector3<f64>>| {
+        let [a, b] = ends.map(|end| junctions[end]);
+        [a, middle.unwrap_or(0.5 * (a + b)), b]
+    };
+    let straight = edges.iter().map(|ends| points_of(*ends, None));
+    let bowed = (curved.iter()).map(|edge| points_of(edge.ends, Some(edge.middle)));
+    let mut parts: Vec<Option<[Vector3<f64>; 3]>> = straight.chain(bowed).map(Some).collect();
+    for found in arcs.iter_mut() {
+        absorb(images, &mut parts, found);
+    }
+    let mut left = parts.iter().map(Option::is_some);
+    let kept: Vec<bool> = left.by_ref().take(edges.len()).collect();
+    retain_edges(&kept, edges, sources);
+    curved.retain(|_| left.next() == Some(true));
+    let of_curves = curved.iter().flat_map(|edge| edge.ends);
+    let used: BTreeSet<usize> = edges.iter().flatten().copied().chain(of_curves).collect();
+    let junctions: Vec<Vector3<f64>> = used.iter().map(|j| junctions[*j]).collect();
+    let ended = arcs.par_iter().map(|found| {
+        let stations = stations(images, found, &junctions);
+        let ended = Ends {
+            images,
+            found,
+            stations,
+        }
+        .moved();
+        let stations = self::stations(images, &ended, &junctions);
+        Ends {
+            images,
+            found: &ended,
+            stations,
+        }
+        .cut()
+    });
+    *arcs = ended.flatten_iter().collect();
+}
+
+/// Takes the edges, each by its start, middle and end, that lie on the circle of an arc and along
+/// it, and lengthens the arc by those that go on from its ends.
+fn absorb(images: &Images, parts: &mut [Option<[Vector3<f64>; 3]>], found: &mut FoundArc) {
+    let arc = &mut found.arc;
+    let near = AT_JUNCTION * found.pixel / arc.radius;
+    let gap = MAX_GAP * images.reach * found.pixel;
+    let mut grown = true;
+    while grown && !arc.is_closed() {
+        grown = false;
+        for part in parts.iter_mut() {
+            let Some(points) = part
+                .filter(|points| (points.iter()).all(|point| arc.distance_to_circle(point) <= gap))
+            else {
+                continue;
+            };
+            let [a, middle, b] = points.map(|point| arc.angle_of(&point));
+            let (from, to) = match [a, b].map(|angle| arc.contains(angle, near)) {
+                [false, false] => continue,
+                [true, false] => (a, b),
+                [false, true] => (b, a),
+                [true, true] => {
+                    if !arc.contains(middle, 0.0) {
+                        arc.angles[1] = arc.angles[0] + TAU;
+                    }
+                    *part = None;
+                    continue;
+                }
+            };
+            let end = usize::from(wrapped(to - from) > 0.0);
+            arc.angles[end] += wrapped(to - arc.angles[end]);
+            (*part, grown) = (None, true);
+        }
+        if arc.sweep() + near >= TAU {
+            arc.angles[1] = arc.angles[0] + TAU;
+        }
+    }
+}
+
+/// The angles of the junctions on the circle of an arc, from its start on, ascending.
+fn stations(images: &Images, found: &FoundArc, junctions: &[Vector3<f64>]) -> Vec<f64> {
+    let arc = &found.arc;
+    let gap = MAX_GAP * images.reach * found.pixel;
+    let on_circle = junctions
+        .iter()
+        .filter(|j| arc.distance_to_circle(j) <= gap);
+    let mut stations: Vec<f64> = on_circle
+        .map(|j| arc.angles[0] + (arc.angle_of(j) - arc.angles[0]).rem_euclid(TAU))
+        .collect();
+    stations.sort_by(f64::total_cmp);
+    stations
+}
+
+/// An arc with the angles of the junctions on its circle.
+struct Ends<'a> {
+    images: &'a Images<'a>,
+    found: &'a FoundArc,
+    stations: Vec<f64>,
+}
+
+impl Ends<'_> {
+    /// The arc with its ends moved.
+    fn moved(&self) -> FoundArc {
+        let mut ended = self.found.clone();
+        let arc = &self.found.arc;
+        let [start, end] = arc.angles;
+        if arc.is_closed() {
+            return ended;
+        }
+        if self.stations.is_empty() {
+            if arc.sweep() > PI && self.gain([end, start + TAU]) > -2.0 * OPEN_END {
+                ended.arc.angles = [start, start + TAU];
+            }
+            return ended;
+        }
+        let mut moved = [start, end];
+        for (k, sign) in [(0, -1.0), (1, 1.0)] {
+            moved[k] += sign * self.to_junction(arc.angles[k], sign);
+        }
+        if (1e-9..=TAU).contains(&(moved[1] - moved[0])) {
+            ended.arc.angles = moved;
+        }
+        ended
+    }
+
+    /// How far outward along the circle an end goes to the junction that costs least: none where
+    /// it is at one, or where images say too much against all.
+    fn to_junction(&self, from: f64, sign: f64) -> f64 {
+        let arc = &self.found.arc;
+        let in_pixels = |by: f64| by.abs() * arc.radius / self.found.pixel;
+        let ways = self
+            .stations
+            .iter()
+            .map(|station| sign * wrapped(station - from));
+        let near = ways.filter(|by| in_pixels(*by) <= WINDOW_IN_PIXELS);
+        let costs = near.map(|by| {
+            let to = from + sign * by;
+            let cost = if in_pixels(by) <= AT_JUNCTION {
+                0.0
+            } else {
+                let gain = self.gain([from.min(to), from.max(to)]);
+                if by > 0.0 { -gain } else { gain }
+            };
+            (cost, by)
+        });
+        let order = |a: &(f64, f64), b: &(f64, f64)| {
+            a.0.total_cmp(&b.0).then(a.1.abs().total_cmp(&b.1.abs()))
+        };
+        let best = costs.min_by(order).filter(|(cost, _)| *cost < OPEN_END);
+        best.map_or(0.0, |(_, by)| by)
+    }
+
+    /// The pieces between junctions that images show. A circle stays whole if all are.
+    fn cut(&self) -> Vec<FoundArc> {
+        let arc = &self.found.arc;
+        let near = AT_JUNCTION * self.found.pixel / arc.radius;
+        let [start, end] = arc.angles;
+        let turned = self
+            .stations
+            .iter()
+            .flat_map(|station| [*station, station + TAU]);
+        let within = |angle: &f64| (start + near..end - near).contains(angle);
+        let mut places: Vec<f64> = turned.filter(within).collect();
+        places.sort_by(f64::total_cmp);
+        places.dedup_by(|a, b| *a - *b < near);
+        let mut bounds = Vec::new();
+        match (arc.is_closed(), &places[..]) {
+            (_, []) | (true, [_]) => return vec![self.found.clone()],
+            (true, [first, ..]) => {
+                bounds.extend(places.iter().copied());
+                bounds.push(first + TAU);
+            }
+            (false, _) => {
+                bounds.push(start);
+                bounds.extend(places.iter().copied());
+                bounds.push(end);
+            }
+        }
+        let gains: Vec<([f64; 2], f64)> = (bounds.windows(2))
+            .map(|ends| [ends[0], ends[1]])
+            .map(|ends| (ends, self.gain(ends)))
+            .collect();
+        let most = gains.iter().map(|([from, to], gain)| gain / (to - from));
+        let least = OF_WHOLE * most.fold(0.0, f64::max);
+        let is_there = |([from, to], gain): &([f64; 2], f64)| *gain >= least * (to - from);
+        if arc.is_closed() && gains.iter().all(is_there) {
+            return vec![self.found.clone()];
+        }
+        let piece = |(angles, gain): ([f64; 2], f64)| {
+            let mut piece = self.found.clone();
+            piece.arc.angles = angles;
+            piece.gain = gain;
+            let middle = |sector: &[f64; 2]| 0.5 * (sector[0] + sector[1]);
+            piece.sectors.retain(|sector| {
+                let off = (middle(&sector.angles) - angles[0]).rem_euclid(TAU);
+                off <= angles[1] - angles[0]
+            });
+            piece
+        };
+        gains.into_iter().filter(is_there).map(piece).collect()
+    }
+
+    /// What the images say for a part of the circle.
+    fn gain(&self, [from, to]: [f64; 2]) -> f64 {
+        let arc = &self.found.arc;
+        let length = (to - from) * arc.radius / (PIECE_IN_PIXELS * self.found.pixel);
+        let count = length.ceil().max(1.0);
+        let width = (to - from) / count;
+        let piece = |k: usize| {
+            let low = from + k as f64 * width;
+            let angles = [low, low + width];
+            self.images.evidence_of_sector(arc, angles, None).gain
+        };
+        (0..count as usize).map(piece).sum()
+    }
+}
