@@ -2,9 +2,9 @@
 //!
 //! Edgels say within a sector where an arc ends, and nothing where it is hidden. But curves end
 //! where others do. So an end of an arc moves along its circle to a junction near it; an edge that
-//! goes on from there as a chord of the circle, within what edgels tell, is a part of the arc; a
-//! circle without any junction on it is closed; and an arc is cut where junctions lie on it, and
-//! loses the pieces that hardly any edgel shows.
+//! goes on from there as a chord of the circle, within what edgels tell, is a part of the arc; and
+//! of the pieces between junctions those are left out that hardly any edgel shows. A circle without
+//! a junction on it is closed if the rest of it is shown.
 
 use super::arc_joints::wrapped;
 use super::circle_fitting::FoundArc;
@@ -25,9 +25,9 @@ const OPEN_END: f64 = 3.0;
 const AT_JUNCTION: f64 = 5.0;
 /// Pixels of an arc that are asked at once, as in circles that are followed.
 const PIECE_IN_PIXELS: f64 = 12.0;
-/// A piece between junctions is there if its images say this much of what they say of the whole
-/// arc, by length. Of a circle with eight scallops (`knob`) pieces that are there say .9 of it at
-/// least, those across scallops .02 at most.
+/// A piece of a circle is there if images say this much for it, by length, of what they say for
+/// the piece that they show best. Of a circle with eight scallops (`knob`) those that are there say
+/// .5 of it and more, those across scallops .02 at most.
 const OF_WHOLE: f64 = 0.1;
 
 /// Ends the arcs at the junctions of edges, straight and curved ones. Edges that are parts of arcs
@@ -71,7 +71,7 @@ pub(super) fn end_at_junctions(
             found: &ended,
             stations,
         }
-        .cut()
+        .without_gaps()
     });
     *arcs = ended.flatten_iter().collect();
 }
@@ -145,7 +145,9 @@ impl Ends<'_> {
             return ended;
         }
         if self.stations.is_empty() {
-            if arc.sweep() > PI && self.gain([end, start + TAU]) > -2.0 * OPEN_END {
+            let rest = [end, start + TAU];
+            let rate = self.gain(arc.angles) / arc.sweep();
+            if arc.sweep() > PI && self.gain(rest) >= OF_WHOLE * rate * (rest[1] - rest[0]) {
                 ended.arc.angles = [start, start + TAU];
             }
             return ended;
@@ -187,41 +189,49 @@ impl Ends<'_> {
         best.map_or(0.0, |(_, by)| by)
     }
 
-    /// The pieces between junctions that images show. A circle stays whole if all are.
-    fn cut(&self) -> Vec<FoundArc> {
+    /// What is left of the arc without the pieces between junctions that images do not show.
+    fn without_gaps(&self) -> Vec<FoundArc> {
         let arc = &self.found.arc;
         let near = AT_JUNCTION * self.found.pixel / arc.radius;
-        let [start, end] = arc.angles;
-        let turned = self
-            .stations
-            .iter()
-            .flat_map(|station| [*station, station + TAU]);
-        let within = |angle: &f64| (start + near..end - near).contains(angle);
-        let mut places: Vec<f64> = turned.filter(within).collect();
-        places.sort_by(f64::total_cmp);
-        places.dedup_by(|a, b| *a - *b < near);
-        let mut bounds = Vec::new();
-        match (arc.is_closed(), &places[..]) {
-            (_, []) | (true, [_]) => return vec![self.found.clone()],
-            (true, [first, ..]) => {
-                bounds.extend(places.iter().copied());
-                bounds.push(first + TAU);
-            }
-            (false, _) => {
-                bounds.push(start);
-                bounds.extend(places.iter().copied());
-                bounds.push(end);
-            }
+        let [mut start, mut end] = arc.angles;
+        if let (true, Some(first)) = (arc.is_closed(), self.stations.first()) {
+            [start, end] = [*first, first + TAU];
         }
+        let turned = self.stations.iter().flat_map(|at| [*at, at + TAU]);
+        let mut bounds: Vec<f64> = turned
+            .filter(|angle| (start + near..end - near).contains(angle))
+            .collect();
+        bounds.sort_by(f64::total_cmp);
+        bounds.insert(0, start);
+        bounds.push(end);
         let gains: Vec<([f64; 2], f64)> = (bounds.windows(2))
             .map(|ends| [ends[0], ends[1]])
             .map(|ends| (ends, self.gain(ends)))
             .collect();
-        let most = gains.iter().map(|([from, to], gain)| gain / (to - from));
-        let least = OF_WHOLE * most.fold(0.0, f64::max);
+        let rates = gains.iter().map(|([from, to], gain)| gain / (to - from));
+        let least = OF_WHOLE * rates.fold(0.0, f64::max);
         let is_there = |([from, to], gain): &([f64; 2], f64)| *gain >= least * (to - from);
-        if arc.is_closed() && gains.iter().all(is_there) {
+        if gains.iter().all(is_there) {
             return vec![self.found.clone()];
+        }
+        let mut left: Vec<([f64; 2], f64)> = Vec::new();
+        for (angles, gain) in gains.into_iter().filter(is_there) {
+            match left.last_mut() {
+                Some((last, sum)) if last[1] == angles[0] => {
+                    last[1] = angles[1];
+                    *sum += gain;
+                }
+                _ => left.push((angles, gain)),
+            }
+        }
+        // Around a circle the last piece goes on in the first.
+        if let [(first, _), .., (last, _)] = &left[..]
+            && arc.is_closed()
+            && (last[1] - TAU - first[0]).abs() < 1e-9
+        {
+            let (last, gain) = left.pop().unwrap_or_default();
+            left[0].0[0] = last[0] - TAU;
+            left[0].1 += gain;
         }
         let piece = |(angles, gain): ([f64; 2], f64)| {
             let mut piece = self.found.clone();
@@ -234,7 +244,7 @@ impl Ends<'_> {
             });
             piece
         };
-        gains.into_iter().filter(is_there).map(piece).collect()
+        left.into_iter().map(piece).collect()
     }
 
     /// What the images say for a part of the circle.

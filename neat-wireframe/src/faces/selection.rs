@@ -4,7 +4,7 @@
 //! The energy is a sum over faces and curves, in nats. A face costs what images say against it
 //! ([`super::visibility`]). A curve that lacks a face costs [`MISSING_FACE`], twice if it has none;
 //! a curve between two faces of one plane is no crease and costs [`FLAT`]. An inferred line that has
-//! no face is none, and costs nothing. Round faces cost [`ROUND`]. No curve has three faces, no two faces
+//! no face is none, and costs nothing. A cone costs [`CONE`], an acute angle up to [`ACUTE`]. No curve has three faces, no two faces
 //! lie on each other, and no cylinder or cone passes through another face. The minimum is found by branch and bound.
 
 use super::curves::Curves;
@@ -21,10 +21,13 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) const MISSING_FACE: f64 = 3.0;
 /// More than a face can win by one curve: a circle on a face is a hole before it is a lid.
 const FLAT: f64 = 2.0 * MISSING_FACE;
-/// What a cylinder and a cone cost: rims alone do not tell a pin with chamfers from a tube with
-/// sharp rims, or a step from a cone, and of what would explain them as well the flatter is likelier.
-/// Less than a rim without a face.
-const ROUND: [f64; 2] = [0.5, 1.0];
+/// Coaxial rims of different radii stand on two sides of a step more often than they bound a cone.
+/// Less than a rim without a face: it decides where both would do.
+const CONE: f64 = 1.0;
+/// Two faces under an acute angle cost so much times its cosine: rims alone do not tell a pin with
+/// chamfers from a tube with sharp ends or from two frustums, and most things are blunt. Less than
+/// a rim without a face.
+const ACUTE: f64 = 1.0;
 /// Faces against which images speak more than this are out whatever they would close.
 pub(super) const MOST_AGAINST: f64 = 3.0;
 /// Cosine of the angle of two faces that go on as one plane, or lie on each other: 3°.
@@ -34,11 +37,23 @@ pub(super) const SAME_PLANE: f64 = 0.9986;
 const MOST_STATES: usize = 20_000;
 
 /// How two faces lie to each other: at one curve, or one through the other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Pair {
-    Crease,
+    /// With the cosine of the angle between them.
+    Crease(f64),
     Flat,
     Excluding,
+}
+
+impl Pair {
+    /// `None` if there cannot be both.
+    fn cost(&self) -> Option<f64> {
+        match self {
+            Self::Crease(cosine) => Some(ACUTE * cosine.max(0.0)),
+            Self::Flat => Some(FLAT),
+            Self::Excluding => None,
+        }
+    }
 }
 
 /// The places of the chosen faces, ascending; `against` is what images say against each.
@@ -64,11 +79,11 @@ pub(super) fn select(
         for (k, (one, step)) in at.iter().enumerate() {
             for (other, other_step) in &at[k + 1..] {
                 let pair = pair(curves, [&faces[*one], &faces[*other]], [step, other_step]);
-                if pair != Pair::Crease {
+                if pair.cost() != Some(0.0) {
                     beside[*one].push((*other, pair));
                     beside[*other].push((*one, pair));
                 }
-                if at.len() > 2 || pair != Pair::Crease || is_inferred {
+                if at.len() > 2 || !matches!(pair, Pair::Crease(_)) || is_inferred {
                     contended.push(vec![*one, *other]);
                 }
             }
@@ -108,11 +123,6 @@ fn inward(curves: &Curves, face: &Face, step: &Step) -> Option<Vector3<f64>> {
 }
 
 fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
-    // A plane that touches a cylinder or a cone goes on as another surface: the end of a slot.
-    let is_plane = |face: &Face| matches!(face.surface, Surface::Plane { .. });
-    if is_plane(faces[0]) != is_plane(faces[1]) {
-        return Pair::Crease;
-    }
     let [one, other] = [0, 1].map(|k| {
         // Both from the same end of the curve: a face to the left of its loop is to the
         // right of the same loop backwards.
@@ -127,17 +137,24 @@ fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
         };
         inward(curves, &forward, &step)
     });
-    match one.zip(other).map(|(one, other)| one.dot(&other)) {
-        Some(cosine) if cosine > SAME_PLANE => Pair::Excluding,
-        Some(cosine) if cosine < -SAME_PLANE => Pair::Flat,
-        _ => Pair::Crease,
+    let cosine = one.zip(other).map_or(0.0, |(one, other)| one.dot(&other));
+    // A plane that touches a cylinder or a cone goes on as another surface: the end of a slot.
+    let is_plane = |face: &Face| matches!(face.surface, Surface::Plane { .. });
+    if is_plane(faces[0]) != is_plane(faces[1]) {
+        Pair::Crease(cosine)
+    } else if cosine > SAME_PLANE {
+        Pair::Excluding
+    } else if cosine < -SAME_PLANE {
+        Pair::Flat
+    } else {
+        Pair::Crease(cosine)
     }
 }
 
 /// Branch and bound over the faces of one group.
 struct Search<'a> {
     faces: &'a [Face],
-    /// For each face those that go on as its plane or lie on it.
+    /// For each face those that it does not simply meet.
     beside: &'a [Vec<(usize, Pair)>],
     /// In the order in which they are decided on, each with what it wins at most.
     order: Vec<(f64, usize)>,
@@ -155,12 +172,9 @@ impl<'a> Search<'a> {
         group: Vec<usize>,
     ) -> Self {
         let gain = |face: usize| {
-            let round = match faces[face].surface {
-                Surface::Plane { .. } => 0.0,
-                Surface::Cylinder { .. } => ROUND[0],
-                Surface::Cone { .. } => ROUND[1],
-            };
-            MISSING_FACE * faces[face].steps().count() as f64 - against[face] - round
+            let is_cone = matches!(faces[face].surface, Surface::Cone { .. });
+            let cost = against[face] + if is_cone { CONE } else { 0.0 };
+            MISSING_FACE * faces[face].steps().count() as f64 - cost
         };
         let gains = group.into_iter().map(|face| (gain(face), face));
         let mut order: Vec<(f64, usize)> = gains.filter(|(gain, _)| *gain > 0.0).collect();
@@ -218,15 +232,13 @@ impl<'a> Search<'a> {
         let beside = self.beside[face]
             .iter()
             .filter(|(other, _)| self.taken.contains(other));
-        let flat: Option<f64> = beside
-            .map(|(_, pair)| (*pair != Pair::Excluding).then_some(FLAT))
-            .sum();
+        let cost: Option<f64> = beside.map(|(_, pair)| pair.cost()).sum();
         // A line is inferred for the first face, which wins nothing by it and lacks the other.
         let is_first = |step: &&Step| {
             matches!(step.curve, CurveIndex::Smooth(_))
                 && self.count.get(&step.curve).is_none_or(|count| *count == 0)
         };
         let inferred = self.faces[face].steps().filter(is_first).count();
-        flat.map(|flat| flat + 2.0 * MISSING_FACE * inferred as f64)
+        cost.map(|cost| cost + 2.0 * MISSING_FACE * inferred as f64)
     }
 }
