@@ -166,8 +166,9 @@ impl Wireframe {
     }
 
     /// Faces between edges and arcs, closed shells first, as the lists and dicts of wireframe.json:
-    /// `closed`, whether it bounds a solid, and `faces`. A face has a `plane` (`normal`, `offset`) or a
-    /// `cylinder` (`point`, `axis`, `radius`, `convex`), and `loops` of steps: an `edge` or `arc` by
+    /// `closed`, whether it bounds a solid, and `faces`. A face has a `plane` (`normal`, `offset`), a
+    /// `cylinder` (`point`, `axis`, `radius`, `convex`) or a `cone` (`apex`, `axis`, `half_angle`,
+    /// `convex`), and `loops` of steps: an `edge` or `arc` by
     /// its index, or a `smooth` line by its two junctions, and whether it is `reversed`.
     #[getter]
     fn shells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

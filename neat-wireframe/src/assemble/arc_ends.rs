@@ -261,3 +261,107 @@ impl Ends<'_> {
         (0..count as usize).map(piece).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::circle_fitting::tests::{arc, found, views_of_arcs};
+    use crate::assemble::test_views::TestViews;
+    use crate::assemble::view_segments::PreparedView;
+    use crate::test_scenes::{cameras_on_sphere, views_of_edges};
+
+    /// The angles of what is left of an arc, and how many edges, where an edge leaves the circle
+    /// at some angles, and others are chords of it.
+    fn ended(
+        views: &TestViews,
+        angles: [f64; 2],
+        leaving: &[f64],
+        chords: &[[f64; 2]],
+    ) -> (Vec<[f64; 2]>, usize) {
+        let mut arcs = vec![found(arc(1.0))];
+        arcs[0].arc.angles = angles;
+        let circle = arcs[0].arc;
+        let mut wireframe = Wireframe3d::default();
+        let ends = leaving.iter().map(|angle| {
+            let on_circle = circle.point_at(*angle);
+            [on_circle, on_circle + 0.2 * circle.toward(*angle)]
+        });
+        let of_chords = chords
+            .iter()
+            .map(|ends| ends.map(|end| circle.point_at(end)));
+        for ends in ends.chain(of_chords) {
+            let first = wireframe.junctions.len();
+            wireframe.junctions.extend(ends);
+            wireframe.edges.push([first, first + 1]);
+        }
+        let mut sources = vec![None; wireframe.edges.len()];
+        let (images, mut curved) = (views.images(), Vec::new());
+        end_at_junctions(
+            &images,
+            &mut wireframe,
+            &mut sources,
+            &mut curved,
+            &mut arcs,
+        );
+        assert_eq!(sources.len(), wireframe.edges.len());
+        let left = arcs.iter().map(|found| found.arc.angles).collect();
+        (left, wireframe.edges.len())
+    }
+
+    fn assert_near(found: &[[f64; 2]], expected: &[[f64; 2]]) {
+        let near = |(a, b): (&[f64; 2], &[f64; 2])| (0..2).all(|k| (a[k] - b[k]).abs() < 1e-6);
+        let same = found.len() == expected.len() && found.iter().zip(expected).all(near);
+        assert!(same, "{found:?}, not {expected:?}");
+    }
+
+    #[test]
+    fn ends_come_to_junctions_and_take_in_chords() {
+        let views = views_of_arcs(20, |_| arc(1.5));
+        let (angles, edges) = ended(&views, [0.04, 1.46], &[0.0, 1.5], &[]);
+        assert_near(&angles, &[[0.0, 1.5]]);
+        assert_eq!(edges, 2);
+        // A junction far away is none of its ends.
+        let (angles, _) = ended(&views, [0.0, 1.5], &[0.0, 2.0], &[]);
+        assert_near(&angles, &[[0.0, 1.5]]);
+        // A chord goes on from its end, another lies along it.
+        let (angles, edges) = ended(&views, [0.0, 1.35], &[0.0, 1.5], &[[1.5, 1.36], [0.4, 0.5]]);
+        assert_near(&angles, &[[0.0, 1.5]]);
+        assert_eq!(edges, 2);
+    }
+
+    #[test]
+    fn pieces_that_nothing_shows_are_left_out() {
+        let (mut points, mut edges) = (Vec::new(), Vec::new());
+        for [from, to] in [[0.0, 1.0], [2.0, 3.0]] {
+            let mut part = arc(1.0);
+            part.angles = [from, to];
+            let first = points.len();
+            points.extend(part.points(0.05));
+            edges.extend((first + 1..points.len()).map(|k| [k - 1, k]));
+        }
+        let seen = views_of_edges(&cameras_on_sphere(20), &points, &edges);
+        let views = (seen.iter()).map(|view| PreparedView::new(view, 1.0, 0.0));
+        let views = TestViews::of(views.collect());
+        let (angles, _) = ended(&views, [0.0, 3.0], &[1.0, 2.0], &[]);
+        assert_near(&angles, &[[0.0, 1.0], [2.0, 3.0]]);
+        // Of a whole circle what is left may run over its start.
+        let (angles, _) = ended(&views, [0.5, 0.5 + TAU], &[0.0, 1.0, 2.0, 3.0], &[]);
+        let mut angles: Vec<[f64; 2]> = (angles.into_iter())
+            .map(|ends| ends.map(|end| end.rem_euclid(TAU)))
+            .collect();
+        angles.sort_by(|a, b| a[1].total_cmp(&b[1]));
+        assert!(
+            angles.len() == 2 && (angles[0][1] - 1.0).abs() < 1e-6,
+            "{angles:?}"
+        );
+        assert!((angles[1][0] - 2.0).abs() < 1e-6 && (angles[1][1] - 3.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn circles_close_where_the_rest_is_shown() {
+        let whole = views_of_arcs(20, |_| arc(TAU));
+        assert_near(&ended(&whole, [0.0, 5.0], &[], &[]).0, &[[0.0, TAU]]);
+        let open = views_of_arcs(20, |_| arc(5.0));
+        assert_near(&ended(&open, [0.0, 5.0], &[], &[]).0, &[[0.0, 5.0]]);
+    }
+}

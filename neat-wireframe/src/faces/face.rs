@@ -46,8 +46,8 @@ pub enum CurveIndex {
     Edge(usize),
     /// An arc, which may be a whole circle.
     Arc(usize),
-    /// No edge, but a straight line between two junctions, the lower first, where two faces meet
-    /// without a crease: inferred, as no image shows it.
+    /// No edge, but a straight line between two junctions, the lower first, where two faces meet,
+    /// without a crease or with one that no image shows from end to end: inferred.
     Smooth([usize; 2]),
 }
 
