@@ -23,7 +23,8 @@ use std::f64::consts::{PI, TAU};
 const OPEN_END: f64 = 3.0;
 /// An end within so many pixels of a junction is there, as for 2D segments.
 const AT_JUNCTION: f64 = 5.0;
-/// Pixels of an arc that are asked at once, as in circles that are followed.
+/// Pixels of an arc that are asked at once, as in circles that are followed. Arcs of smaller radius
+/// stay as they are: any short edge beside them would be a chord.
 const PIECE_IN_PIXELS: f64 = 12.0;
 /// A piece of a circle is there if images say this much for it, by length, of what they say for
 /// the piece that they show best. Of a circle with eight scallops (`knob`) those that are there say
@@ -47,7 +48,8 @@ pub(super) fn end_at_junctions(
     let straight = edges.iter().map(|ends| points_of(*ends, None));
     let bowed = (curved.iter()).map(|edge| points_of(edge.ends, Some(edge.middle)));
     let mut parts: Vec<Option<[Vector3<f64>; 3]>> = straight.chain(bowed).map(Some).collect();
-    for found in arcs.iter_mut() {
+    let is_small = |found: &FoundArc| found.arc.radius < PIECE_IN_PIXELS * found.pixel;
+    for found in arcs.iter_mut().filter(|found| !is_small(found)) {
         absorb(images, &mut parts, found);
     }
     let mut left = parts.iter().map(Option::is_some);
@@ -58,6 +60,9 @@ pub(super) fn end_at_junctions(
     let used: BTreeSet<usize> = edges.iter().flatten().copied().chain(of_curves).collect();
     let junctions: Vec<Vector3<f64>> = used.iter().map(|j| junctions[*j]).collect();
     let ended = arcs.par_iter().map(|found| {
+        if is_small(found) {
+            return vec![found.clone()];
+        }
         let stations = stations(images, found, &junctions);
         let ended = Ends {
             images,

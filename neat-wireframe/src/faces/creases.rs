@@ -11,7 +11,7 @@
 use super::curves::{Curve, Curves};
 use super::face::CurveIndex;
 use super::planes::CoplanarCurves;
-use super::tangency::inferred_line;
+use super::rulings::inferred_line;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -3,7 +3,7 @@
 //!
 //! Curves that lie in one plane within their covariances divide it into cells, and two coaxial
 //! circles are the rims of a cylinder or a cone: each is a face that may be there (`candidates.rs`). Where a
-//! cylinder goes on without a crease, the line between them is inferred (`tangency.rs`), and where
+//! cylinder goes on without a crease, the line between them is inferred (`rulings.rs`), and where
 //! two planes meet at corners that lack an edge, that edge (`creases.rs`). Images
 //! speak against a face through which they show what lies behind it (`visibility.rs`); among the
 //! others those are chosen that give the most edges two faces (`selection.rs`). What hangs
@@ -51,12 +51,12 @@ mod planes;
 mod point_evidence;
 mod polygon;
 mod region;
+mod rulings;
 mod selection;
 mod sheets;
 mod shells;
 mod surface;
 mod surface_points;
-mod tangency;
 mod triangulation;
 mod visibility;
 
@@ -96,7 +96,7 @@ pub fn find_shells(
     points: &[SurfacePoint],
 ) -> Vec<Shell> {
     let observed = Curves::new(graph);
-    let smooth = tangency::smooth_lines(&observed);
+    let smooth = rulings::missing_rulings(&observed);
     let (curves, faces) = candidates::candidates(observed.with_inferred(smooth));
     let _span = tracing::debug_span!("find_shells", faces = faces.len()).entered();
     let sightings = Sightings::new(&curves, views);

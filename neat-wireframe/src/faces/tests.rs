@@ -3,7 +3,7 @@ use nalgebra::{Rotation3, Vector2, Vector3};
 use neat_core::{CircularArc, Wireframe3d};
 use std::f64::consts::{PI, TAU};
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Model {
     wireframe: Wireframe3d,
     arcs: Vec<CircularArc>,
@@ -502,9 +502,20 @@ fn fillets_and_slots_close_by_inferred_lines() {
 #[test]
 fn nothing_is_inferred_where_an_arc_ends_at_a_corner_or_alone() {
     // The arc meets the sides at 27°: there must be an edge, and it is missing.
-    let cornered = filleted(0.4).turned().shells();
+    let mut corner = filleted(0.4);
+    let cornered = corner.clone().turned().shells();
     assert!(!cornered.is_empty() && cornered.iter().all(|shell| !shell.closed));
     assert_eq!(inferred(&cornered), 0);
+    // With pieces of both edges there is a solid.
+    for [x, y] in [[1.0, 0.7], [0.7, 1.0]] {
+        let count = corner.wireframe.junctions.len();
+        let places = [0.0, 0.3].map(|z| Vector3::new(x, y, z));
+        let from = (0..count).find(|j| corner.wireframe.junctions[*j] == places[0]);
+        corner.wireframe.junctions.push(places[1]);
+        corner.wireframe.edges.push([from.unwrap(), count]);
+    }
+    let shells = corner.turned().shells();
+    assert!(shells.len() == 1 && shells[0].closed && inferred(&shells) == 4);
     // Two arcs that go on straight, and nothing that the lines between them bound.
     let mut bare = filleted(0.7);
     let at_arc = |edge: &[usize; 2]| edge.iter().any(|end| [2, 3, 7, 8].contains(end));

@@ -1,9 +1,10 @@
-//! Lines where a cylinder or a cone goes on without a crease: no image shows them, but faces end
-//! there.
+//! Lines along cylinders and cones between ends of their rims, where no curve is.
 //!
-//! Two arcs are its rims, and from an end of each a curve goes on in the same direction: between
-//! these two ends it touches the next surface. Such a line is inferred. It costs
-//! nothing by itself, but wants a face on both sides like any other (`selection.rs`).
+//! Two arcs are rims of one surface, and an end of each lies at the same angle around its axis.
+//! Between these two ends a line is inferred if from both of them a curve goes on in the direction
+//! of the arc, as then the surface touches the next one there without a crease, which no image
+//! shows; or if a piece of it is an edge that leads from one of them to nowhere. It costs nothing
+//! by itself, but wants a face on both sides like any other (`selection.rs`).
 
 use super::candidates::common_surface;
 use super::curves::{Curve, Curves};
@@ -18,7 +19,7 @@ const MAX_TURN: f64 = 0.174;
 const REACH: f64 = 4.0;
 
 /// The inferred lines between ends of arcs that no curve joins yet, in the order of their ends.
-pub(super) fn smooth_lines(curves: &Curves) -> Vec<Curve> {
+pub(super) fn missing_rulings(curves: &Curves) -> Vec<Curve> {
     let joined: BTreeSet<[usize; 2]> = (curves.all.iter())
         .filter_map(|curve| curve.ends.map(sorted))
         .collect();
@@ -34,7 +35,9 @@ pub(super) fn smooth_lines(curves: &Curves) -> Vec<Curve> {
             };
             for ends in pairs_of_ends(curves, [one, other], &surface) {
                 let goes_on = leaving.goes_on(one, ends[0].0) && leaving.goes_on(other, ends[1].0);
-                if goes_on && !joined.contains(&sorted(ends.map(|(junction, _)| junction))) {
+                let is_sought =
+                    goes_on || leaving.begins(ends) || leaving.begins([ends[1], ends[0]]);
+                if is_sought && !joined.contains(&sorted(ends.map(|(junction, _)| junction))) {
                     let line = inferred_line(curves, ends);
                     lines.insert(line.index, line);
                 }
@@ -89,11 +92,19 @@ pub(super) fn inferred_line(curves: &Curves, mut ends: [End; 2]) -> Curve {
 }
 
 /// The directions in which curves leave each junction.
-struct Leaving(BTreeMap<usize, Vec<(CurveIndex, Vector3<f64>)>>);
+struct Leaving(BTreeMap<usize, Vec<Departure>>);
+
+/// How a curve leaves a junction.
+struct Departure {
+    curve: CurveIndex,
+    direction: Vector3<f64>,
+    /// The other junction at which it ends.
+    to: usize,
+}
 
 impl Leaving {
     fn new(curves: &Curves) -> Self {
-        let mut leaving: BTreeMap<usize, Vec<(CurveIndex, Vector3<f64>)>> = BTreeMap::new();
+        let mut leaving: BTreeMap<usize, Vec<Departure>> = BTreeMap::new();
         for curve in &curves.all {
             let Some([start, end]) = curve.ends else {
                 continue;
@@ -110,10 +121,11 @@ impl Leaving {
                 }
             };
             for (junction, direction) in [start, end].into_iter().zip(directions) {
-                leaving
-                    .entry(junction)
-                    .or_default()
-                    .push((curve.index, direction));
+                leaving.entry(junction).or_default().push(Departure {
+                    curve: curve.index,
+                    direction,
+                    to: start + end - junction,
+                });
             }
         }
         Self(leaving)
@@ -122,11 +134,25 @@ impl Leaving {
     /// Whether at this end of a curve another one goes on in its direction.
     fn goes_on(&self, curve: &Curve, junction: usize) -> bool {
         let here = self.0.get(&junction).map_or(&[][..], Vec::as_slice);
-        let own = here.iter().find(|(index, _)| *index == curve.index);
-        own.is_some_and(|(_, own)| {
-            here.iter().any(|(index, other)| {
-                *index != curve.index && own.dot(other) < 0.0 && own.cross(other).norm() <= MAX_TURN
+        let own = here.iter().find(|other| other.curve == curve.index);
+        own.is_some_and(|own| {
+            here.iter().any(|other| {
+                other.curve != curve.index
+                    && own.direction.dot(&other.direction) < 0.0
+                    && own.direction.cross(&other.direction).norm() <= MAX_TURN
             })
+        })
+    }
+
+    /// Whether an edge leads from the first end toward the second one, and to nowhere.
+    fn begins(&self, [(from, start), (_, end)]: [End; 2]) -> bool {
+        let toward = (end - start).normalize();
+        let here = self.0.get(&from).map_or(&[][..], Vec::as_slice);
+        here.iter().any(|edge| {
+            matches!(edge.curve, CurveIndex::Edge(_))
+                && self.0.get(&edge.to).is_some_and(|there| there.len() == 1)
+                && edge.direction.dot(&toward) > 0.0
+                && edge.direction.cross(&toward).norm() <= MAX_TURN
         })
     }
 }
