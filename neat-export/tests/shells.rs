@@ -155,16 +155,25 @@ proptest! {
         normal in prop::sample::select(vec![Vector3::x(), -Vector3::y(), Vector3::z()]),
         offset in -2.0..2.0,
         convex: bool,
+        half_angle in prop::option::of(0.01..1.5),
     ) {
         let mut document = document();
         for face in document.shells.iter_mut().flat_map(|shell| &mut shell.faces) {
             face.surface = match face.surface {
                 Surface::Plane { .. } => Surface::Plane { normal, offset },
-                Surface::Cylinder { radius, .. } => Surface::Cylinder {
-                    point: document.arcs[0].center,
-                    axis: normal,
-                    radius,
-                    convex,
+                _ => match half_angle {
+                    Some(half_angle) => Surface::Cone {
+                        apex: document.arcs[0].center + offset * normal,
+                        axis: normal,
+                        half_angle,
+                        convex,
+                    },
+                    None => Surface::Cylinder {
+                        point: document.arcs[0].center,
+                        axis: normal,
+                        radius: 0.2,
+                        convex,
+                    },
                 },
             };
         }
@@ -173,6 +182,50 @@ proptest! {
             prop_assert!(!text.contains("NaN") && !text.contains("inf"), "{format:?}");
         }
     }
+}
+
+#[test]
+fn a_countersunk_hole_is_a_cone_in_step() {
+    let circle = |radius: f64, z: f64| CircularArc {
+        center: Vector3::new(0.4, 0.5, z),
+        axes: [Vector3::x(), Vector3::y()],
+        radius,
+        angles: [0.3, 0.3 + std::f64::consts::TAU],
+    };
+    let corner = |k: usize| [k & 1, k >> 1 & 1, k >> 2].map(|x| x as f64);
+    let edges = (0..8).flat_map(|k| [1, 2, 4].map(|bit| [k, k | bit]));
+    let mut document = WireframeDocument {
+        junctions: (0..8).map(|k| Vector3::from(corner(k))).collect(),
+        edges: edges.filter(|[a, b]| a != b).collect(),
+        arcs: vec![circle(0.1, 0.0), circle(0.1, 0.7), circle(0.3, 1.0)],
+        ..WireframeDocument::default()
+    };
+    let wireframe = document.wireframe();
+    let graph = MeasuredGraph {
+        wireframe: &wireframe,
+        arcs: &document.arcs,
+        covariances: &[],
+    };
+    document.shells = find_shells(&graph, &[], &[]);
+    let step = exported(&document, Format::Step, EdgeFilter::default());
+    assert_eq!(count(&step, "MANIFOLD_SOLID_BREP"), 1);
+    assert_eq!(count(&step, "CONICAL_SURFACE"), 1);
+    assert_eq!(count(&step, "CYLINDRICAL_SURFACE"), 1);
+    // Its radius where it begins, and its angle.
+    let cone = step.lines().find(|line| line.contains("CONICAL")).unwrap();
+    let numbers: Vec<f64> = (cone.trim_end_matches([')', ';']).split(','))
+        .filter_map(|word| word.parse().ok())
+        .collect();
+    assert!(
+        numbers.len() == 2 && (numbers[1] - (0.2_f64 / 0.3).atan()).abs() < 1e-9,
+        "{cone}"
+    );
+    let is_rim = |radius: f64| (numbers[0] - radius).abs() < 1e-9;
+    assert!(is_rim(0.1) || is_rim(0.3), "{cone}");
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("w.json");
+    write_json(&path, &document).unwrap();
+    assert_eq!(read_json(&path).unwrap(), document);
 }
 
 /// A block with a rounded corner, whose cylinder goes on as planes.

@@ -169,7 +169,7 @@ impl<'a> ShellWriter<'a> {
                 let along = axis.dot(&(points[0] - apex));
                 let x = x_axis(axis, &(points[0] - apex));
                 let placement = self.step.placement(&(apex + axis * along), axis, &x);
-                let [radius, angle] = [along * half_angle.tan(), *half_angle].map(real);
+                let [radius, angle] = [along.abs() * half_angle.tan(), *half_angle].map(real);
                 let surface = self
                     .step
                     .add(&format!("CONICAL_SURFACE('',{placement},{radius},{angle})"));
