@@ -99,7 +99,10 @@ def faces(shape, place):
     """Faces as `gt_wireframe.json` holds them, without the edges around them."""
     found = TopTools_IndexedMapOfShape()
     TopExp.MapShapes_s(shape, TopAbs_FACE, found)
-    return [face_of(TopoDS.Face_s(found.FindKey(index)), place) for index in range(1, found.Extent() + 1)]
+    return [
+        face_of(TopoDS.Face_s(found.FindKey(index)), place)
+        for index in range(1, found.Extent() + 1)
+    ]
 
 
 def face_of(face, place):
