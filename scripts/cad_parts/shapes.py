@@ -49,13 +49,7 @@ def shaft():
         with BuildSketch(Plane.XZ):
             with BuildLine():
                 Polyline(
-                    (0, 0),
-                    (12, 0),
-                    (12, 30),
-                    (18, 30),
-                    (18, 40),
-                    (10, 40),
-                    (10, 80),
+                    (0, 0), (12, 0), (12, 30), (18, 30), (18, 40), (10, 40), (10, 80),
                     (0, 80),
                     close=True,
                 )
@@ -72,18 +66,8 @@ def channel():
         with BuildSketch(Plane.XZ):
             with BuildLine():
                 Polyline(
-                    (0, 0),
-                    (40, 0),
-                    (40, 30),
-                    (33, 30),
-                    (33, 26),
-                    (36, 26),
-                    (36, 4),
-                    (4, 4),
-                    (4, 26),
-                    (7, 26),
-                    (7, 30),
-                    (0, 30),
+                    (0, 0), (40, 0), (40, 30), (33, 30), (33, 26), (36, 26), (36, 4),
+                    (4, 4), (4, 26), (7, 26), (7, 30), (0, 30),
                     close=True,
                 )
             make_face()
@@ -131,15 +115,8 @@ def house():
         with BuildSketch(Plane.XZ):
             with BuildLine():
                 Polyline(
-                    (0, 0),
-                    (60, 0),
-                    (60, 30),
-                    (64, 27),
-                    (64, 29.5),
-                    (30, 55),
-                    (-4, 29.5),
-                    (-4, 27),
-                    (0, 30),
+                    (0, 0), (60, 0), (60, 30), (64, 27), (64, 29.5), (30, 55), (-4, 29.5),
+                    (-4, 27), (0, 30),
                     close=True,
                 )
             make_face()
@@ -158,7 +135,7 @@ def house():
 def heatsink():
     with BuildPart() as p:
         Box(60, 50, 6, align=(Align.CENTER, Align.CENTER, Align.MIN))
-        with Locations([(-27 + 6.75 * i, 0, 6) for i in range(9)]):
+        with Locations([(-27+6.75 * i, 0, 6) for i in range(9)]):
             Box(2, 50, 22, align=(Align.CENTER, Align.CENTER, Align.MIN))
     return p
 
@@ -168,7 +145,7 @@ def gear():
     pts = []
     for i in range(n):
         a, w = 2 * math.pi * i / n, 2 * math.pi / n
-        for f, r in ((-0.28, 30), (-0.14, 37), (0.14, 37), (0.28, 30)):
+        for f, r in ((-.28, 30), (-.14, 37), (.14, 37), (.28, 30)):
             pts.append((r * math.cos(a + f * w), r * math.sin(a + f * w)))
     with BuildPart() as p:
         with BuildSketch():
@@ -205,14 +182,7 @@ def dovetail():
         with BuildSketch(Plane.XZ):
             with BuildLine():
                 Polyline(
-                    (0, 0),
-                    (50, 0),
-                    (50, 20),
-                    (37, 20),
-                    (42, 9),
-                    (8, 9),
-                    (13, 20),
-                    (0, 20),
+                    (0, 0), (50, 0), (50, 20), (37, 20), (42, 9), (8, 9), (13, 20), (0, 20),
                     close=True,
                 )
             make_face()
@@ -250,23 +220,13 @@ def beam():
         with BuildSketch(Plane.XZ):
             with BuildLine():
                 Polyline(
-                    (0, 0),
-                    (30, 0),
-                    (30, 4),
-                    (17, 4),
-                    (17, 36),
-                    (30, 36),
-                    (30, 40),
-                    (0, 40),
-                    (0, 36),
-                    (13, 36),
-                    (13, 4),
-                    (0, 4),
+                    (0, 0), (30, 0), (30, 4), (17, 4), (17, 36), (30, 36), (30, 40),
+                    (0, 40), (0, 36), (13, 36), (13, 4), (0, 4),
                     close=True,
                 )
             make_face()
         extrude(amount=90)
-        split(bisect_by=Plane(origin=(15, -10, 20), z_dir=(0.5, -1, 0.35)), keep=Keep.TOP)
+        split(bisect_by=Plane(origin=(15, -10, 20), z_dir=(.5, -1, .35)), keep=Keep.TOP)
     return p
 
 
@@ -392,13 +352,7 @@ def pulley():
         with BuildSketch(Plane.XZ):
             with BuildLine():
                 Polyline(
-                    (5, 0),
-                    (30, 0),
-                    (30, 4),
-                    (22, 8),
-                    (22, 10),
-                    (30, 14),
-                    (30, 18),
+                    (5, 0), (30, 0), (30, 4), (22, 8), (22, 10), (30, 14), (30, 18),
                     (5, 18),
                     close=True,
                 )
@@ -414,13 +368,7 @@ def arrow():
         with BuildSketch():
             with BuildLine():
                 Polyline(
-                    (0, 8),
-                    (40, 8),
-                    (40, 18),
-                    (64, 0),
-                    (40, -18),
-                    (40, -8),
-                    (0, -8),
+                    (0, 8), (40, 8), (40, 18), (64, 0), (40, -18), (40, -8), (0, -8),
                     close=True,
                 )
             make_face()
