@@ -132,7 +132,7 @@ fn scene_sphere(scene: &Scene) -> Finding {
         if 2 * inside.len() > scene.views.len() {
             let all = counted(scene.views.len(), "camera");
             let message = format!(
-                "{} of {all} stand inside {ball}, as in a room",
+                "{} of {all} stand inside {ball}, as in a room; around an object, {remedy}",
                 inside.len()
             );
             return Finding::new(Check::SceneSphere, Level::Note, message).of_views(inside);

@@ -50,6 +50,31 @@ fn all_solids_pass_at_both_depths() {
     }
 }
 
+/// Most cameras within the scene sphere are a room, a few are a mistake.
+#[test]
+fn cameras_within_the_scene_sphere_are_in_a_room_or_wrong() {
+    let of_sphere = |scene: &Scene| {
+        let examination = examine(scene, &ExamineOptions::default());
+        let findings = examination.findings.into_iter();
+        let mut of_sphere = findings.filter(|finding| finding.check == Check::SceneSphere);
+        let finding = of_sphere.next().unwrap();
+        (finding.level, finding.views.len())
+    };
+    let mut scene = synthetic(Solid::ALL[0], 40);
+    assert_eq!(of_sphere(&scene), (Level::Good, 0));
+    let radius = scene.sphere_radius;
+    let distances = scene
+        .views
+        .iter()
+        .map(|view| view.camera.center_in_world.norm());
+    scene.sphere_radius = 1.2 * distances.fold(0.0, f64::max);
+    assert_eq!(of_sphere(&scene), (Level::Note, 40));
+    scene.sphere_radius = radius;
+    let center = &mut scene.views[7].camera.center_in_world;
+    *center *= 0.5 * radius / center.norm();
+    assert_eq!(of_sphere(&scene), (Level::Warning, 1));
+}
+
 /// A dome without any corner; its silhouettes tell.
 #[test]
 fn a_smooth_thing_in_another_order_is_not_passed() {
