@@ -5,7 +5,8 @@
 //! piece of it, two corners are left at which a curve of either plane ends and none goes on. Between
 //! two such corners, one after the other on the line in which the planes meet, an edge is inferred.
 //! An edge that leads to such a corner and stops short of it is gone on with; one that runs past it
-//! ends there. Like any inferred line it costs nothing by itself, but wants two faces
+//! ends there. Two edges on one line that end facing each other are pieces of one, whatever lies
+//! between. Like any inferred line it costs nothing by itself, but wants two faces
 //! (`selection.rs`).
 
 use super::curves::{Curve, Curves};
@@ -13,12 +14,49 @@ use super::face::CurveIndex;
 use super::planes::CoplanarCurves;
 use super::rulings::inferred_line;
 use nalgebra::Vector3;
+use neat_core::LineSegment3;
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Planes that meet at a smaller sine do not say where.
 const MIN_SINE: f64 = 0.03;
-/// Corners that are nearer to each other, in standard deviations of an arc, are one.
+/// Corners that are nearer to each other, in standard deviations of an arc, are one; what lies beside
+/// a line within so many of a junction lies on it.
 const REACH: f64 = 4.0;
+
+/// The lines between the ends of edges that lie on one line and face each other.
+pub(super) fn facing_ends(curves: &Curves) -> Vec<Curve> {
+    let corners = Corners::new(curves);
+    let pieces: Vec<[usize; 2]> = (curves.observed())
+        .filter_map(|curve| corners.free_end(curve))
+        .collect();
+    let at = |junction: usize| corners.points[&junction];
+    let reach = REACH * curves.junction_sigma();
+    // How far two ends are apart that face each other.
+    let gap = |[a, b]: [usize; 2], [c, d]: [usize; 2]| {
+        let whole = LineSegment3::new(at(a), at(c));
+        let places = [b, d].map(|end| whole.line_parameter(&at(end)));
+        let in_order = 0.0 < places[0] && places[0] < places[1] && places[1] < 1.0;
+        let on_line = [b, d]
+            .iter()
+            .all(|end| whole.distance_to_point(&at(*end)) <= reach);
+        (in_order && on_line).then(|| (at(b) - at(d)).norm())
+    };
+    let nearest = |one: usize| {
+        let others = (0..pieces.len()).filter(|other| *other != one);
+        let facing = others.filter_map(|other| Some((gap(pieces[one], pieces[other])?, other)));
+        facing
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, other)| other)
+    };
+    let nearest: Vec<Option<usize>> = (0..pieces.len()).into_par_iter().map(nearest).collect();
+    let mutual = (0..pieces.len()).filter_map(|one| {
+        let other = nearest[one].filter(|other| *other > one && nearest[*other] == Some(one))?;
+        let [a, b] = [one, other].map(|piece| pieces[piece][1]);
+        Some(inferred_line(curves, [(a, at(a)), (b, at(b))]))
+    });
+    mutual.collect()
+}
 
 /// What planes have with inferred creases.
 pub(super) struct MissingCreases {

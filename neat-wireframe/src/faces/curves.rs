@@ -114,6 +114,7 @@ impl Curves {
     pub fn with_inferred(mut self, lines: Vec<Curve>) -> Self {
         self.all.extend(lines);
         self.all.sort_by_key(|curve| curve.index);
+        self.all.dedup_by_key(|curve| curve.index);
         self
     }
 
@@ -131,7 +132,12 @@ impl Curves {
 
     /// What is added to the covariances of junctions.
     pub fn junction_floor(&self) -> Matrix3<f64> {
-        Matrix3::identity() * (JUNCTION_NOISE * self.extent).powi(2)
+        Matrix3::identity() * self.junction_sigma().powi(2)
+    }
+
+    /// Standard deviation that is added to those of junctions.
+    pub fn junction_sigma(&self) -> f64 {
+        JUNCTION_NOISE * self.extent
     }
 
     /// Covariance of a point of an arc.

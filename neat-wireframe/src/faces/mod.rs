@@ -96,8 +96,9 @@ pub fn find_shells(
     points: &[SurfacePoint],
 ) -> Vec<Shell> {
     let observed = Curves::new(graph);
-    let smooth = rulings::missing_rulings(&observed);
-    let (curves, faces) = candidates::candidates(observed.with_inferred(smooth));
+    let mut inferred = rulings::missing_rulings(&observed);
+    inferred.extend(creases::facing_ends(&observed));
+    let (curves, faces) = candidates::candidates(observed.with_inferred(inferred));
     let _span = tracing::debug_span!("find_shells", faces = faces.len()).entered();
     let sightings = Sightings::new(&curves, views);
     let (regions, against): (Vec<Option<Region>>, Vec<f64>) = (faces.par_iter())

@@ -267,6 +267,22 @@ fn missing_creases_are_inferred_between_corners() {
     assert_solid(instead(&[]), 8, 0.255);
     assert_solid(instead(&[[0.3, 0.3, 0.2]]), 8, 0.255);
     assert_solid(instead(&[[0.3, 0.3, 0.7]]), 8, 0.255);
+    // Of two edges of a thin strip only pieces at both ends are left, which no plane joins.
+    let mut bar = Model::default().prism(
+        &[[0.0, 0.0], [1.0, 0.0], [1.0, 0.05], [0.0, 0.05]],
+        [0.0, 1.0],
+    );
+    for [start, end] in [[4, 5], [6, 7]] {
+        bar.wireframe.edges.retain(|edge| *edge != [start, end]);
+        for (from, to) in [(start, end), (end, start)] {
+            let [a, b] = [from, to].map(|k| bar.wireframe.junctions[k]);
+            bar.wireframe
+                .edges
+                .push([from, bar.wireframe.junctions.len()]);
+            bar.wireframe.junctions.push(a + 0.2 * (b - a));
+        }
+    }
+    assert_solid(bar, 6, 0.05);
 }
 
 #[test]
