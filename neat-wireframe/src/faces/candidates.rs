@@ -11,8 +11,8 @@ use super::surface::Surface;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Rims of one cylinder or cone agree within so many standard deviations of an arc, of both together: as
-/// one point of a thousand does not.
+/// Rims of one cylinder or cone agree within so many standard deviations of an arc, of both
+/// together: as one point of a thousand does not.
 const AGREEMENT: f64 = 3.29 * std::f64::consts::SQRT_2;
 
 /// All curves, inferred ones among them, and faces with different boundaries; none knows its outer

@@ -2,13 +2,13 @@
 //! closed to shells where they close.
 //!
 //! Curves that lie in one plane within their covariances divide it into cells, and two coaxial
-//! circles are the rims of a cylinder or a cone: each is a face that may be there (`candidates.rs`). Where a
-//! cylinder goes on without a crease, the line between them is inferred (`rulings.rs`), and where
-//! two planes meet at corners that lack an edge, that edge (`creases.rs`). Images
-//! speak against a face through which they show what lies behind it (`visibility.rs`); among the
-//! others those are chosen that give the most edges two faces (`selection.rs`). What hangs
-//! together is a shell; it bounds a solid if each of its curves has a face on both sides
-//! (`shells.rs`).
+//! circles are the rims of a cylinder or a cone: each is a face that may be there
+//! (`candidates.rs`). Where a round face goes on without a crease, the line between them is
+//! inferred (`rulings.rs`), and so is an edge that is missing where two planes meet
+//! (`creases.rs`). Images speak against a face through which they show what lies behind it
+//! (`visibility.rs`); among the others those are chosen that give the most edges two faces
+//! (`selection.rs`). What hangs together is a shell; it bounds a solid if each of its curves has a
+//! face on both sides (`shells.rs`).
 //!
 //! Where there are points of surfaces, planes are found that explain edges and points together
 //! (`explained_planes.rs`), and the parts of them that points say are surface (`sheets.rs`), also

@@ -4,8 +4,9 @@
 //! The energy is a sum over faces and curves, in nats. A face costs what images say against it
 //! ([`super::visibility`]). A curve that lacks a face costs [`MISSING_FACE`], twice if it has none;
 //! a curve between two faces of one plane is no crease and costs [`FLAT`]. An inferred line that has
-//! no face is none, and costs nothing. A cone costs [`CONE`], an acute angle up to [`ACUTE`]. No curve has three faces, no two faces
-//! lie on each other, and no cylinder or cone passes through another face. The minimum is found by branch and bound.
+//! no face is none, and costs nothing. A cone costs [`CONE`], an acute angle up to [`ACUTE`]. No
+//! curve has three faces, no two faces lie on each other, and no cylinder or cone passes through
+//! another face. The minimum is found by branch and bound.
 
 use super::curves::Curves;
 use super::face::{CurveIndex, Face, Step};
