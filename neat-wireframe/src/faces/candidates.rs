@@ -15,8 +15,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// together: as one point of a thousand does not.
 const AGREEMENT: f64 = 3.29 * std::f64::consts::SQRT_2;
 
-/// All curves, inferred ones among them, and faces with different boundaries; none knows its outer
-/// side yet.
+/// All curves, inferred ones among them, and faces with different boundaries. None knows its outer
+/// side yet. A face most of whose curves are inferred, and most of their length, is a guess.
 pub(super) fn candidates(curves: Curves) -> (Curves, Vec<Face>) {
     let planes = coplanar_curves(&curves);
     let missing = missing_creases(&curves, &planes);
@@ -51,7 +51,15 @@ pub(super) fn candidates(curves: Curves) -> (Curves, Vec<Face>) {
             planar.extend(faces_of(plane, &with_gained));
         }
     }
-    for face in planar.into_iter().chain(round_faces(&curves)) {
+    let is_seen = |face: &Face| {
+        let curves = face.steps().filter_map(|step| curves.find(step.curve));
+        let (inferred, seen): (Vec<&Curve>, Vec<&Curve>) =
+            curves.partition(|curve| matches!(curve.index, CurveIndex::Smooth(_)));
+        let length = |curves: &[&Curve]| curves.iter().map(|curve| curve.length()).sum::<f64>();
+        inferred.len() <= seen.len() || length(&inferred) <= length(&seen)
+    };
+    let all = planar.into_iter().chain(round_faces(&curves));
+    for face in all.filter(is_seen) {
         let mut boundary: Vec<CurveIndex> = face.steps().map(|step| step.curve).collect();
         boundary.sort_unstable();
         if known.insert(boundary) {

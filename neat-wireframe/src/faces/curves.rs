@@ -56,6 +56,11 @@ pub(super) struct Curves {
 }
 
 impl Curve {
+    pub fn length(&self) -> f64 {
+        let pieces = self.points.windows(2);
+        pieces.map(|ends| (ends[1] - ends[0]).norm()).sum()
+    }
+
     /// The points in the direction of a loop.
     pub fn points_along(&self, step: &Step) -> Vec<Vector3<f64>> {
         let mut points = self.points.clone();
