@@ -99,7 +99,7 @@ def main():
         results.write_text(json.dumps(known, indent=1))
 
     if "as it is" not in known or at_once:
-        binary = build(copy, out)
+        binary = build(copy, out) or sys.exit("with its constants as functions neat does not build")
         # Alone: it leaves the 2D segments that the others read.
         if "as it is" not in known:
             keep(*measure("as it is", binary, {}))
@@ -126,8 +126,16 @@ def parsed():
     )
     parser.add_argument("out", type=pathlib.Path, help="folder for the results")
     parser.add_argument("scenes", type=pathlib.Path, nargs="+", help="scenes with truth")
-    parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these constants, by name or by file and name")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="measure so many values at once")
+    parser.add_argument(
+        "--only",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="these constants, by name or by file and name",
+    )
+    parser.add_argument(
+        "--jobs", type=int, default=1, metavar="N", help="measure so many values at once"
+    )
     return parser.parse_args()
 
 
@@ -178,7 +186,11 @@ def known_early(copy):
         early |= {
             found.key
             for found in every
-            if (found.name in names if found.path == path else found.visibility and found.name in imported)
+            if (
+                found.name in names
+                if found.path == path
+                else found.visibility and found.name in imported
+            )
         }
     # Other files cannot tell which of two with one name is a function.
     shared = {found.name for found in every if found.visibility and found.key in early}
@@ -190,10 +202,10 @@ def made_functions(copy, constants):
     (copy / CRATE / "changed_constants.rs").write_text(READ)
     root = copy / CRATE / "lib.rs"
     root.write_text(root.read_text() + "\nmod changed_constants;\n")
-    of_file = collections.defaultdict(set)
+    of_file = collections.defaultdict(dict)
     for found in constants:
-        of_file[found.path].add(found.name)
-    public = {found.name for found in constants if found.visibility}
+        of_file[found.path][found.name] = is_array(found)
+    public = {found.name: is_array(found) for found in constants if found.visibility}
     own = collections.defaultdict(set)
     for found in defined(copy):
         own[found.path].add(found.name)
@@ -202,7 +214,8 @@ def made_functions(copy, constants):
         for found in constants:
             if found.path == path:
                 text = text.replace(found.text, function(found))
-        path.write_text(calls(text, of_file[path] | (public - own[path])))
+        others = {name: array for name, array in public.items() if name not in own[path]}
+        path.write_text(calls(text, of_file[path] | others))
 
 
 def with_value(found, value):
@@ -214,25 +227,30 @@ def with_value(found, value):
 def function(found):
     count = re.findall(NUMBER, found.value)
     kind = re.search("f64|usize", found.kind)[0]
-    array = found.kind.startswith("[")
-    values = f"static VALUES: std::sync::OnceLock<[{kind}; {len(count)}]> = std::sync::OnceLock::new();"
-    first = found.value if array else f"[{found.value}]"
-    read = f'VALUES.get_or_init(|| crate::changed_constants::changed("{found.key}", {first}))'
-    return (
-        f"#[allow(non_snake_case)] {found.visibility}fn {found.name}() -> "
-        f"{found.kind if array else kind} {{ {values} {'*' + read if array else read + '[0]'} }}"
+    values = (
+        f"static VALUES: std::sync::OnceLock<[{kind}; {len(count)}]> = std::sync::OnceLock::new();"
     )
+    first = found.value if is_array(found) else f"[{found.value}]"
+    read = f'VALUES.get_or_init(|| crate::changed_constants::changed("{found.key}", {first}))'
+    result, read = (f"&'static {found.kind}", read) if is_array(found) else (kind, f"{read}[0]")
+    return f"#[allow(non_snake_case)] {found.visibility}fn {found.name}() -> {result} {{ {values} {read} }}"
+
+
+def is_array(found):
+    return found.kind.startswith("[")
 
 
 def calls(text, names):
+    """Where the constants are read; `names` says which of them are arrays."""
     if not names:
         return text
     name = re.compile(rf"\b({'|'.join(sorted(names))})\b(?!\()")
+    call = lambda match: f"(*{match[0]}())" if names[match[0]] else f"{match[0]}()"
     parts, end = [], 0
     for skipped in NOT_READ.finditer(text):
-        parts += [name.sub(r"\1()", text[end : skipped.start()]), skipped[0]]
+        parts += [name.sub(call, text[end : skipped.start()]), skipped[0]]
         end = skipped.end()
-    return "".join([*parts, name.sub(r"\1()", text[end:])])
+    return "".join([*parts, name.sub(call, text[end:])])
 
 
 def build(copy, out):
@@ -241,7 +259,9 @@ def build(copy, out):
     command += ["--example", "measure_assembler"]
     target = out / "target"
     done = subprocess.run(
-        command, cwd=copy, env={**os.environ, "CARGO_TARGET_DIR": str(target), "RUSTFLAGS": "-Awarnings"}
+        command,
+        cwd=copy,
+        env={**os.environ, "CARGO_TARGET_DIR": str(target), "RUSTFLAGS": "-Awarnings"},
     )
     return target / "release/examples/measure_assembler" if done.returncode == 0 else None
 
@@ -271,7 +291,12 @@ def of_environment(found, factor):
 
 def measured(binary, arguments, environment):
     """F of each scene; that there is none, where the assembler gives up."""
-    command = [binary, "--out", arguments.out / "scenes", *(scene.resolve() for scene in arguments.scenes)]
+    command = [
+        binary,
+        "--out",
+        arguments.out / "scenes",
+        *(scene.resolve() for scene in arguments.scenes),
+    ]
     environment = {**os.environ, **environment}
     if arguments.jobs > 1:
         environment["RAYON_NUM_THREADS"] = "1"
