@@ -29,6 +29,16 @@ fn exported(document: &WireframeDocument, format: Format, filter: EdgeFilter) ->
     fs::read_to_string(path).unwrap()
 }
 
+fn add_shells(document: &mut WireframeDocument) {
+    let wireframe = document.wireframe();
+    let graph = MeasuredGraph {
+        wireframe: &wireframe,
+        arcs: &document.arcs,
+        covariances: &[],
+    };
+    document.shells = find_shells(&graph, &[], &[]);
+}
+
 fn count(text: &str, entity: &str) -> usize {
     text.matches(&format!("={entity}(")).count()
 }
@@ -200,13 +210,7 @@ fn a_countersunk_hole_is_a_cone_in_step() {
         arcs: vec![circle(0.1, 0.0), circle(0.1, 0.7), circle(0.3, 1.0)],
         ..WireframeDocument::default()
     };
-    let wireframe = document.wireframe();
-    let graph = MeasuredGraph {
-        wireframe: &wireframe,
-        arcs: &document.arcs,
-        covariances: &[],
-    };
-    document.shells = find_shells(&graph, &[], &[]);
+    add_shells(&mut document);
     let step = exported(&document, Format::Step, EdgeFilter::default());
     assert_eq!(count(&step, "MANIFOLD_SOLID_BREP"), 1);
     assert_eq!(count(&step, "CONICAL_SURFACE"), 1);
@@ -245,13 +249,7 @@ fn rounded() -> WireframeDocument {
         arcs: vec![arc(0.0), arc(0.8)],
         ..WireframeDocument::default()
     };
-    let wireframe = document.wireframe();
-    let graph = MeasuredGraph {
-        wireframe: &wireframe,
-        arcs: &document.arcs,
-        covariances: &[],
-    };
-    document.shells = find_shells(&graph, &[], &[]);
+    add_shells(&mut document);
     document
 }
 

@@ -104,8 +104,8 @@ impl Shell {
 }
 
 impl Face {
-    /// Whether its surface is one, and its loops are closed chains of curves that exist: any
-    /// number on a plane; on a cylinder or a cone two arcs, which are loops of their own or joined by two
+    /// Whether its surface is one, and its loops are closed chains of curves that exist: any number
+    /// on a plane; on a cylinder or a cone two arcs, which are loops of their own or joined by two
     /// edges or inferred lines.
     pub(crate) fn is_valid(&self, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> bool {
         let exists = |step: &Step| match step.curve {

@@ -71,6 +71,14 @@ impl Model {
 }
 
 const SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+const L_PROFILE: [[f64; 2]; 6] = [
+    [0.0, 0.0],
+    [1.0, 0.0],
+    [1.0, 0.3],
+    [0.3, 0.3],
+    [0.3, 1.0],
+    [0.0, 1.0],
+];
 const WHOLE: [f64; 2] = [-1.0, -1.0 + TAU];
 /// Volume of the unit cube of a model that is turned.
 const UNIT: f64 = 1.7 * 1.7 * 1.7;
@@ -87,14 +95,6 @@ fn assert_solid(model: Model, faces: usize, volume: f64) {
 
 #[test]
 fn prisms_are_solids() {
-    let l_profile = [
-        [0.0, 0.0],
-        [1.0, 0.0],
-        [1.0, 0.3],
-        [0.3, 0.3],
-        [0.3, 1.0],
-        [0.0, 1.0],
-    ];
     let stairs = [
         [0.0, 0.0],
         [1.0, 0.0],
@@ -106,7 +106,7 @@ fn prisms_are_solids() {
         [0.0, 1.0],
     ];
     assert_solid(Model::default().prism(&SQUARE, [0.0, 0.8]), 6, 0.8);
-    assert_solid(Model::default().prism(&l_profile, [0.0, 0.5]), 8, 0.255);
+    assert_solid(Model::default().prism(&L_PROFILE, [0.0, 0.5]), 8, 0.255);
     assert_solid(
         Model::default().prism(&stairs, [0.0, 1.0]),
         10,
@@ -243,16 +243,8 @@ fn steps_are_no_cones_and_chamfers_are() {
 
 #[test]
 fn missing_creases_are_inferred_between_corners() {
-    let l_profile = [
-        [0.0, 0.0],
-        [1.0, 0.0],
-        [1.0, 0.3],
-        [0.3, 0.3],
-        [0.3, 1.0],
-        [0.0, 1.0],
-    ];
     let instead = |ends: &[[f64; 3]]| {
-        let mut model = Model::default().prism(&l_profile, [0.0, 0.5]);
+        let mut model = Model::default().prism(&L_PROFILE, [0.0, 0.5]);
         model.wireframe.edges.retain(|edge| *edge != [3, 9]);
         for end in ends {
             model

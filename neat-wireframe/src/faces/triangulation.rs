@@ -91,8 +91,8 @@ fn indices_along(
     indices
 }
 
-/// Appends the triangles between two rims of a cylinder or a cone, from angle to angle: each shares its side
-/// along the axis with the next.
+/// Appends the triangles between two rims of a round face, from angle to angle: each shares its
+/// side along the axis with the next.
 fn strip(
     surface: &Surface,
     one: &[usize],
