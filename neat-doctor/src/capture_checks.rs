@@ -119,25 +119,26 @@ fn scene_sphere(scene: &Scene) -> Finding {
             .remedied_by(remedy);
     }
     if !inside.is_empty() {
-        let message = of_cameras(&inside, "stand inside");
+        let count = scene.views.len();
         let apart = (scene.views.iter())
             .map(|view| (view.camera.center_in_world - camera(0).center_in_world).norm())
             .fold(0.0, f64::max);
-        if inside.len() == scene.views.len() && apart < MIN_BASELINE * scene.sphere_radius {
-            // From one place, as seen from what it holds.
-            let mut finding = Finding::warning(Check::SceneSphere, message, remedy);
-            finding.level = Level::Problem;
-            return finding.of_views(inside);
-        }
-        if 2 * inside.len() > scene.views.len() {
-            let all = counted(scene.views.len(), "camera");
+        // From one place, as seen from what it holds.
+        let from_one_place = inside.len() == count && apart < MIN_BASELINE * scene.sphere_radius;
+        if 2 * inside.len() > count && !from_one_place {
             let message = format!(
-                "{} of {all} stand inside {ball}, as in a room; around an object, {remedy}",
-                inside.len()
+                "{} of {} stand inside {ball}, as in a room; around an object, {remedy}",
+                inside.len(),
+                counted(count, "camera")
             );
             return Finding::new(Check::SceneSphere, Level::Note, message).of_views(inside);
         }
-        return Finding::warning(Check::SceneSphere, message, remedy).of_views(inside);
+        let message = of_cameras(&inside, "stand inside");
+        let mut finding = Finding::warning(Check::SceneSphere, message, remedy);
+        if from_one_place {
+            finding.level = Level::Problem;
+        }
+        return finding.of_views(inside);
     }
     let seen = median(shares.into_iter());
     let message = format!("cameras see {} of {ball} (median)", percent(seen));

@@ -63,8 +63,8 @@ impl TrueFace {
     /// Reads the `faces` of a true wireframe, with the edges around them; none where it has none.
     ///
     /// # Errors
-    /// If the file is missing or no such JSON, a plane, a cylinder or a cone lacks its numbers, or a face
-    /// names an edge that is not there.
+    /// If the file is missing or no such JSON, a plane, a cylinder or a cone lacks its numbers, or
+    /// a face names an edge that is not there.
     pub fn read(path: &Path) -> Result<Vec<Self>, SceneError> {
         Self::parse(
             &file::read(path, "give a true wireframe with `faces`")?,

@@ -192,7 +192,7 @@ impl<'a> ShellWriter<'a> {
         written
     }
 
-    /// A cylinder or a cone between two circles as one loop, cut open along a line between their vertices.
+    /// A round face between two circles as one loop, cut open along a line between their vertices.
     fn seamed(&mut self, first: &[Step], second: &[Step]) -> Vec<String> {
         let corner = |steps: &[Step]| Some(self.edges.get(&steps.first()?.curve)?.1[0].clone());
         let corners = corner(first).zip(corner(second));

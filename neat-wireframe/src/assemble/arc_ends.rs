@@ -63,20 +63,8 @@ pub(super) fn end_at_junctions(
         if is_small(found) {
             return vec![found.clone()];
         }
-        let stations = stations(images, found, &junctions);
-        let ended = Ends {
-            images,
-            found,
-            stations,
-        }
-        .moved();
-        let stations = self::stations(images, &ended, &junctions);
-        Ends {
-            images,
-            found: &ended,
-            stations,
-        }
-        .without_gaps()
+        let ended = Ends::new(images, found, &junctions).moved();
+        Ends::new(images, &ended, &junctions).without_gaps()
     });
     *arcs = ended.flatten_iter().collect();
 }
@@ -119,28 +107,29 @@ fn absorb(images: &Images, parts: &mut [Option<[Vector3<f64>; 3]>], found: &mut 
     }
 }
 
-/// The angles of the junctions on the circle of an arc, from its start on, ascending.
-fn stations(images: &Images, found: &FoundArc, junctions: &[Vector3<f64>]) -> Vec<f64> {
-    let arc = &found.arc;
-    let gap = MAX_GAP * images.reach * found.pixel;
-    let on_circle = junctions
-        .iter()
-        .filter(|j| arc.distance_to_circle(j) <= gap);
-    let mut stations: Vec<f64> = on_circle
-        .map(|j| arc.angles[0] + (arc.angle_of(j) - arc.angles[0]).rem_euclid(TAU))
-        .collect();
-    stations.sort_by(f64::total_cmp);
-    stations
-}
-
-/// An arc with the angles of the junctions on its circle.
+/// An arc with the angles of the junctions on its circle, from its start on, ascending.
 struct Ends<'a> {
     images: &'a Images<'a>,
     found: &'a FoundArc,
     stations: Vec<f64>,
 }
 
-impl Ends<'_> {
+impl<'a> Ends<'a> {
+    fn new(images: &'a Images<'a>, found: &'a FoundArc, junctions: &[Vector3<f64>]) -> Self {
+        let arc = &found.arc;
+        let gap = MAX_GAP * images.reach * found.pixel;
+        let on_circle = (junctions.iter()).filter(|j| arc.distance_to_circle(j) <= gap);
+        let mut stations: Vec<f64> = on_circle
+            .map(|j| arc.angles[0] + (arc.angle_of(j) - arc.angles[0]).rem_euclid(TAU))
+            .collect();
+        stations.sort_by(f64::total_cmp);
+        Self {
+            images,
+            found,
+            stations,
+        }
+    }
+
     /// The arc with its ends moved.
     fn moved(&self) -> FoundArc {
         let mut ended = self.found.clone();

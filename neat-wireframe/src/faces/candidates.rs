@@ -3,7 +3,7 @@
 
 use super::cells::cells;
 use super::creases::missing_creases;
-use super::curves::{Curve, Curves};
+use super::curves::{Curve, Curves, sorted};
 use super::face::{CurveIndex, Face, Step};
 use super::plane_fit::{PlaneFit, PlaneFrame};
 use super::planes::{CoplanarCurves, coplanar_curves};
@@ -175,8 +175,4 @@ fn loops_between(
         }
         _ => None,
     }
-}
-
-fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
-    [a.min(b), a.max(b)]
 }

@@ -9,7 +9,7 @@
 //! between. Like any inferred line it costs nothing by itself, but wants two faces
 //! (`selection.rs`).
 
-use super::curves::{Curve, Curves};
+use super::curves::{Curve, Curves, sorted};
 use super::face::CurveIndex;
 use super::planes::CoplanarCurves;
 use super::rulings::inferred_line;
@@ -20,8 +20,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Planes that meet at a smaller sine do not say where.
 const MIN_SINE: f64 = 0.03;
-/// Corners that are nearer to each other, in standard deviations of an arc, are one; what lies beside
-/// a line within so many of a junction lies on it.
+/// Corners that are nearer to each other, in standard deviations of an arc, are one; what lies
+/// beside a line within so many of a junction lies on it.
 const REACH: f64 = 4.0;
 
 /// The lines between the ends of edges that lie on one line and face each other.
@@ -83,8 +83,11 @@ pub(super) fn missing_creases(curves: &Curves, planes: &[CoplanarCurves]) -> Mis
     for (second, other) in planes.iter().enumerate() {
         for (first, one) in planes[..second].iter().enumerate() {
             let direction = one.normal.cross(&other.normal);
+            if direction.norm() < MIN_SINE {
+                continue;
+            }
             let common: Vec<usize> = open[first].intersection(&open[second]).copied().collect();
-            if common.len() < 2 || direction.norm() < MIN_SINE {
+            if common.len() < 2 {
                 continue;
             }
             let in_both: Vec<&Curve> = (one.curves.iter())
@@ -137,7 +140,7 @@ impl Corners {
             for junction in [start, end] {
                 *counts.entry(junction).or_default() += 1;
             }
-            joined.insert([start.min(end), start.max(end)]);
+            joined.insert(sorted([start, end]));
         }
         Self {
             points,
@@ -185,10 +188,9 @@ struct Meeting<'a> {
 impl Meeting<'_> {
     /// The pairs of junctions on it, the lower first, between which an edge is missing, and the
     /// edges that those replace.
-    fn pairs(&self, open: Vec<usize>) -> (Vec<[usize; 2]>, BTreeSet<CurveIndex>) {
+    fn pairs(&self, mut open: Vec<usize>) -> (Vec<[usize; 2]>, BTreeSet<CurveIndex>) {
         let along = |junction: usize| self.direction.dot(&self.corners.points[&junction]);
         let reach = REACH * self.curves.arc_sigma();
-        let mut open = open;
         open.sort_by(|a, b| along(*a).total_cmp(&along(*b)));
         let mut pairs = BTreeSet::new();
         let mut replaced = BTreeSet::new();
@@ -209,15 +211,14 @@ impl Meeting<'_> {
                 a.total_cmp(&b)
             });
             if let Some(nearest) = nearest.copied() {
-                pairs.insert([from.min(nearest), from.max(nearest)]);
+                pairs.insert(sorted([from, nearest]));
                 replaced.insert(curve.index);
                 open.retain(|junction| ![from, to, nearest].contains(junction));
             }
         }
         for ends in open.windows(2) {
-            let sorted = [ends[0].min(ends[1]), ends[0].max(ends[1])];
-            if along(ends[1]) - along(ends[0]) > 0.0 {
-                pairs.insert(sorted);
+            if along(ends[1]) > along(ends[0]) {
+                pairs.insert(sorted([ends[0], ends[1]]));
             }
         }
         pairs.retain(|ends| !self.corners.joined.contains(ends));

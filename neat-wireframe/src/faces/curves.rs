@@ -156,6 +156,11 @@ impl Curves {
     }
 }
 
+/// Two junctions, the lower first.
+pub(super) fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
+    [a.min(b), a.max(b)]
+}
+
 /// The junctions nearest to the ends of an arc; `None` without junctions.
 pub(crate) fn nearest_junctions(
     arc: &CircularArc,

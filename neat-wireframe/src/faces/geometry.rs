@@ -236,25 +236,6 @@ fn on_surfaces(start: Vector3<f64>, surfaces: &[Surface]) -> Vector3<f64> {
     position
 }
 
-/// The radius of a round surface where its axis passes a point, and by how much it grows along a
-/// direction of the axis.
-fn radius_at(surface: &Surface, center: &Vector3<f64>, along: &Vector3<f64>) -> Option<[f64; 2]> {
-    match surface {
-        Surface::Plane { .. } => None,
-        Surface::Cylinder { radius, .. } => Some([*radius, 0.0]),
-        Surface::Cone {
-            apex,
-            axis,
-            half_angle,
-            ..
-        } => {
-            let slope = half_angle.tan();
-            let growth = slope * axis.dot(along).signum();
-            Some([slope * axis.dot(&(center - apex)), growth])
-        }
-    }
-}
-
 /// The circle of an arc in the plane of a face and around the axis of another, or where two round
 /// faces of one axis meet. A whole one begins where all circles around this axis do.
 fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> CircularArc {
@@ -270,7 +251,7 @@ fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> C
             center = point + axis * axis.dot(&(center - point));
             axis
         });
-    let mut profiles = (surfaces.iter()).filter_map(|s| radius_at(s, &center, &axis?));
+    let mut profiles = (surfaces.iter()).filter_map(|surface| surface.radius_at(&center, &axis?));
     let (first, second) = (profiles.next(), profiles.next());
     let normal = match (plane, first, second, axis) {
         (Some((normal, offset)), ..) => {

@@ -56,15 +56,7 @@ impl Region {
                 // Angles run as on the arc, wherever the axis points.
                 let normal = one.normal().dot(&along).signum() * along / height;
                 let x = (one.axes[0] - normal * normal.dot(&one.axes[0])).normalize();
-                let (radius, slope) = match round {
-                    Surface::Cone { half_angle, .. } => {
-                        let slope = half_angle.tan();
-                        let radius = slope * axis.dot(&(one.center - point));
-                        (radius, slope * axis.dot(&normal).signum())
-                    }
-                    Surface::Cylinder { radius, .. } => (radius, 0.0),
-                    Surface::Plane { .. } => return None,
-                };
+                let [radius, slope] = round.radius_at(&one.center, &normal)?;
                 let rim = CircularArc {
                     center: center(&one),
                     axes: [x, normal.cross(&x)],

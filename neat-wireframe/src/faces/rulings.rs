@@ -7,7 +7,7 @@
 //! by itself, but wants a face on both sides like any other (`selection.rs`).
 
 use super::candidates::common_surface;
-use super::curves::{Curve, Curves};
+use super::curves::{Curve, Curves, sorted};
 use super::face::CurveIndex;
 use super::surface::Surface;
 use nalgebra::Vector3;
@@ -155,8 +155,4 @@ impl Leaving {
                 && edge.direction.cross(&toward).norm() <= MAX_TURN
         })
     }
-}
-
-fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
-    [a.min(b), a.max(b)]
 }

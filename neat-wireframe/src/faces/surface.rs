@@ -96,6 +96,29 @@ impl Surface {
         }
     }
 
+    /// The radius of a round surface where its axis passes a point, and by how much it grows along
+    /// a direction of the axis; `None` of a plane.
+    pub(super) fn radius_at(
+        &self,
+        center: &Vector3<f64>,
+        along: &Vector3<f64>,
+    ) -> Option<[f64; 2]> {
+        match self {
+            Self::Plane { .. } => None,
+            Self::Cylinder { radius, .. } => Some([*radius, 0.0]),
+            Self::Cone {
+                apex,
+                axis,
+                half_angle,
+                ..
+            } => {
+                let slope = half_angle.tan();
+                let growth = slope * axis.dot(along).signum();
+                Some([slope * axis.dot(&(center - apex)), growth])
+            }
+        }
+    }
+
     /// Whether its numbers are such.
     pub(super) fn is_valid(&self) -> bool {
         let unit = |v: &Vector3<f64>| (v.norm() - 1.0).abs() < 1e-6;
