@@ -7,7 +7,7 @@
 //! a junction on it is closed if the rest of it is shown.
 
 use super::arc_joints::wrapped;
-use super::circle_fitting::FoundArc;
+use super::circle_fitting::{FoundArc, SECTOR_IN_PIXELS};
 use super::corners::{MAX_GAP, WINDOW_IN_PIXELS};
 use super::curved_edges::CurvedEdge;
 use super::edge_cutting::retain_edges;
@@ -23,9 +23,9 @@ use std::f64::consts::{PI, TAU};
 const OPEN_END: f64 = 3.0;
 /// An end within so many pixels of a junction is there, as for 2D segments.
 const AT_JUNCTION: f64 = 5.0;
-/// Pixels of an arc that are asked at once, as in circles that are followed. Arcs of smaller radius
-/// stay as they are: any short edge beside them would be a chord.
-const PIECE_IN_PIXELS: f64 = 12.0;
+/// Arcs of a smaller radius, in pixels, stay as they are: any short edge beside them would be a
+/// chord.
+const MIN_RADIUS: f64 = SECTOR_IN_PIXELS;
 /// A piece of a circle is there if images say this much for it, by length, of what they say for
 /// the piece that they show best. Of a circle with eight scallops (`knob`) those that are there say
 /// .5 of it and more, those across scallops .02 at most.
@@ -48,7 +48,7 @@ pub(super) fn end_at_junctions(
     let straight = edges.iter().map(|ends| points_of(*ends, None));
     let bowed = (curved.iter()).map(|edge| points_of(edge.ends, Some(edge.middle)));
     let mut parts: Vec<Option<[Vector3<f64>; 3]>> = straight.chain(bowed).map(Some).collect();
-    let is_small = |found: &FoundArc| found.arc.radius < PIECE_IN_PIXELS * found.pixel;
+    let is_small = |found: &FoundArc| found.arc.radius < MIN_RADIUS * found.pixel;
     for found in arcs.iter_mut().filter(|found| !is_small(found)) {
         absorb(images, &mut parts, found);
     }
@@ -242,17 +242,8 @@ impl<'a> Ends<'a> {
     }
 
     /// What the images say for a part of the circle.
-    fn gain(&self, [from, to]: [f64; 2]) -> f64 {
-        let arc = &self.found.arc;
-        let length = (to - from) * arc.radius / (PIECE_IN_PIXELS * self.found.pixel);
-        let count = length.ceil().max(1.0);
-        let width = (to - from) / count;
-        let piece = |k: usize| {
-            let low = from + k as f64 * width;
-            let angles = [low, low + width];
-            self.images.evidence_of_sector(arc, angles, None).gain
-        };
-        (0..count as usize).map(piece).sum()
+    fn gain(&self, angles: [f64; 2]) -> f64 {
+        (self.images).gain_along(&self.found.arc, angles, self.found.pixel, None)
     }
 }
 

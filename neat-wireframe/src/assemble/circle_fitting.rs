@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Length of a sector in pixels: the shortest that a line would be asked with …
-const SECTOR_IN_PIXELS: f64 = 12.0;
+pub(super) const SECTOR_IN_PIXELS: f64 = 12.0;
 /// … but so many make a circle: lines across a smaller part tell of its bend.
 const MIN_SECTORS_OF_CIRCLE: f64 = 8.0;
 /// … and not more than so many, of which most are out of sight.
@@ -270,6 +270,24 @@ impl Images<'_> {
         taken: Option<&[Vec<bool>]>,
     ) -> LineEvidence {
         self.evidence_of_curve(arc, angles, |_, angle| Some(arc.point_at(angle)), taken)
+    }
+
+    /// What the images say about a part of an arc, sector by sector; edgels that are `taken` do
+    /// not count.
+    pub(super) fn gain_along(
+        &self,
+        arc: &CircularArc,
+        [from, to]: [f64; 2],
+        pixel: f64,
+        taken: Option<&[Vec<bool>]>,
+    ) -> f64 {
+        let count = ((to - from) * arc.radius / (SECTOR_IN_PIXELS * pixel)).ceil();
+        let width = (to - from) / count.max(1.0);
+        let sector = |k: usize| {
+            let low = from + k as f64 * width;
+            self.evidence_of_sector(arc, [low, low + width], taken).gain
+        };
+        (0..count.clamp(1.0, MAX_SECTORS) as usize).map(sector).sum()
     }
 
     /// Samples of a part of an arc in a view; `None` where it does not see enough of it.

@@ -21,6 +21,7 @@
 mod arc_covariance;
 mod arc_ends;
 mod arc_joints;
+mod arc_pieces;
 mod arc_tubes;
 mod arcs;
 mod candidate_queue;
@@ -340,6 +341,7 @@ fn graph_of(
         response = place_curves(&images, photographs, &mut lines, arcs, progress)?;
     }
     progress(PLACED)?;
+    images.retain_own(&lines, arcs);
     report.common_directions = turn_to_common_directions(&images, selection.noise, &mut lines);
     join_tangents(&images, &mut lines, arcs);
     meet_in_slivers(&images, &mut lines);

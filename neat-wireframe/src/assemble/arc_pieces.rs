@@ -1,0 +1,132 @@
+//! Arcs that are pieces of one circle become one: growth stops where an arc drifts to another rim,
+//! and the rest of the circle is found by another chord.
+
+use super::circle_fitting::{FoundArc, Sector};
+use super::claimed_edgels::claim_edgels;
+use super::curves::BESIDE_IN_PIXELS;
+use super::edge_samples::Images;
+use super::line_selection::ChosenLine;
+use super::corners::WINDOW_IN_PIXELS;
+use nalgebra::Vector3;
+use neat_core::CircularArc;
+use std::f64::consts::TAU;
+
+/// Points of each of two arcs that a circle through both is tried by.
+const SAMPLES: usize = 7;
+/// An arc of whose evidence no more than this share is its own is explained by what has the rest.
+/// Of `part-004` arcs that run along one rim here and along another one there keep 0 to .16, true
+/// ones, with other rims three pixels beside them, .43 and more.
+const OWN_SHARE: f64 = 0.2;
+
+impl Images<'_> {
+    /// Whether images speak for an arc by edgels that are not `taken` by others, too.
+    fn has_own(&self, found: &FoundArc, taken: &[Vec<bool>]) -> bool {
+        let gain = |taken| self.gain_along(&found.arc, found.arc.angles, found.pixel, taken);
+        gain(Some(taken)) > OWN_SHARE * gain(None)
+    }
+
+    /// Leaves out arcs that lines and surer arcs explain.
+    pub(super) fn retain_own(&self, lines: &[ChosenLine], arcs: &mut Vec<FoundArc>) {
+        let mut taken = self.nothing_taken();
+        for line in lines {
+            claim_edgels(self, &line.line, &mut taken);
+        }
+        arcs.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        arcs.retain(|found| {
+            let is_own = self.has_own(found, &taken);
+            if is_own {
+                self.claim_arc(found, &mut taken);
+            }
+            is_own
+        });
+    }
+
+    /// Merges arcs that are pieces of one, those that images speak for most first.
+    pub(super) fn merge_arcs(&self, mut arcs: Vec<FoundArc>) -> Vec<FoundArc> {
+        arcs.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut first = 0;
+        while first < arcs.len() {
+            let whole = (first + 1..arcs.len()).find_map(|second| {
+                let whole = self.whole_of([&arcs[first], &arcs[second]])?;
+                Some((second, whole))
+            });
+            match whole {
+                Some((second, whole)) => {
+                    arcs.remove(second);
+                    arcs[first] = whole;
+                }
+                None => first += 1,
+            }
+        }
+        arcs
+    }
+
+    /// The arc of which two others are pieces.
+    fn whole_of(&self, pieces: [&FoundArc; 2]) -> Option<FoundArc> {
+        let pixel = pieces[0].pixel.min(pieces[1].pixel);
+        let points: Vec<Vector3<f64>> = pieces.iter().flat_map(|piece| points_of(piece)).collect();
+        let circle = widest_circle(&points)?;
+        let is_near =
+            |point: &Vector3<f64>| circle.distance_to_circle(point) <= BESIDE_IN_PIXELS * pixel;
+        if !points.iter().all(is_near) {
+            return None;
+        }
+        let start = CircularArc {
+            angles: union(&circle, pieces, WINDOW_IN_PIXELS * pixel)?,
+            ..circle
+        };
+        let mut views: Vec<usize> = (pieces.iter())
+            .flat_map(|piece| piece.sectors.iter().flat_map(|s: &Sector| s.evidence.views()))
+            .collect();
+        views.sort_unstable();
+        views.dedup();
+        let whole = self.follow_arc(&start, &views)?;
+        let mut taken = self.nothing_taken();
+        self.claim_arc(&whole, &mut taken);
+        (pieces.iter())
+            .all(|piece| !self.has_own(piece, &taken))
+            .then_some(whole)
+    }
+}
+
+fn points_of(piece: &FoundArc) -> [Vector3<f64>; SAMPLES] {
+    let arc = &piece.arc;
+    let share = |k: usize| k as f64 / (SAMPLES - 1) as f64;
+    std::array::from_fn(|k| arc.point_at(arc.angles[0] + share(k) * arc.sweep()))
+}
+
+/// The whole circle through the three points that span the largest triangle.
+fn widest_circle(points: &[Vector3<f64>]) -> Option<CircularArc> {
+    let mut widest = (0.0, None);
+    for (i, a) in points.iter().enumerate() {
+        for (j, b) in points.iter().enumerate().skip(i + 1) {
+            for c in &points[j + 1..] {
+                let area = (b - a).cross(&(c - a)).norm_squared();
+                if area > widest.0 {
+                    widest = (area, Some([*a, *b, *c]));
+                }
+            }
+        }
+    }
+    CircularArc::through(widest.1?).map(|arc| CircularArc {
+        angles: [0.0, TAU],
+        ..arc
+    })
+}
+
+/// From where to where an arc runs along a circle that it lies on.
+fn span_on(circle: &CircularArc, arc: &CircularArc) -> [f64; 2] {
+    let middle = circle.angle_of(&arc.point_at(0.5 * (arc.angles[0] + arc.angles[1])));
+    let half = (0.5 * arc.length() / circle.radius).min(0.5 * TAU);
+    [middle - half, middle + half]
+}
+
+/// The part of a circle that two arcs along it cover, at most `gap` apart.
+fn union(circle: &CircularArc, pieces: [&FoundArc; 2], gap: f64) -> Option<[f64; 2]> {
+    let [a, b] = pieces.map(|piece| span_on(circle, &piece.arc));
+    let turn = TAU * (0.5 * ((a[0] + a[1]) - (b[0] + b[1])) / TAU).round();
+    let b = b.map(|angle| angle + turn);
+    let apart = (a[0] - b[1]).max(b[0] - a[1]) * circle.radius;
+    let whole = [a[0].min(b[0]), a[1].max(b[1])];
+    (apart <= gap).then(|| [whole[0], whole[1].min(whole[0] + TAU)])
+}
