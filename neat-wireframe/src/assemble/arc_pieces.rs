@@ -3,10 +3,10 @@
 
 use super::circle_fitting::{FoundArc, Sector};
 use super::claimed_edgels::claim_edgels;
+use super::corners::WINDOW_IN_PIXELS;
 use super::curves::BESIDE_IN_PIXELS;
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
-use super::corners::WINDOW_IN_PIXELS;
 use nalgebra::Vector3;
 use neat_core::CircularArc;
 use std::f64::consts::TAU;
@@ -76,7 +76,12 @@ impl Images<'_> {
             ..circle
         };
         let mut views: Vec<usize> = (pieces.iter())
-            .flat_map(|piece| piece.sectors.iter().flat_map(|s: &Sector| s.evidence.views()))
+            .flat_map(|piece| {
+                piece
+                    .sectors
+                    .iter()
+                    .flat_map(|s: &Sector| s.evidence.views())
+            })
             .collect();
         views.sort_unstable();
         views.dedup();

@@ -287,7 +287,9 @@ impl Images<'_> {
             let low = from + k as f64 * width;
             self.evidence_of_sector(arc, [low, low + width], taken).gain
         };
-        (0..count.clamp(1.0, MAX_SECTORS) as usize).map(sector).sum()
+        (0..count.clamp(1.0, MAX_SECTORS) as usize)
+            .map(sector)
+            .sum()
     }
 
     /// Samples of a part of an arc in a view; `None` where it does not see enough of it.

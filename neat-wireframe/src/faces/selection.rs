@@ -154,15 +154,24 @@ fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
 
 /// Branch and bound over the faces of one group.
 struct Search<'a> {
-    faces: &'a [Face],
     /// For each face those that it does not simply meet.
     beside: &'a [Vec<(usize, Pair)>],
-    /// In the order in which they are decided on, each with what it wins at most.
-    order: Vec<(f64, usize)>,
+    /// In the order in which they are decided on, those first that win most.
+    order: Vec<Candidate>,
     taken: BTreeSet<usize>,
-    count: BTreeMap<CurveIndex, usize>,
+    /// Of each curve of the group, whether it is an inferred line and how many faces it has.
+    curves: Vec<(bool, usize)>,
     best: (f64, Vec<usize>),
     states: usize,
+}
+
+/// A face that may be chosen.
+struct Candidate {
+    face: usize,
+    /// What it wins by its curves, if none of them has two faces, less its own cost.
+    gain: f64,
+    /// The places of its curves in [`Search::curves`].
+    curves: Vec<usize>,
 }
 
 impl<'a> Search<'a> {
@@ -172,74 +181,114 @@ impl<'a> Search<'a> {
         beside: &'a [Vec<(usize, Pair)>],
         group: Vec<usize>,
     ) -> Self {
-        let gain = |face: usize| {
+        let steps = group.iter().flat_map(|face| faces[*face].steps());
+        let known: BTreeSet<CurveIndex> = steps.map(|step| step.curve).collect();
+        let known: Vec<CurveIndex> = known.into_iter().collect();
+        let place = |step: &Step| known.binary_search(&step.curve).ok();
+        let candidate = |face: usize| {
             let is_cone = matches!(faces[face].surface, Surface::Cone { .. });
             let cost = against[face] + if is_cone { CONE } else { 0.0 };
-            MISSING_FACE * faces[face].steps().count() as f64 - cost
+            let curves: Vec<usize> = faces[face].steps().filter_map(place).collect();
+            Candidate {
+                face,
+                gain: MISSING_FACE * curves.len() as f64 - cost,
+                curves,
+            }
         };
-        let gains = group.into_iter().map(|face| (gain(face), face));
-        let mut order: Vec<(f64, usize)> = gains.filter(|(gain, _)| *gain > 0.0).collect();
-        order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut order: Vec<Candidate> = (group.into_iter())
+            .map(candidate)
+            .filter(|candidate| candidate.gain > 0.0)
+            .collect();
+        order.sort_by(|a, b| b.gain.total_cmp(&a.gain).then(a.face.cmp(&b.face)));
+        let is_inferred = |curve: &CurveIndex| matches!(curve, CurveIndex::Smooth(_));
         Self {
-            faces,
             beside,
             order,
             taken: BTreeSet::new(),
-            count: BTreeMap::new(),
+            curves: (known.iter())
+                .map(|curve| (is_inferred(curve), 0))
+                .collect(),
             best: (0.0, Vec::new()),
             states: 0,
         }
     }
 
     fn best(mut self) -> Vec<usize> {
-        let left = self.order.iter().map(|(gain, _)| gain).sum();
-        self.descend(0, 0.0, left);
+        self.descend(0, 0.0);
         self.best.1
     }
 
-    /// Decides on the faces from the `next` one on, which win `left` at most, after `won`.
-    fn descend(&mut self, next: usize, won: f64, left: f64) {
+    /// Decides on the faces from the `next` one on, after `won`.
+    fn descend(&mut self, next: usize, won: f64) {
         if won > self.best.0 {
             self.best = (won, self.taken.iter().copied().collect());
         }
         self.states += 1;
-        if next == self.order.len() || won + left <= self.best.0 || self.states > MOST_STATES {
+        if next == self.order.len() || self.states > MOST_STATES {
             return;
         }
-        let (gain, face) = self.order[next];
-        if let Some(cost) = self.cost_beside_taken(face) {
+        if won + self.most_of_rest(next) <= self.best.0 {
+            return;
+        }
+        let Candidate { face, gain, .. } = self.order[next];
+        if let Some(cost) = self.cost_beside_taken(&self.order[next]) {
+            let cost = cost + self.cost_of_first(&self.order[next]);
             self.taken.insert(face);
-            self.add(face, 1);
-            self.descend(next + 1, won + gain - cost, left - gain);
-            self.add(face, -1);
+            self.add(next, 1);
+            self.descend(next + 1, won + gain - cost);
+            self.add(next, -1);
             self.taken.remove(&face);
         }
-        self.descend(next + 1, won, left - gain);
+        self.descend(next + 1, won);
     }
 
-    fn add(&mut self, face: usize, by: isize) {
-        for step in self.faces[face].steps() {
-            let count = self.count.entry(step.curve).or_default();
+    fn add(&mut self, candidate: usize, by: isize) {
+        for curve in &self.order[candidate].curves {
+            let (_, count) = &mut self.curves[*curve];
             *count = count.saturating_add_signed(by);
         }
     }
 
+    /// What the faces from the `next` one on win at most: each curve by the faces that it lacks,
+    /// of those that can be taken still the ones that cost least.
+    fn most_of_rest(&self, next: usize) -> f64 {
+        let mut won_by = vec![[0.0_f64; 2]; self.curves.len()];
+        for candidate in &self.order[next..] {
+            let Some(cost) = self.cost_beside_taken(candidate) else {
+                continue;
+            };
+            let won = (candidate.gain - cost) / candidate.curves.len() as f64;
+            for curve in &candidate.curves {
+                let [first, second] = &mut won_by[*curve];
+                *second = second.max(won.min(*first));
+                *first = first.max(won);
+            }
+        }
+        let of_curve =
+            |((is_inferred, count), [first, second]): (&(bool, usize), &[f64; 2])| match count {
+                // An inferred line wins nothing before it has both.
+                0 if *is_inferred => 0.0,
+                0 => first + second,
+                1 => *first,
+                _ => 0.0,
+            };
+        self.curves.iter().zip(&won_by).map(of_curve).sum()
+    }
+
     /// What the faces that are taken make a further one cost; `None` if they exclude it.
-    fn cost_beside_taken(&self, face: usize) -> Option<f64> {
-        let full = |step: &Step| self.count.get(&step.curve).is_some_and(|count| *count > 1);
-        if self.faces[face].steps().any(full) {
+    fn cost_beside_taken(&self, candidate: &Candidate) -> Option<f64> {
+        let is_full = |curve: &usize| self.curves[*curve].1 > 1;
+        if candidate.curves.iter().any(is_full) {
             return None;
         }
-        let beside = self.beside[face]
-            .iter()
-            .filter(|(other, _)| self.taken.contains(other));
-        let cost: Option<f64> = beside.map(|(_, pair)| pair.cost()).sum();
-        // A line is inferred for the first face, which wins nothing by it and lacks the other.
-        let is_first = |step: &&Step| {
-            matches!(step.curve, CurveIndex::Smooth(_))
-                && self.count.get(&step.curve).is_none_or(|count| *count == 0)
-        };
-        let inferred = self.faces[face].steps().filter(is_first).count();
-        cost.map(|cost| cost + 2.0 * MISSING_FACE * inferred as f64)
+        let beside =
+            (self.beside[candidate.face].iter()).filter(|(other, _)| self.taken.contains(other));
+        beside.map(|(_, pair)| pair.cost()).sum()
+    }
+
+    /// A line is inferred for the first face, which wins nothing by it and lacks the other.
+    fn cost_of_first(&self, candidate: &Candidate) -> f64 {
+        let is_first = |curve: &&usize| self.curves[**curve] == (true, 0);
+        2.0 * MISSING_FACE * candidate.curves.iter().filter(is_first).count() as f64
     }
 }
