@@ -8,8 +8,8 @@ OUT is the folder that
     cargo run --release -p neat-export --example export_all -- WIREFRAME.json OUT
 
 has filled. Every format must hold as many vertices and edges as WIREFRAME.json, the
-same edges, and the same coordinates to 1e-6 of the wireframe's extent; and its arcs, as
-arcs or as chains of straight pieces, where the format has them. Closed shells must be valid
+same edges, and the same coordinates to 1e-6 of the wireframe's extent; and its arcs and splines,
+as such or as chains of straight pieces, where the format has them. Closed shells must be valid
 solids in STEP and CityJSON and watertight triangles elsewhere, of the volume that their loops
 enclose; surfaces in CityJSON are what their normals say, and those of the house what it has.
 Prints a line per file; the exit code is 1 if one differs. Needs scripts/requirements-readers.txt.
@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 TOLERANCE = 1e-6
-# Pieces of arcs that are drawn as chains turn by no more, in radians.
+# Pieces of arcs and splines that are drawn as chains turn by no more, in radians.
 TURN = 0.089
 SCHEMA = Path(__file__).resolve().parent.parent / "docs" / "wireframe.schema.json"
 
@@ -55,20 +55,61 @@ class Arc:
         return self.points(np.arange(count if self.is_closed else count + 1) / count)
 
 
-class Wireframe:
-    """Vertices [V, 3], index pairs [E, 2], arcs and shells."""
+class Spline:
+    """A uniform cubic B-spline, as wireframe.json has it."""
 
-    def __init__(self, vertices, edges, arcs=(), shells=(), name=None):
+    def __init__(self, controls, closed):
+        self.controls, self.is_closed = np.asarray(controls, dtype=float), closed
+        count = len(controls)
+        self.pieces = count if closed else count - 3
+        self.knots = np.arange(-3, self.pieces + 4)
+        if closed:
+            self.around = self.controls[np.arange(count + 3) % count]
+        else:
+            self.around, self.knots = self.controls, self.knots.clip(0, self.pieces)
+
+    def points(self, places):
+        """At these places from 0 to the number of pieces, [N, 3], by de Boor's algorithm."""
+        def point(place):
+            piece = min(int(place), self.pieces - 1)
+            points = list(self.around[piece:piece + 4])
+            for level in (1, 2, 3):
+                for k in range(3, level - 1, -1):
+                    low, high = self.knots[piece + k], self.knots[piece + k + 4 - level]
+                    share = (place - low) / (high - low)
+                    points[k] = (1 - share) * points[k - 1] + share * points[k]
+            return points[3]
+
+        return np.array([point(place) for place in places])
+
+    def chain(self):
+        """Points of the straight pieces that draw it."""
+        places = [0.0]
+        for piece in range(self.pieces):
+            a, b, c, d = self.points(piece + np.arange(4) / 3)
+            inner = [(-5 * a + 18 * b - 9 * c + 2 * d) / 6, (2 * a - 9 * b + 18 * c - 5 * d) / 6]
+            legs = np.diff([a, *inner, d], axis=0)
+            legs /= np.linalg.norm(legs, axis=-1, keepdims=True)
+            turn = np.arccos((legs[1:] * legs[:-1]).sum(axis=-1)).sum()
+            count = min(max(math.ceil(turn / TURN), 1), 64)
+            places += (piece + np.arange(1, count + 1) / count).tolist()
+        return self.points(places[:-1] if self.is_closed else places)
+
+
+class Wireframe:
+    """Vertices [V, 3], index pairs [E, 2], arcs, splines and shells."""
+
+    def __init__(self, vertices, edges, arcs=(), shells=(), name=None, splines=()):
         self.vertices = np.asarray(vertices, dtype=float).reshape(-1, 3)
         self.edges = np.asarray(edges, dtype=int).reshape(-1, 2)
-        self.arcs, self.shells, self.name = arcs, shells, name
+        self.arcs, self.splines, self.shells, self.name = arcs, splines, shells, name
 
     def drawn(self):
-        """With arcs as chains of straight pieces, for formats without curves."""
+        """With arcs and splines as chains of straight pieces, for formats without curves."""
         vertices, edges = self.vertices, self.edges
-        for arc in self.arcs:
-            points = arc.chain()
-            start = np.arange(len(points) if arc.is_closed else len(points) - 1)
+        for curve in [*self.arcs, *self.splines]:
+            points = curve.chain()
+            start = np.arange(len(points) if curve.is_closed else len(points) - 1)
             pieces = np.stack([start, (start + 1) % len(points)], axis=-1)
             edges = np.concatenate([edges, len(vertices) + pieces])
             vertices = np.concatenate([vertices, points])
@@ -89,15 +130,17 @@ class Wireframe:
         new_index = {old: new for new, old in enumerate(kept)}
         pairs = [[new_index[a], new_index[b]]
                  for i, (a, b) in enumerate(self.edges.tolist()) if i not in set(edges)]
-        return Wireframe(self.vertices[kept], pairs, self.arcs)
+        return Wireframe(self.vertices[kept], pairs, self.arcs, splines=self.splines)
 
     def without_faces(self):
         """What bounds no face."""
         steps = [step for shell in self.shells for face in shell["faces"]
                  for loop in face["loops"] for step in loop]
-        edges, arcs = ({step[kind] for step in steps if kind in step} for kind in ("edge", "arc"))
+        edges, arcs, splines = ({step[kind] for step in steps if kind in step}
+                                for kind in ("edge", "arc", "spline"))
         loose = Wireframe(self.vertices, self.edges,
-                          [arc for i, arc in enumerate(self.arcs) if i not in arcs])
+                          [arc for i, arc in enumerate(self.arcs) if i not in arcs],
+                          splines=[s for i, s in enumerate(self.splines) if i not in splines])
         return loose.without(edges=edges)
 
 
@@ -130,10 +173,14 @@ def volume(shell, wireframe):
 
 
 def area_of_step(step, wireframe):
-    """Half the integral of x × dx along an edge or an arc."""
+    """Half the integral of x × dx along an edge, an arc or a spline."""
     sign = -0.5 if step.get("reversed") else 0.5
     if "edge" in step:
         return sign * np.cross(*wireframe.vertices[wireframe.edges[step["edge"]]])
+    if "spline" in step:
+        spline = wireframe.splines[step["spline"]]
+        points = spline.points(np.linspace(0, spline.pieces, 100 * spline.pieces + 1))
+        return sign * np.cross(points[:-1], points[1:]).sum(axis=0)
     arc = wireframe.arcs[step["arc"]]
     start, end = arc.points([0.0, 1.0])
     swept = arc.radius**2 * arc.sweep * np.cross(*arc.axes)
@@ -206,6 +253,16 @@ def same_arcs(found, expected):
             check_close(points, arc.points([0.0, 0.5, 1.0]), expected.extent(), "points of an arc")
 
 
+def same_splines(found, expected):
+    """Points [N, 3] of splines in their order, at places evenly from end to end."""
+    check(len(found) == len(expected.splines),
+          f"{len(found)} splines, not {len(expected.splines)}")
+    for spline, points in zip(expected.splines, found):
+        places = np.linspace(0, spline.pieces, len(points))
+        check_close(np.asarray(points), spline.points(places), expected.extent(),
+                    "points of a spline")
+
+
 def read_json(path, expected):
     import jsonschema
 
@@ -216,7 +273,8 @@ def read_json(path, expected):
     for broken in ({}, {"junctions": [[0, 0]], "edges": []},
                    {"junctions": [], "edges": [[0, -1]]},
                    dict(document, views=[1]), dict(document, junction_covariances=[[0] * 5]),
-                   dict(document, arcs=[{"center": [0, 0, 0], "radius": 1}])):
+                   dict(document, arcs=[{"center": [0, 0, 0], "radius": 1}]),
+                   dict(document, splines=[{"controls": [[0, 0, 0]] * 3, "closed": False}])):
         check(not jsonschema.Draft202012Validator(schema).is_valid(broken),
               f"the schema accepts {str(broken)[:80]}")
     same_graph(Wireframe(document["junctions"], document["edges"]), expected)
@@ -329,7 +387,7 @@ def read_dxf(path, expected):
           f"ezdxf finds {auditor.errors} and fixes {auditor.fixes}")
     space = dxf.modelspace()
     layers = {layer.dxf.name for layer in dxf.layers}
-    check({"JUNCTIONS", "ARCS", "CONFIDENCE_HIGH", "CONFIDENCE_MEDIUM", "CONFIDENCE_LOW",
+    check({"JUNCTIONS", "ARCS", "SPLINES", "CONFIDENCE_HIGH", "CONFIDENCE_MEDIUM", "CONFIDENCE_LOW",
            "CONFIDENCE_UNKNOWN"} <= layers, f"layers {layers}")
     check({entity.dxf.layer for entity in space} <= layers, "an entity on no layer")
     same_lines([[line.dxf.start, line.dxf.end] for line in space.query("LINE")],
@@ -344,6 +402,10 @@ def read_dxf(path, expected):
         center = list(arc.ocs().to_wcs(arc.dxf.center))
         arcs.append((points, (center, list(arc.dxf.extrusion), arc.dxf.radius)))
     same_arcs(arcs, expected)
+    for spline, polyline in zip(expected.splines, space.query("POLYLINE"), strict=True):
+        check(polyline.is_3d_polyline and polyline.is_closed == spline.is_closed, "flags")
+        check_close(np.array([list(point) for point in polyline.points()]), spline.chain(),
+                    expected.extent(), "points of a spline")
     points = [point.dxf.location for point in space.query("POINT")]
     same_graph(Wireframe([list(point) for point in points], expected.edges), expected)
     return "ezdxf, audit clean"
@@ -378,6 +440,7 @@ def check_shells(shape, parts, expected):
 def read_step(path, expected):
     from OCP.BRep import BRep_Tool
     from OCP.BRepAdaptor import BRepAdaptor_Curve
+    from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.GeomAbs import GeomAbs_CurveType
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.STEPControl import STEPControl_Reader
@@ -403,7 +466,7 @@ def read_step(path, expected):
     flat = [i for i, length in enumerate(lengths) if length == 0.0]
     expected = expected.without(edges=flat)
     expected = expected.without(vertices=expected.isolated())
-    if len(expected.edges) + len(expected.arcs) == 0:
+    if len(expected.edges) + len(expected.arcs) + len(expected.splines) == 0:
         return "Open CASCADE"
 
     vertex_kind, edge_kind = TopAbs_ShapeEnum.TopAbs_VERTEX, TopAbs_ShapeEnum.TopAbs_EDGE
@@ -423,13 +486,19 @@ def read_step(path, expected):
         return len(vertices) - 1
 
     as_edge = getattr(TopoDS, "Edge_s", None) or TopoDS.Edge
-    edges, arcs = [], []
+    edges, arcs, splines = [], [], []
     for edge in parts(shape, edge_kind, TopAbs_ShapeEnum.TopAbs_FACE):
         curve = BRepAdaptor_Curve(as_edge(edge))
-        if curve.GetType() != GeomAbs_CurveType.GeomAbs_Circle:
+        if curve.GetType() == GeomAbs_CurveType.GeomAbs_Line:
             edges.append([index(vertex) for vertex in parts(edge, vertex_kind)])
             continue
         first, last = curve.FirstParameter(), curve.LastParameter()
+        if curve.GetType() == GeomAbs_CurveType.GeomAbs_BSplineCurve:
+            check(BRepCheck_Analyzer(edge).IsValid(), "Open CASCADE finds a spline not valid")
+            ends = list(parts(edge, vertex_kind))
+            splines.append(([curve.Value(x) for x in np.linspace(first, last, 101)],
+                            ends[0].IsSame(ends[-1])))
+            continue
         points = [curve.Value(first + share * (last - first)) for share in (0.0, 0.5, 1.0)]
         axis = curve.Circle().Axis()
         center, normal = axis.Location(), axis.Direction()
@@ -437,6 +506,9 @@ def read_step(path, expected):
                      ([center.X(), center.Y(), center.Z()], [normal.X(), normal.Y(), normal.Z()],
                       curve.Circle().Radius())))
     same_arcs(arcs, expected)
+    same_splines([[[p.X(), p.Y(), p.Z()] for p in points] for points, _ in splines], expected)
+    check([closed for _, closed in splines] == [spline.is_closed for spline in expected.splines],
+          "splines that run around have one vertex, others two")
     found = Wireframe(vertices, edges)
     check(len(vertices) == len(expected.vertices),
           f"{len(vertices)} vertices, not {len(expected.vertices)}")
@@ -476,7 +548,7 @@ def read_svg(path, expected):
 
     # Ends and the middle of each elliptical piece lie on the arc as one looks at it; pieces that
     # are thinner than a hundredth of a pixel are straight.
-    paths = list(root.iter(space + "path"))
+    paths = [path for path in root.iter(space + "path") if "data-arc" in path.attrib]
     check(len(paths) == len(expected.arcs), "number of arcs")
     for arc, element in zip(expected.arcs, paths):
         segments = [s for s in SvgPath(element.attrib["d"]) if type(s).__name__ in ("Arc", "Line")]
@@ -488,6 +560,14 @@ def read_svg(path, expected):
             off = np.linalg.norm(dense - point, axis=-1).min()
             check(off < 0.02 / numbers["scale"][0] + 1e-4 * arc.radius,
                   f"arc {element.attrib['data-arc']} passes {off} beside itself")
+    paths = [path for path in root.iter(space + "path") if "data-spline" in path.attrib]
+    for spline, element in zip(expected.splines, paths, strict=True):
+        pieces = [s for s in SvgPath(element.attrib["d"]) if type(s).__name__ == "CubicBezier"]
+        check(len(pieces) == spline.pieces, "number of cubic pieces")
+        shares = np.linspace(0.0, 1.0, 11)
+        points = [in_units(*piece.point(share)) for piece in pieces for share in shares]
+        places = [piece + share for piece in range(spline.pieces) for share in shares]
+        check_close(np.stack(points), spline.points(places) @ axes.T, expected.extent(), "a spline")
     return "ElementTree and svgelements"
 
 
@@ -514,7 +594,8 @@ def read_geojson(path, expected):
     check(collection["type"] == "FeatureCollection", "type")
     features = collection["features"]
     drawn = [f for f in features if f["geometry"]["type"] == "LineString"]
-    lines = [f for f in drawn if "arc" not in f["properties"]]
+    lines = [f for f in drawn if "edge" in f["properties"]]
+    splines = [f for f in drawn if "spline" in f["properties"]]
     arcs = [f for f in drawn if "arc" in f["properties"]]
     for arc, feature in zip(expected.arcs, arcs, strict=True):
         found = np.asarray(feature["geometry"]["coordinates"])
@@ -523,6 +604,14 @@ def read_geojson(path, expected):
             chain = np.concatenate([chain, chain[:1]])
         check_close(found, chain, expected.extent(), "points of an arc")
         check(feature["properties"]["radius"] == arc.radius, "radius")
+    for spline, feature in zip(expected.splines, splines, strict=True):
+        chain = spline.chain()
+        if spline.is_closed:
+            chain = np.concatenate([chain, chain[:1]])
+        check_close(np.asarray(feature["geometry"]["coordinates"]), chain, expected.extent(),
+                    "points of a spline")
+        check(feature["properties"]["controls"] == spline.controls.tolist(), "control points")
+    check(len(lines) + len(arcs) + len(splines) == len(drawn), "other lines")
     points = [f for f in features if f["geometry"]["type"] == "Point"]
     check(len(drawn) + len(points) == len(features), "other features")
     same_lines([line["geometry"]["coordinates"] for line in lines],
@@ -603,6 +692,10 @@ def read_npz(path, expected):
                                              arrays["arc_radii"], arrays["arc_angles"])]
     same_arcs([(arc.points([0.0, 0.5, 1.0]), (arc.center, np.cross(*arc.axes), arc.radius))
                for arc in arcs], expected)
+    controls = np.split(arrays["spline_controls"], np.cumsum(arrays["spline_sizes"])[:-1])
+    for spline, points, closed in zip(expected.splines, controls, arrays["spline_closed"]):
+        check(np.array_equal(points, spline.controls) and closed == spline.is_closed, "a spline")
+    check(len(arrays["spline_closed"]) == len(expected.splines), "number of splines")
     return "numpy"
 
 
@@ -637,7 +730,8 @@ def main(arguments):
     directory = Path(arguments[1])
     expected = Wireframe(truth["junctions"], truth.get("edges", truth.get("lines", [])),
                          [Arc(**arc) for arc in truth.get("arcs", [])], truth.get("shells", []),
-                         truth.get("metadata", {}).get("scene"))
+                         truth.get("metadata", {}).get("scene"),
+                         [Spline(**spline) for spline in truth.get("splines", [])])
     readers = [("wireframe.json", read_json), ("wireframe.obj", read_obj),
                ("wireframe.ply", read_ply), ("wireframe.gltf", read_gltf),
                ("wireframe.glb", read_gltf), ("wireframe.dxf", read_dxf),
@@ -655,7 +749,7 @@ def main(arguments):
             failed += 1
             print(f"{name}: FAILED: {type(error).__name__}: {error}")
     print(f"{len(expected.vertices)} vertices, {len(expected.edges)} edges, "
-          f"{len(expected.arcs)} arcs: "
+          f"{len(expected.arcs)} arcs, {len(expected.splines)} splines: "
           f"{len(readers) - failed} of {len(readers)} files agree")
     return 1 if failed else 0
 

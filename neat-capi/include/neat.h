@@ -143,6 +143,15 @@ typedef struct {
     // The upper triangle of the covariance of each arc's centre x, y, z and radius, row by row:
     // ten numbers in squared units; NaN where the views do not tell.
     const double *arc_covariances;
+    // How many smooth curves there are beside edges and arcs: uniform cubic B-splines.
+    size_t spline_count;
+    // x, y, z of the control points of one spline after the other. An open one begins at its
+    // first and ends at its last.
+    const double *spline_controls;
+    // How many control points each spline has.
+    const uint32_t *spline_sizes;
+    // 1 for a spline that runs around, else 0.
+    const uint8_t *spline_closed;
 } NeatView;
 
 #ifdef __cplusplus

@@ -311,6 +311,10 @@ fn view_of(numbers: &Numbers, size: u32) -> NeatView {
         arc_count: numbers.arcs.len() / 12,
         arcs: list(&numbers.arcs),
         arc_covariances: list(&numbers.arc_covariances),
+        spline_count: numbers.spline_sizes.len(),
+        spline_controls: list(&numbers.spline_controls),
+        spline_sizes: list(&numbers.spline_sizes),
+        spline_closed: list(&numbers.spline_closed),
     }
 }
 

@@ -23,6 +23,12 @@ pub struct Numbers {
     pub arcs: Vec<f64>,
     /// Ten numbers per arc; NaN where it is not determined.
     pub arc_covariances: Vec<f64>,
+    /// x, y, z of the control points of one spline after the other.
+    pub spline_controls: Vec<f64>,
+    /// How many control points each spline has.
+    pub spline_sizes: Vec<u32>,
+    /// 1 for a spline that runs around, else 0.
+    pub spline_closed: Vec<u8>,
 }
 
 impl Numbers {
@@ -70,6 +76,17 @@ impl Numbers {
             arc_covariances: (document.arc_covariances.iter())
                 .flat_map(|known| known.unwrap_or([f64::NAN; 10]))
                 .collect(),
+            spline_controls: (document.splines.iter())
+                .flat_map(|spline| &spline.controls)
+                .flatten()
+                .copied()
+                .collect(),
+            spline_sizes: (document.splines.iter())
+                .map(|spline| spline.controls.len() as u32)
+                .collect(),
+            spline_closed: (document.splines.iter())
+                .map(|spline| u8::from(spline.closed))
+                .collect(),
         }
     }
 }
@@ -104,7 +121,11 @@ mod tests {
                 {"center": [1, 2, 3], "axes": [[1, 0, 0], [0, 1, 0]], "radius": 4, "angles": [0, 2]},
                 {"center": [0, 0, 0], "axes": [[0, 1, 0], [0, 0, 1]], "radius": 1, "angles": [1, 3]}
             ],
-            "arc_covariances": [[1, 2, 3, 4, 5, 6, 7, 8, 9, 10], null]
+            "arc_covariances": [[1, 2, 3, 4, 5, 6, 7, 8, 9, 10], null],
+            "splines": [
+                {"controls": [[0, 0, 0], [1, 0, 0], [1, 2, 0], [0, 2, 3]], "closed": false},
+                {"controls": [[4, 5, 6], [1, 0, 0], [1, 1, 0]], "closed": true}
+            ]
         }"#;
         let numbers = Numbers::of(&parse_json(text, Path::new("a.json")).unwrap());
         assert_eq!(
@@ -121,6 +142,12 @@ mod tests {
         assert_eq!((numbers.arcs.len(), &numbers.arcs[..12]), (24, &first[..]));
         assert_eq!(numbers.arc_covariances[9], 10.0);
         assert!(numbers.arc_covariances[10..].iter().all(|x| x.is_nan()));
+        assert_eq!(
+            numbers.spline_controls[9..15],
+            [0.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+        );
+        assert_eq!(numbers.spline_sizes, [4, 3]);
+        assert_eq!(numbers.spline_closed, [0, 1]);
         assert_eq!(numbers.kinds, [0.25, 0.25, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0]);
     }
 

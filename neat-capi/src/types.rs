@@ -131,6 +131,15 @@ pub struct NeatView {
     /// The upper triangle of the covariance of each arc's centre x, y, z and radius, row by row:
     /// ten numbers in squared units; NaN where the views do not tell.
     pub arc_covariances: *const f64,
+    /// How many smooth curves there are beside edges and arcs: uniform cubic B-splines.
+    pub spline_count: usize,
+    /// x, y, z of the control points of one spline after the other. An open one begins at its
+    /// first and ends at its last.
+    pub spline_controls: *const f64,
+    /// How many control points each spline has.
+    pub spline_sizes: *const u32,
+    /// 1 for a spline that runs around, else 0.
+    pub spline_closed: *const u8,
 }
 
 /// A wireframe: see `neat_wireframe_view` and `neat_wireframe_free`.

@@ -1,7 +1,7 @@
 //! What is evaluated: straight edges, and curves where a method finds them.
 
 use nalgebra::Vector3;
-use neat_core::{CircularArc, LineSegment3, Wireframe3d};
+use neat_core::{CircularArc, LineSegment3, Spline, Wireframe3d};
 use std::f64::consts::FRAC_PI_4;
 
 /// Edges that some method found.
@@ -42,6 +42,12 @@ impl CubicBezier {
                 }
             })
             .collect()
+    }
+
+    /// The curves that a spline consists of.
+    pub fn of_spline(spline: &Spline) -> Vec<Self> {
+        let of_piece = |control_points| Self { control_points };
+        spline.beziers().into_iter().map(of_piece).collect()
     }
 
     /// The point at parameter `t`: 0 is the start, 1 the end.
@@ -126,6 +132,27 @@ mod tests {
                     assert!(arc.contains(arc.angle_of(&point), 1e-9));
                 }
             }
+        }
+    }
+
+    #[test]
+    fn curves_of_a_spline_are_its_pieces() {
+        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 3.0], [0.0, 1.0]];
+        for closed in [false, true] {
+            let spline = Spline {
+                controls: corners.map(|[x, y]| Vector3::new(x, y, x * y)).to_vec(),
+                closed,
+            };
+            let curves = CubicBezier::of_spline(&spline);
+            assert_eq!(curves.len(), spline.pieces());
+            for (piece, curve) in curves.iter().enumerate() {
+                for share in [0.0, 0.3, 1.0] {
+                    let point = spline.point_at(piece as f64 + share);
+                    assert!((curve.point_at(share) - point).norm() < 1e-12);
+                }
+            }
+            let length: f64 = curves.iter().map(CubicBezier::length).sum();
+            assert!((length - spline.length()).abs() < 1e-3);
         }
     }
 

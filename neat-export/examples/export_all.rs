@@ -44,8 +44,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let report = |name: &str, format, options: &ExportOptions| {
         let written = export(&document, &out.join(name), format, options)?;
         println!(
-            "{name}: {} junctions, {} edges, {} arcs",
-            written.junctions, written.edges, written.arcs
+            "{name}: {} junctions, {} edges, {} arcs, {} splines",
+            written.junctions, written.edges, written.arcs, written.splines
         );
         for sentence in written.remarks {
             println!("  {sentence}");

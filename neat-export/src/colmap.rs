@@ -29,7 +29,7 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
             .iter()
             .try_for_each(|(name, text)| file::write_atomically(&dir.join(name), text.as_bytes()))
     })?;
-    to.leave_out_arcs("lines3D.txt has pairs of junctions and no arcs");
+    to.leave_out_curves("lines3D.txt has pairs of junctions");
     to.written.files = files.iter().map(|(name, _)| dir.join(name)).collect();
     Ok(())
 }

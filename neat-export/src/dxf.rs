@@ -1,4 +1,5 @@
-//! DXF of AutoCAD Release 12: `LINE` entities on layers by confidence, and `ARC`s and `CIRCLE`s.
+//! DXF of AutoCAD Release 12: `LINE` entities on layers by confidence, `ARC`s and `CIRCLE`s,
+//! and splines as `POLYLINE`s, as this version has no others.
 //!
 //! Release 12 is the version that every CAD program reads. It states no unit and
 //! shares no vertices; lines that meet have the same numbers at their ends, and all
@@ -13,8 +14,17 @@ use std::fmt::{Display, Write};
 
 /// Layer of the junctions …
 const JUNCTIONS: &str = "JUNCTIONS";
-/// … and of the arcs, whose confidence nobody knows.
+/// … and of the arcs, whose confidence nobody knows …
 const ARCS: &str = "ARCS";
+/// … and of the splines, likewise.
+const SPLINES: &str = "SPLINES";
+
+/// A flag of a polyline: its last vertex is joined to its first …
+const CLOSED: u32 = 1;
+/// … and that it is one in space.
+const IN_SPACE: u32 = 8;
+/// The flag of a vertex of a polyline in space.
+const VERTEX_IN_SPACE: u32 = 32;
 
 /// Writes a DXF file.
 pub fn write(to: &mut Target) -> Result<(), ExportError> {
@@ -37,10 +47,11 @@ fn text(document: &WireframeDocument) -> String {
             dxf.group(73, 0);
             dxf.number(40, 0.0);
         });
-        dxf.table("LAYER", Confidence::ALL.len() + 3, |dxf| {
+        dxf.table("LAYER", Confidence::ALL.len() + 4, |dxf| {
             dxf.layer("0", 7);
             dxf.layer(JUNCTIONS, 8);
             dxf.layer(ARCS, 3);
+            dxf.layer(SPLINES, 3);
             for class in Confidence::ALL {
                 dxf.layer(layer(class), color_number(class));
             }
@@ -55,6 +66,9 @@ fn text(document: &WireframeDocument) -> String {
         }
         for arc in &document.arcs {
             dxf.arc(arc);
+        }
+        for spline in &document.splines {
+            dxf.polyline(spline.points(WireframeDocument::TURN_OF_DRAWN_ARCS));
         }
         for junction in &document.junctions {
             dxf.group(0, "POINT");
@@ -133,6 +147,27 @@ impl Dxf {
             }
         }
         self.point(210, &normal);
+    }
+
+    /// Points along a spline; the first and the last of a closed one are the same.
+    fn polyline(&mut self, mut points: Vec<Vector3<f64>>) {
+        let closed = points.first() == points.last();
+        if closed {
+            points.pop();
+        }
+        self.group(0, "POLYLINE");
+        self.group(8, SPLINES);
+        self.group(66, 1);
+        self.point(10, &Vector3::zeros());
+        self.group(70, if closed { IN_SPACE | CLOSED } else { IN_SPACE });
+        for point in &points {
+            self.group(0, "VERTEX");
+            self.group(8, SPLINES);
+            self.point(10, point);
+            self.group(70, VERTEX_IN_SPACE);
+        }
+        self.group(0, "SEQEND");
+        self.group(8, SPLINES);
     }
 
     fn layer(&mut self, name: &str, color: u8) {

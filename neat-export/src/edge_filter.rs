@@ -40,8 +40,8 @@ impl EdgeFilter {
 
     /// The document with the edges that pass, in their order, and the junctions
     /// that they join. Fields, covariances and support follow; the metadata say
-    /// what was asked for. Arcs all stay: nothing is known of them that a filter asks. Faces go
-    /// with their edges, and a shell that loses one is a sheet. Without any
+    /// what was asked for. Arcs and splines all stay: nothing is known of them that a filter asks.
+    /// Faces go with their edges, and a shell that loses one is a sheet. Without any
     /// minimum, the document as it is, junctions without edges too.
     ///
     /// The document must be valid, see [`WireframeDocument::check`].
@@ -117,6 +117,7 @@ fn with_edges(document: &WireframeDocument, passes: &[bool]) -> WireframeDocumen
     let new_junction = |junction: usize| joined[junction].then_some(new_index[junction]);
     WireframeDocument {
         arcs: document.arcs.clone(),
+        splines: document.splines.clone(),
         shells: (document.shells.iter())
             .filter_map(|shell| shell.with_indices(new_edge, new_junction))
             .collect(),

@@ -33,12 +33,20 @@ pub fn export(
             junctions: document.junctions.len(),
             edges: document.edges.len(),
             arcs: document.arcs.len(),
+            splines: document.splines.len(),
             remarks: Vec::new(),
         },
     };
-    if options.filter != EdgeFilter::default() && !document.arcs.is_empty() {
-        let sentence = "arcs have neither a probability nor a kind, so the filter leaves out none";
-        target.written.remarks.push(sentence.to_owned());
+    let counts = [
+        (document.arcs.len(), "arcs"),
+        (document.splines.len(), "splines"),
+    ];
+    for (_, what) in counts.iter().filter(|(count, _)| *count > 0) {
+        if options.filter != EdgeFilter::default() {
+            target.written.remarks.push(format!(
+                "{what} have neither a probability nor a kind, so the filter leaves out none"
+            ));
+        }
     }
     format.write(&mut target)?;
     if !format.holds_faces() {

@@ -1,5 +1,5 @@
-//! GeoJSON (RFC 7946): a `LineString` with z per edge and one of many points per arc, a `Point`
-//! per junction without edges.
+//! GeoJSON (RFC 7946): a `LineString` with z per edge and one of many points per arc and per
+//! spline, a `Point` per junction without edges.
 //!
 //! The RFC means WGS 84 longitude and latitude. Coordinates are written as they are
 //! in the document instead, which programs accept when told the reference system;
@@ -38,6 +38,16 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
         });
         json!({"type": "Feature", "geometry": line, "properties": properties})
     });
+    let splines = document.splines.iter().enumerate().map(|(index, spline)| {
+        let points = spline.points(WireframeDocument::TURN_OF_DRAWN_ARCS);
+        let line = json!({"type": "LineString", "coordinates": points});
+        let properties = json!({
+            "spline": index,
+            "controls": spline.controls,
+            "closed": spline.closed,
+        });
+        json!({"type": "Feature", "geometry": line, "properties": properties})
+    });
     let isolated = isolated_junctions(document).into_iter().map(|junction| {
         let mut properties = fields(&junction_fields, junction);
         properties.insert("junction".into(), junction.into());
@@ -47,7 +57,7 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
     let collection = json!({
         "type": "FeatureCollection",
         "coordinate_frame": "the frame of the reconstructed scene, not WGS 84",
-        "features": edges.chain(arcs).chain(isolated).collect::<Vec<_>>(),
+        "features": edges.chain(arcs).chain(splines).chain(isolated).collect::<Vec<_>>(),
     });
     to.write(format!("{collection}\n"))
 }

@@ -2,8 +2,8 @@
 //!
 //! Positions are 32-bit numbers from the centre of the wireframe, which is the
 //! translation of the node: coordinates far from the origin keep their accuracy.
-//! Every class of confidence and the arcs, as chains of straight pieces, are a primitive with a
-//! colour of its own, and so are the faces; all use the same positions. Axes and unit are those of the document, although glTF means
+//! Every class of confidence, the arcs and the splines, as chains of straight pieces, are a
+//! primitive each with a material of its own, and so are the faces; all use the same positions. Axes and unit are those of the document, although glTF means
 //! metres with +Y up.
 
 use crate::drawn::Drawn;

@@ -32,7 +32,7 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
     write_image_list(images, &document.views)?;
     write_all_tracks(all, &tracks)?;
     write_track_folder(folder, &tracks)?;
-    to.leave_out_arcs("line tracks are straight and no arcs");
+    to.leave_out_curves("line tracks are straight");
     to.written.files = written.into();
     Ok(())
 }

@@ -1,15 +1,16 @@
-//! SVG 1.1: an orthographic view with a group per class of confidence and one of arcs, which are
-//! elliptical arcs.
+//! SVG 1.1: an orthographic view with a group per class of confidence, one of arcs, which are
+//! elliptical arcs, and one of splines, which are cubic Bézier curves.
 //!
 //! Coordinates are pixels, to a millionth; the attributes `data-scale` and
 //! `data-center` of the root lead back to the units of the document:
 //! right = center₀ + (x − width / 2) / scale, up = center₁ − (y − height / 2) / scale.
 
-use crate::drawn::{ARC_COLOR, ARCS};
-use crate::orthographic::Frame;
+use crate::drawn::{ARCS, CURVE_COLOR, SPLINES};
+use crate::orthographic::{Drawing, Frame};
 use crate::projected_arc::elliptical_path;
 use crate::target::Target;
 use crate::{Confidence, ExportError};
+use neat_core::Spline;
 use std::fmt::Write;
 
 /// Writes an SVG file.
@@ -64,10 +65,18 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
         svg.push_str("</g>\n");
     }
     if !document.arcs.is_empty() {
-        svg.push_str(&group(ARCS, ARCS, ARC_COLOR));
+        svg.push_str(&group(ARCS, ARCS, CURVE_COLOR));
         for (index, arc) in document.arcs.iter().enumerate() {
             let path = elliptical_path(arc, &drawing);
             let _ = writeln!(svg, "<path data-arc=\"{index}\" d=\"{path}\"/>");
+        }
+        svg.push_str("</g>\n");
+    }
+    if !document.splines.is_empty() {
+        svg.push_str(&group(SPLINES, SPLINES, CURVE_COLOR));
+        for (index, spline) in document.splines.iter().enumerate() {
+            let path = cubic_path(spline, &drawing);
+            let _ = writeln!(svg, "<path data-spline=\"{index}\" d=\"{path}\"/>");
         }
         svg.push_str("</g>\n");
     }
@@ -81,6 +90,24 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
     }
     svg.push_str("</g>\n</svg>\n");
     to.write(svg)
+}
+
+/// The commands of a path that draw a spline: parallel projection takes the control points of its
+/// cubic pieces to those of theirs.
+fn cubic_path(spline: &Spline, drawing: &Drawing) -> String {
+    let mut path = String::new();
+    for (piece, controls) in spline.beziers().iter().enumerate() {
+        let [a, b, c, d] = controls.map(|point| drawing.project(&point));
+        if piece == 0 {
+            let _ = write!(path, "M{:.6} {:.6}", a.x, a.y);
+        }
+        let _ = write!(
+            path,
+            "C{:.6} {:.6} {:.6} {:.6} {:.6} {:.6}",
+            b.x, b.y, c.x, c.y, d.x, d.y
+        );
+    }
+    path
 }
 
 /// Text as XML content. What XML 1.0 cannot hold at all becomes U+FFFD.

@@ -17,6 +17,8 @@ pub struct Written {
     pub edges: usize,
     /// Number of arcs in the files; no filter leaves them out.
     pub arcs: usize,
+    /// Number of splines in the files, likewise.
+    pub splines: usize,
     /// What the format has no words for and the files therefore lack, and what no filter could
     /// judge, one sentence each.
     pub remarks: Vec<String>,
@@ -70,10 +72,14 @@ impl Target<'_> {
         }
     }
 
-    /// Says that the format knows no arcs.
-    pub fn leave_out_arcs(&mut self, sentence: &str) {
-        self.leave_out(self.document.arcs.len(), sentence);
-        self.written.arcs = 0;
+    /// Says what the format has instead of arcs and splines.
+    pub fn leave_out_curves(&mut self, what: &str) {
+        self.leave_out(self.document.arcs.len(), &format!("{what} and no arcs"));
+        self.leave_out(
+            self.document.splines.len(),
+            &format!("{what} and no splines"),
+        );
+        (self.written.arcs, self.written.splines) = (0, 0);
     }
 
     /// That the format has no numbers for the extent of the wireframe.

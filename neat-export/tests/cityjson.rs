@@ -49,6 +49,7 @@ fn with_shells(wireframe: &Wireframe3d, covariances: &[Option<Matrix3<f64>>]) ->
     let graph = MeasuredGraph {
         wireframe,
         arcs: &[],
+        splines: &[],
         covariances,
     };
     WireframeDocument {

@@ -34,6 +34,7 @@ fn add_shells(document: &mut WireframeDocument) {
     let graph = MeasuredGraph {
         wireframe: &wireframe,
         arcs: &document.arcs,
+        splines: &[],
         covariances: &[],
     };
     document.shells = find_shells(&graph, &[], &[]);

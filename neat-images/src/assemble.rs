@@ -2,7 +2,7 @@
 
 use crate::distilled::{BackEndReport, Distilled};
 use nalgebra::Matrix4;
-use neat_core::{Camera, CircularArc, EdgelMap, Scene, SceneError, Wireframe3d};
+use neat_core::{Camera, CircularArc, EdgelMap, Scene, SceneError, Spline, Wireframe3d};
 use neat_detect::{DetectorConfig, edgel_maps};
 use neat_wireframe::assemble::{
     AssembleConfig, Assembled, Photographs, Witnesses, assemble_with_progress,
@@ -47,6 +47,8 @@ pub struct Draft {
     pub arcs: Vec<CircularArc>,
     /// How sure their centres and radii are, see [`Assembled::arc_covariances`].
     pub arc_covariances: Vec<Option<Matrix4<f64>>>,
+    /// Smooth curves that are no circles, likewise.
+    pub splines: Vec<Spline>,
     /// What each step kept and removed.
     pub report: BackEndReport,
     /// Edges that are structure with less than this probability are left out.
@@ -104,6 +106,7 @@ impl Draft {
             wireframe: built.wireframe,
             arcs: built.arcs,
             arc_covariances: built.arc_covariances,
+            splines: built.splines,
             report: BackEndReport::Assembler {
                 steps: built.report,
             },
@@ -137,7 +140,12 @@ impl Draft {
             wireframe,
             kinds,
             painted,
-        } = without_paint(&self.wireframe, &self.arcs, &kinds, self.min_structure);
+        } = without_paint(
+            &self.wireframe,
+            (&self.arcs, &self.splines),
+            &kinds,
+            self.min_structure,
+        );
         let mut report = self.report;
         if painted > 0 {
             confidence = assessed(&wireframe)?;
@@ -148,6 +156,7 @@ impl Draft {
         let graph = MeasuredGraph {
             wireframe: &wireframe,
             arcs: &self.arcs,
+            splines: &self.splines,
             covariances: &covariances,
         };
         let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
@@ -158,6 +167,7 @@ impl Draft {
             arcs: self.arcs,
             shells,
             arc_covariances: self.arc_covariances,
+            splines: self.splines,
             confidence,
             kinds,
             report,

@@ -1,8 +1,8 @@
 //! A wireframe with all that is known about it.
 
 use crate::event::{Decision, POSES};
-use nalgebra::Matrix4;
-use neat_core::{Camera, CircularArc, Scene, Wireframe3d};
+use nalgebra::{Matrix4, Vector3};
+use neat_core::{Camera, CircularArc, Scene, Spline, Wireframe3d};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::assemble::AssembleReport;
 use neat_wireframe::confidence::{Confidence, fill_arcs};
@@ -29,7 +29,9 @@ pub struct Distilled {
     pub wireframe: Wireframe3d,
     /// Arcs of circles beside its edges, likewise.
     pub arcs: Vec<CircularArc>,
-    /// Faces between edges and arcs, likewise.
+    /// Smooth curves that are no circles, likewise.
+    pub splines: Vec<Spline>,
+    /// Faces between edges, arcs and splines, likewise.
     pub shells: Vec<Shell>,
     /// How sure the centres and radii of arcs are, see
     /// [`Assembled::arc_covariances`](neat_wireframe::assemble::Assembled::arc_covariances).
@@ -132,6 +134,14 @@ impl BackEndReport {
 }
 
 impl Distilled {
+    /// Points along the arcs and the splines, in the world frame.
+    pub fn drawn_curves(&self) -> Vec<Vec<Vector3<f64>>> {
+        let turn = WireframeDocument::TURN_OF_DRAWN_ARCS;
+        let arcs = self.arcs.iter().map(|arc| arc.points(turn));
+        let splines = self.splines.iter().map(|spline| spline.points(turn));
+        arcs.chain(splines).collect()
+    }
+
     /// The wireframe in the frame of the user's files, with what is known about its
     /// parts; `scene` is the one that it is of.
     pub fn document(&self, scene: &Scene) -> WireframeDocument {
@@ -144,6 +154,9 @@ impl Distilled {
             .collect();
         let (arcs, covariances) = (&self.arcs, &self.arc_covariances);
         fill_arcs(&mut document, arcs, covariances, original_from_world);
+        document.splines = (self.splines.iter())
+            .map(|spline| spline.map(|point| original_from_world.apply(point)))
+            .collect();
         self.confidence
             .fill(&mut document, &names, original_from_world);
         fill_kinds(&mut document, &self.kinds, &junction_types(&self.wireframe));

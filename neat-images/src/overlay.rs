@@ -7,21 +7,16 @@ pub use picture::draw_wireframe;
 
 use image::{Rgb, RgbImage};
 use line_drawing::{Pen, draw_disc, draw_segment};
-use nalgebra::Vector2;
-use neat_core::{
-    Camera, CircularArc, LineSegment2, LineSegment3, SceneError, View, Wireframe2d, Wireframe3d,
-};
-
-use neat_wireframe::export::WireframeDocument;
+use nalgebra::{Vector2, Vector3};
+use neat_core::{Camera, LineSegment2, LineSegment3, SceneError, View, Wireframe2d, Wireframe3d};
 
 /// Line width relative to the larger side of the image.
 const WIDTH_PER_SIZE: f64 = 1.0 / 400.0;
 const SEGMENT_COLOR: [f64; 3] = [255.0, 64.0, 32.0];
 const JUNCTION_COLOR: [f64; 3] = [32.0, 200.0, 255.0];
 
-/// The photograph of a view with the wireframe on it, hidden parts too. The
-/// wireframe is in the world frame of the cameras; what is behind the camera is
-/// cut off.
+/// The photograph of a view with the wireframe on it, and curves by points along each, hidden
+/// parts too. All are in the world frame of the cameras; what is behind the camera is cut off.
 ///
 /// `pixel_center` is [`neat_core::Scene::pixel_center`].
 ///
@@ -30,14 +25,14 @@ const JUNCTION_COLOR: [f64; 3] = [32.0, 200.0, 255.0];
 pub fn draw_overlay(
     view: &View,
     pixel_center: f64,
-    (wireframe, arcs): (&Wireframe3d, &[CircularArc]),
+    (wireframe, curves): (&Wireframe3d, &[Vec<Vector3<f64>>]),
 ) -> Result<RgbImage, SceneError> {
     let photograph = view.image.read()?.into_owned();
     Ok(draw_projected(
         photograph,
         &view.camera,
         pixel_center,
-        (wireframe, arcs),
+        (wireframe, curves),
     ))
 }
 
@@ -47,7 +42,7 @@ pub fn draw_sketch(
     view: &View,
     pixel_center: f64,
     min_segment_score: f64,
-    drawn: (&Wireframe3d, &[CircularArc]),
+    drawn: (&Wireframe3d, &[Vec<Vector3<f64>>]),
 ) -> RgbImage {
     let (width, height) = view.image.dimensions();
     let size = f64::from(width.max(height));
@@ -63,11 +58,11 @@ pub fn draw_sketch(
     draw_projected(image, &view.camera, pixel_center, drawn)
 }
 
-/// All edges, and chords of all arcs.
-fn segments_of(wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Vec<LineSegment3> {
+/// All edges, and chords of all curves, which are given by points along them.
+fn segments_of(wireframe: &Wireframe3d, curves: &[Vec<Vector3<f64>>]) -> Vec<LineSegment3> {
     let mut segments = wireframe.segments();
-    for arc in arcs {
-        segments.extend(arc.chords(WireframeDocument::TURN_OF_DRAWN_ARCS));
+    for ends in curves.iter().flat_map(|curve| curve.windows(2)) {
+        segments.push(LineSegment3::new(ends[0], ends[1]));
     }
     segments
 }
@@ -76,7 +71,7 @@ fn draw_projected(
     mut image: RgbImage,
     camera: &Camera,
     pixel_center: f64,
-    (wireframe, arcs): (&Wireframe3d, &[CircularArc]),
+    (wireframe, curves): (&Wireframe3d, &[Vec<Vector3<f64>>]),
 ) -> RgbImage {
     let size = f64::from(image.width().max(image.height()));
     let radius = (size * WIDTH_PER_SIZE / 2.0 * thinness(wireframe)).max(0.75);
@@ -88,7 +83,7 @@ fn draw_projected(
         color: JUNCTION_COLOR,
         radius: 2.0 * radius,
     };
-    for segment in segments_of(wireframe, arcs) {
+    for segment in segments_of(wireframe, curves) {
         if let Some(segment) = visible_part(&segment, camera, pixel_center) {
             draw_segment(&mut image, &segment, &[line; 2]);
         }

@@ -158,6 +158,7 @@ fn paper(
         wireframe: built.wireframe,
         arcs: Vec::new(),
         arc_covariances: Vec::new(),
+        splines: Vec::new(),
         report: BackEndReport::Paper {
             steps: built.counts,
         },

@@ -165,11 +165,29 @@ impl Wireframe {
         Ok(dict)
     }
 
-    /// Faces between edges and arcs, closed shells first, as the lists and dicts of wireframe.json:
-    /// `closed`, whether it bounds a solid, and `faces`. A face has a `plane` (`normal`, `offset`), a
-    /// `cylinder` (`point`, `axis`, `radius`, `convex`) or a `cone` (`apex`, `axis`, `half_angle`,
-    /// `convex`), and `loops` of steps: an `edge` or `arc` by
-    /// its index, or a `smooth` line by its two junctions, and whether it is `reversed`.
+    /// Smooth curves beside edges and arcs, as arrays by name. Each is a uniform cubic B-spline:
+    /// `controls` (C, 3), the control points of one behind those of the other; `sizes` (S,), how many
+    /// of them are its own; `closed` (S,), whether it runs around. An open one begins at its first
+    /// control point and ends at its last.
+    #[getter]
+    fn splines<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (splines, count) = (&self.document.splines, self.document.splines.len());
+        let controls = splines.iter().flat_map(|spline| &spline.controls);
+        let controls: Vec<f64> = controls.flatten().copied().collect();
+        let sizes = splines.iter().map(|spline| spline.controls.len() as i64);
+        let closed = splines.iter().map(|spline| spline.closed).collect();
+        let dict = PyDict::new(py);
+        dict.set_item("controls", read_only(py, (controls.len() / 3, 3), controls))?;
+        dict.set_item("sizes", read_only(py, count, sizes.collect()))?;
+        dict.set_item("closed", read_only(py, count, closed))?;
+        Ok(dict)
+    }
+
+    /// Faces between edges, arcs and splines, closed shells first, as the lists and dicts of
+    /// wireframe.json: `closed`, whether it bounds a solid, and `faces`. A face has a `plane`
+    /// (`normal`, `offset`), a `cylinder` (`point`, `axis`, `radius`, `convex`) or a `cone` (`apex`,
+    /// `axis`, `half_angle`, `convex`), and `loops` of steps: an `edge`, `arc` or `spline` by its
+    /// index, or a `smooth` line by its two junctions, and whether it is `reversed`.
     #[getter]
     fn shells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         from_json(py, &serde_json::json!(self.document.shells))

@@ -58,6 +58,20 @@ def test_arcs_are_those_of_the_file(tmp_path):
         "covariances": (0, 4, 4)}
 
 
+def test_splines_are_those_of_the_file(tmp_path):
+    points = [[0, 0, 0], [1, 0, 0.5], [1, 2, 0], [0, 2, 1], [-1, 1, 0]]
+    splines = [{"controls": points, "closed": False}, {"controls": points[:3], "closed": True}]
+    path = tmp_path / "wireframe.json"
+    path.write_text(json.dumps({"junctions": [], "edges": [], "splines": splines}))
+    found = neat3d.Wireframe.read(path).splines
+    open_one, closed_one = np.split(found["controls"], np.cumsum(found["sizes"])[:-1])
+    assert open_one.tolist() == points and closed_one.tolist() == points[:3]
+    assert found["closed"].tolist() == [False, True] and found["sizes"].dtype == np.int64
+    none = neat3d.Wireframe([[0, 0, 0], [1, 0, 0]], [[0, 1]]).splines
+    assert {name: array.shape for name, array in none.items()} == {
+        "controls": (0, 3), "sizes": (0,), "closed": (0,)}
+
+
 def test_shells_are_those_of_the_file(tmp_path):
     # A disc: its rim is a circle.
     rim = {"center": [0, 0, 1], "axes": [[1, 0, 0], [0, 1, 0]], "radius": 0.5,

@@ -95,6 +95,7 @@ fn document(data: &SyntheticData) -> WireframeDocument {
     let graph = MeasuredGraph {
         wireframe: &data.truth,
         arcs: &[],
+        splines: &[],
         covariances: &[],
     };
     let shells = find_shells(&graph, &[], &[]);

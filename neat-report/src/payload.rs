@@ -16,7 +16,7 @@ pub(crate) struct Payload<'a> {
     title: &'a str,
     junctions: &'a [Vector3<f64>],
     edges: &'a [[usize; 2]],
-    /// Points along each arc.
+    /// Points along each arc, and behind them along each spline.
     arcs: Vec<Vec<Vector3<f64>>>,
     faces: Vec<FacePayload>,
     junction_fields: &'a JunctionFields,
@@ -37,7 +37,8 @@ pub(crate) struct Payload<'a> {
 struct FacePayload {
     /// That bound it, with those of its holes.
     edges: Vec<usize>,
-    /// Of the junctions, and behind them the points of the arcs: of a whole circle the first once.
+    /// Of the junctions, and behind them the points of the arcs and splines: the first of a closed
+    /// one once.
     triangles: Vec<[usize; 3]>,
 }
 
@@ -93,9 +94,7 @@ impl<'a> Payload<'a> {
             title: &report.title,
             junctions: &document.junctions,
             edges: &document.edges,
-            arcs: (document.arcs.iter())
-                .map(|arc| arc.points(WireframeDocument::TURN_OF_DRAWN_ARCS))
-                .collect(),
+            arcs: document.drawn_curves().collect(),
             faces: faces(document),
             junction_fields: &document.junction_fields,
             edge_fields: &document.edge_fields,
@@ -163,7 +162,7 @@ fn faces(document: &WireframeDocument) -> Vec<FacePayload> {
     let faces = document.shells.iter().flat_map(|shell| &shell.faces);
     let edge = |step: &Step| match step.curve {
         CurveIndex::Edge(edge) => Some(edge),
-        CurveIndex::Arc(_) | CurveIndex::Smooth(_) => None,
+        CurveIndex::Arc(_) | CurveIndex::Spline(_) | CurveIndex::Smooth(_) => None,
     };
     (faces.zip(document.triangles_of_faces()))
         .map(|(face, triangles)| FacePayload {

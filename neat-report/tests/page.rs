@@ -1,6 +1,8 @@
 //! The page is one file that fetches nothing, and texts stay texts.
 
+use nalgebra::Vector3;
 use neat_core::synthetic::{Solid, SyntheticScene, generate};
+use neat_core::{CircularArc, Spline};
 use neat_report::{Curve, FactGroup, JunctionSnapshot, PhotographConfig, Report};
 use proptest::prelude::*;
 
@@ -63,6 +65,27 @@ fn the_data_are_complete() {
     assert_eq!(data["curves"][0]["points"][1][1], serde_json::Value::Null);
     assert_eq!(data["evolution"][0]["step"], 7);
     assert_eq!(data["facts"][0][1][0][1], "3");
+}
+
+#[test]
+fn splines_are_drawn_behind_arcs() {
+    let mut report = small_report();
+    report.document.arcs = vec![CircularArc {
+        center: Vector3::zeros(),
+        axes: [Vector3::x(), Vector3::y()],
+        radius: 1.0,
+        angles: [0.0, 1.0],
+    }];
+    let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+    report.document.splines = vec![Spline {
+        controls: corners.map(|[x, y]| Vector3::new(x, y, 0.0)).to_vec(),
+        closed: true,
+    }];
+    let data = data_of(&report.render().unwrap());
+    let chains: Vec<_> = report.document.drawn_curves().collect();
+    assert_eq!(data["arcs"], serde_json::json!(chains));
+    let closed = data["arcs"][1].as_array().unwrap();
+    assert_eq!(closed.first(), closed.last());
 }
 
 #[test]

@@ -142,6 +142,8 @@ fn a_wireframe_is_read_and_viewed() {
         assert_eq!(view.probabilities.read(), 0.5);
         assert!(view.covariances.is_null() && view.kinds.is_null() && view.curved.is_null());
         assert!(view.arc_count == 0 && view.arcs.is_null() && view.arc_covariances.is_null());
+        assert!(view.spline_count == 0 && view.spline_controls.is_null());
+        assert!(view.spline_sizes.is_null() && view.spline_closed.is_null());
 
         // An earlier header's view ends before `junctions`: nothing is written behind it.
         let mut earlier: NeatView = zeroed();

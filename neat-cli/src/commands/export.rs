@@ -212,12 +212,14 @@ impl ExportArgs {
             output::warning(sentence);
         }
         let (junctions, edges) = (written.junctions, written.edges);
-        let arcs = match written.arcs {
+        let counted = |count: usize, what: &str| match count {
             0 => String::new(),
-            arcs => format!(", {arcs} arcs"),
+            _ => format!(", {count} {what}"),
         };
+        let arcs = counted(written.arcs, "arcs");
+        let splines = counted(written.splines, "splines");
         output::print(&format!(
-            "{format}: {junctions} junctions, {edges} edges{arcs}: {out}",
+            "{format}: {junctions} junctions, {edges} edges{arcs}{splines}: {out}",
             format = format.name(),
             out = out.display()
         ))

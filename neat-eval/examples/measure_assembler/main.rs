@@ -23,7 +23,7 @@ mod calibration_weights;
 mod prepared;
 mod probabilities;
 
-use neat_core::{Camera, CircularArc, Scene, View};
+use neat_core::{Camera, Scene, View};
 use neat_eval::{
     CubicBezier, EdgeModel, EdgePoints, EdgeSampling, EvaluationInput, EvaluationOptions, NeatAbc,
 };
@@ -87,22 +87,23 @@ fn main() -> Result<()> {
         let seconds = start.elapsed().as_secs_f64();
         let original = |p: &_| scene.original_from_world.apply(p);
         let wireframe = built.wireframe.map(original);
-        let arcs: Vec<CircularArc> = built.arcs.iter().map(|arc| arc.map(original)).collect();
+        let mut document = WireframeDocument::from(&wireframe);
+        document.arcs = built.arcs.iter().map(|arc| arc.map(original)).collect();
+        document.splines = built.splines.iter().map(|s| s.map(original)).collect();
         let (text, score) = measured(dir, &scene, &built.wireframe, &wireframe)?;
-        let of_curves = curves(dir, &wireframe, &arcs)?;
+        let of_curves = curves(dir, &document)?;
         let of_edges = match &mut probabilities {
             Some(probabilities) => probabilities.add(dir, &scene, &built.wireframe)?,
             None => String::new(),
         };
         println!(
-            "{name:18} {text} {} edges, {} arcs{of_curves}{of_edges} {seconds:.1} s",
+            "{name:18} {text} {} edges, {} arcs, {} splines{of_curves}{of_edges} {seconds:.1} s",
             wireframe.edges.len(),
-            arcs.len()
+            document.arcs.len(),
+            document.splines.len()
         );
         scores.extend(score);
         if let Some(kept) = &kept {
-            let mut document = WireframeDocument::from(&wireframe);
-            document.arcs = arcs;
             write_json(&kept.join("wireframe.json"), &document)?;
         }
     }
@@ -128,12 +129,13 @@ fn structure_of(built: &Assembled, scene: &Scene, least: f64) -> Result<Wirefram
     let config = ConfidenceConfig::default();
     let confidence = assess(&built.wireframe, &views, None, 1.0, &config)?;
     let kinds = edge_kinds(&built.wireframe, scene, &confidence.edges)?;
-    Ok(without_paint(&built.wireframe, &built.arcs, &kinds, least).wireframe)
+    let curves = (&built.arcs[..], &built.splines[..]);
+    Ok(without_paint(&built.wireframe, curves, &kinds, least).wireframe)
 }
 
 /// How much of the length of what was found lies within 0.01 of true edges and curves, and how
-/// much of those of it, without arcs and with them, where there are true curves.
-fn curves(dir: &Path, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Result<String> {
+/// much of those of it, without arcs and splines and with them, where there are true curves.
+fn curves(dir: &Path, document: &WireframeDocument) -> Result<String> {
     let truth = dir.join("gt_wireframe.json");
     if !truth.exists() {
         return Ok(String::new());
@@ -151,10 +153,12 @@ fn curves(dir: &Path, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Result<S
         ..EdgePoints::edge_gaussians()
     };
     let mut text = ", edges and curves".to_owned();
-    for arcs in [&[], arcs] {
+    let of_arcs = document.arcs.iter().flat_map(CubicBezier::of_arc);
+    let of_splines = document.splines.iter().flat_map(CubicBezier::of_spline);
+    for curves in [Vec::new(), of_arcs.chain(of_splines).collect()] {
         let found = EdgeModel {
-            wireframe: wireframe.clone(),
-            curves: arcs.iter().flat_map(CubicBezier::of_arc).collect(),
+            wireframe: document.wireframe(),
+            curves,
         };
         let score = protocol.evaluate(&found, &truth)?.thresholds[0];
         write!(text, " {:.3}/{:.3}", score.precision, score.recall)?;

@@ -78,6 +78,7 @@ pub fn faces_of_solids(wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Vec<Tru
     let graph = MeasuredGraph {
         wireframe,
         arcs,
+        splines: &[],
         covariances: &[],
     };
     let mut shells = find_shells(&graph, &[], &[]);

@@ -188,11 +188,13 @@ fn documented(mut scene: Scene) -> Result<WireframeDocument> {
         &built.arc_covariances,
         &scene.original_from_world,
     );
+    document.splines = built.splines.iter().map(|s| s.map(original)).collect();
     let junctions = confidence.junctions.iter();
     let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
     let world = MeasuredGraph {
         wireframe: &built.wireframe,
         arcs: &built.arcs,
+        splines: &built.splines,
         covariances: &covariances,
     };
     let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();

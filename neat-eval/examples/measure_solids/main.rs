@@ -21,7 +21,7 @@ mod prepared;
 mod truth;
 
 use nalgebra::{Matrix3, Vector3};
-use neat_core::{Camera, CircularArc, Scene, Wireframe3d};
+use neat_core::{Camera, CircularArc, Scene, Spline, Wireframe3d};
 use neat_eval::{CadFaces, FaceShares, FoundFace, SceneFaceScores, SceneFaces, SceneTruth};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::confidence::{ConfidenceConfig, assess, transformed_covariance};
@@ -43,6 +43,7 @@ type Result<T> = std::result::Result<T, Box<dyn Error>>;
 struct Input {
     wireframe: Wireframe3d,
     arcs: Vec<CircularArc>,
+    splines: Vec<Spline>,
     covariances: Vec<Option<Matrix3<f64>>>,
     views: Vec<ViewObservation>,
     points: Vec<SurfacePoint>,
@@ -85,6 +86,7 @@ fn main() -> Result<()> {
         let of_truth = Input {
             wireframe: truth.wireframe.clone(),
             arcs: truth.arcs.clone(),
+            splines: Vec::new(),
             covariances: Vec::new(),
             views: Vec::new(),
             points: Vec::new(),
@@ -125,11 +127,12 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
     }
     let mut scene = prepared(dir, folder.as_deref())?;
     let original = |scene: &Scene, p: &Vector3<f64>| scene.original_from_world.apply(p);
-    let (wireframe, arcs) = match folder {
+    let (wireframe, arcs, splines) = match folder {
         Some(folder) => {
             let document = read_json(&folder.join("wireframe.json"))?;
             let world = scene.original_from_world.inverse();
-            (document.wireframe().map(|p| world.apply(p)), document.arcs)
+            let wireframe = document.wireframe().map(|p| world.apply(p));
+            (wireframe, document.arcs, document.splines)
         }
         None => {
             let built = assembled(&scene)?;
@@ -140,7 +143,8 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
                 .arcs
                 .iter()
                 .map(|arc| arc.map(|p| original(&scene, p)));
-            (built.wireframe, arcs.collect())
+            let splines = (built.splines.iter()).map(|s| s.map(|p| original(&scene, p)));
+            (built.wireframe, arcs.collect(), splines.collect())
         }
     };
     let views = ViewObservation::from_scene(&scene, MIN_SEGMENT_SCORE);
@@ -163,6 +167,7 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
     Ok(Some(Input {
         wireframe: wireframe.map(|p| original(&scene, p)),
         arcs,
+        splines,
         covariances: (confidence.junctions.iter())
             .map(|junction| junction.covariance.as_ref().map(covariance))
             .collect(),
@@ -176,6 +181,7 @@ impl Input {
         let graph = MeasuredGraph {
             wireframe: &self.wireframe,
             arcs: &self.arcs,
+            splines: &self.splines,
             covariances: &self.covariances,
         };
         find_shells(&graph, &self.views, &self.points)
@@ -184,6 +190,7 @@ impl Input {
     fn document(&self, shells: Vec<Shell>) -> WireframeDocument {
         WireframeDocument {
             arcs: self.arcs.clone(),
+            splines: self.splines.clone(),
             shells,
             ..WireframeDocument::from(&self.wireframe)
         }
@@ -197,7 +204,7 @@ fn scores(shells: &[Shell], input: &Input, truth: &Truth) -> String {
         shells.iter().map(|shell| shell.faces.len()).sum::<usize>()
     );
     for shell in shells {
-        let geometry = ShellGeometry::new(shell, &input.wireframe, &input.arcs);
+        let geometry = ShellGeometry::new(shell, &input.wireframe, &input.arcs, &input.splines);
         let faces = shell.faces.len();
         text += &match (shell.closed, truth.volume) {
             (false, _) => format!(", sheet of {faces}"),

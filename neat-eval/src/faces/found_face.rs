@@ -28,7 +28,7 @@ impl FoundFace {
         let mut triangles = document.triangles_of_faces().into_iter();
         let mut found = Vec::new();
         for shell in &document.shells {
-            let geometry = ShellGeometry::new(shell, &wireframe, &document.arcs);
+            let geometry = ShellGeometry::new(shell, &wireframe, &document.arcs, &document.splines);
             found.extend(shell.faces.iter().zip(&mut triangles).map(|(face, cut)| {
                 let corners = |triangle: [usize; 3]| triangle.map(|corner| points[corner]);
                 Self {
@@ -84,6 +84,7 @@ mod tests {
             &MeasuredGraph {
                 wireframe: &document.wireframe(),
                 arcs: &[],
+                splines: &[],
                 covariances: &[],
             },
             &[],

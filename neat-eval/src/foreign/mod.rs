@@ -2,7 +2,7 @@
 //!
 //! | ending | what | written by |
 //! | --- | --- | --- |
-//! | `.json` | `junctions` and `edges` or `lines` | neat |
+//! | `.json` | `junctions` and `edges` or `lines`, `arcs` and `splines` | neat |
 //! | `.json` | `lines_end_pts`, `curves_ctl_pts` | EMAP and its successors, as `parametric_edges.json` |
 //! | `.npz` | `lines3d` `[n, 2, 3]` | the published NEAT |
 //! | `.npy` | `[n, 2, 3]` or `[n, 6]` | LIMAP |
@@ -29,7 +29,7 @@ use crate::edge_model::{CubicBezier, EdgeModel};
 use crate::error::EvalError;
 use nalgebra::Vector3;
 use neat_core::ground_truth::{self, GroundTruth};
-use neat_core::{CircularArc, LineSegment3, SceneError, Wireframe3d, file};
+use neat_core::{CircularArc, LineSegment3, SceneError, Spline, Wireframe3d, file};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -78,27 +78,33 @@ fn parse_json(bytes: &[u8], path: &Path) -> Result<EdgeModel, SceneError> {
         parse_parametric_edges(bytes, path)
     } else {
         let truth = ground_truth::parse(bytes, path)?;
-        let arcs = arcs(bytes, path)?;
         Ok(EdgeModel {
             wireframe: truth.wireframe,
-            curves: arcs.iter().flat_map(CubicBezier::of_arc).collect(),
+            curves: curves(bytes, path)?,
         })
     }
 }
 
-/// The arcs of a `wireframe.json`.
-fn arcs(bytes: &[u8], path: &Path) -> Result<Vec<CircularArc>, SceneError> {
+/// The curves of the arcs and then the splines of a `wireframe.json`.
+fn curves(bytes: &[u8], path: &Path) -> Result<Vec<CubicBezier>, SceneError> {
     #[derive(Deserialize)]
-    struct WithArcs {
+    struct WithCurves {
         #[serde(default)]
         arcs: Vec<CircularArc>,
+        #[serde(default)]
+        splines: Vec<Spline>,
     }
-    let WithArcs { arcs } =
+    let WithCurves { arcs, splines } =
         serde_json::from_slice(bytes).map_err(|error| malformed(path, error.to_string()))?;
-    match arcs.iter().position(|arc| !arc.is_valid()) {
-        Some(arc) => Err(malformed(path, format!("arc {arc} is none"))),
-        None => Ok(arcs),
+    if let Some(arc) = arcs.iter().position(|arc| !arc.is_valid()) {
+        return Err(malformed(path, format!("arc {arc} is none")));
     }
+    if let Some(spline) = splines.iter().position(|spline| !spline.is_valid()) {
+        return Err(malformed(path, format!("spline {spline} is none")));
+    }
+    let of_arcs = arcs.iter().flat_map(CubicBezier::of_arc);
+    let of_splines = splines.iter().flat_map(CubicBezier::of_spline);
+    Ok(of_arcs.chain(of_splines).collect())
 }
 
 /// [`SceneError::Malformed`] for the file at `path`.
@@ -127,11 +133,11 @@ mod tests {
     use nalgebra::Vector3;
     use neat_core::ground_truth::write_wireframe;
     use neat_core::npz::{NpyArray, write_npz};
-    use neat_wireframe::export::{write_obj, write_ply};
+    use neat_wireframe::export::{WireframeDocument, write_json, write_obj, write_ply};
     use proptest::prelude::*;
 
     #[test]
-    fn arcs_of_a_wireframe_are_curves_and_must_be_arcs() {
+    fn arcs_and_splines_of_a_wireframe_are_curves_and_must_be_such() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("wireframe.json");
         let arc = CircularArc {
@@ -140,20 +146,34 @@ mod tests {
             radius: 2.0,
             angles: [0.0, 1.5],
         };
-        let mut document = neat_wireframe::export::WireframeDocument {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [0.0, 1.0]];
+        let spline = Spline {
+            controls: corners.map(|[x, y]| Vector3::new(x, y, 0.5)).to_vec(),
+            closed: true,
+        };
+        let document = WireframeDocument {
             junctions: vec![Vector3::zeros(), Vector3::x()],
             edges: vec![[0, 1]],
             arcs: vec![arc],
+            splines: vec![spline.clone()],
             ..Default::default()
         };
-        neat_wireframe::export::write_json(&path, &document).unwrap();
+        write_json(&path, &document).unwrap();
         let model = read(&path).unwrap();
-        assert_eq!(model.curves, CubicBezier::of_arc(&arc));
+        let expected = [CubicBezier::of_arc(&arc), CubicBezier::of_spline(&spline)];
+        assert_eq!(model.curves, expected.concat());
         assert_eq!(model.wireframe.edges, [[0, 1]]);
-        document.arcs[0].radius = -1.0;
-        std::fs::write(&path, serde_json::to_vec(&document).unwrap()).unwrap();
-        assert!(read(&path).unwrap_err().to_string().contains("arc 0"));
-        assert!(neat_wireframe::export::write_json(&path, &document).is_err());
+        let is_refused = |document: &WireframeDocument, named| {
+            std::fs::write(&path, serde_json::to_vec(document).unwrap()).unwrap();
+            assert!(read(&path).unwrap_err().to_string().contains(named));
+            assert!(write_json(&path, document).is_err());
+        };
+        let mut bad = document.clone();
+        bad.arcs[0].radius = -1.0;
+        is_refused(&bad, "arc 0");
+        bad = document;
+        bad.splines[0].controls.truncate(2);
+        is_refused(&bad, "spline 0");
     }
     use std::collections::BTreeMap;
     use std::fs;

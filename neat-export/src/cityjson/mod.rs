@@ -61,10 +61,12 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
         "vertices": vertices.whole_numbers(),
     });
     to.write(format!("{file}\n"))?;
-    let [edges, arcs] = bounding_nothing(document);
+    let [edges, arcs, splines] = bounding_nothing(document);
     to.leave_out(edges, "CityJSON has no edges without faces");
     to.leave_out(arcs, "CityJSON has no arcs without faces");
     to.written.arcs -= arcs;
+    to.leave_out(splines, "CityJSON has no splines without faces");
+    to.written.splines -= splines;
     Ok(())
 }
 
@@ -138,8 +140,8 @@ fn geometry(building: &Building, bottom: f64, vertices: &mut Vertices) -> Value 
     })
 }
 
-/// How many edges and arcs bound no face.
-fn bounding_nothing(document: &WireframeDocument) -> [usize; 2] {
+/// How many edges, arcs and splines bound no face.
+fn bounding_nothing(document: &WireframeDocument) -> [usize; 3] {
     let bounding: BTreeSet<CurveIndex> = document.shells.iter().flat_map(Shell::curves).collect();
     let is_free = |curve: &CurveIndex| !bounding.contains(curve);
     [
@@ -149,6 +151,10 @@ fn bounding_nothing(document: &WireframeDocument) -> [usize; 2] {
             .count(),
         (0..document.arcs.len())
             .map(CurveIndex::Arc)
+            .filter(is_free)
+            .count(),
+        (0..document.splines.len())
+            .map(CurveIndex::Spline)
             .filter(is_free)
             .count(),
     ]

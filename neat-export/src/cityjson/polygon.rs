@@ -40,7 +40,12 @@ pub(super) fn polygons(
     first_face: usize,
     turn: &Matrix3<f64>,
 ) -> Vec<Polygon> {
-    let geometry = ShellGeometry::new(shell, &document.wireframe(), &document.arcs);
+    let geometry = ShellGeometry::new(
+        shell,
+        &document.wireframe(),
+        &document.arcs,
+        &document.splines,
+    );
     let is_round = |face: &Face| !matches!(face.surface, Surface::Plane { .. });
     let mut round = match shell.faces.iter().any(is_round) {
         true => triangles(shell, document, &geometry),
@@ -82,6 +87,7 @@ fn triangles(
         junctions: document.junctions.clone(),
         edges: document.edges.clone(),
         arcs: document.arcs.clone(),
+        splines: document.splines.clone(),
         shells: vec![shell.clone()],
         ..WireframeDocument::default()
     };
@@ -91,6 +97,9 @@ fn triangles(
     for (index, curve) in &geometry.curves {
         if let (CurveIndex::Arc(index), Some(arc)) = (index, curve.arc) {
             exact.arcs[*index] = arc;
+        }
+        if let (CurveIndex::Spline(index), Some(spline)) = (index, &curve.spline) {
+            exact.splines[*index] = spline.clone();
         }
     }
     let points = exact.drawn().junctions;

@@ -2,7 +2,7 @@
 
 use crate::LengthUnit;
 use nalgebra::Vector3;
-use neat_core::CircularArc;
+use neat_core::{CircularArc, Spline};
 use std::fmt::Write;
 
 /// The unit vector between two points, if they differ. First scaled, so that no
@@ -80,6 +80,24 @@ impl Entities {
         self.add(&format!("EDGE_CURVE('',{from},{to},{circle},.T.)"))
     }
 
+    /// The edge along a spline between two vertices, which are one if it runs around.
+    pub fn spline_edge(&mut self, [from, to]: [&String; 2], spline: &Spline) -> String {
+        let controls = clamped_controls(spline);
+        let controls: Vec<String> = controls.iter().map(|point| self.point(point)).collect();
+        let pieces = spline.pieces();
+        let knots: Vec<String> = (0..=pieces).map(|knot| real(knot as f64)).collect();
+        let mut multiplicities = vec!["1"; pieces + 1];
+        (multiplicities[0], multiplicities[pieces]) = ("4", "4");
+        let closed = if spline.closed { ".T." } else { ".F." };
+        let curve = self.add(&format!(
+            "B_SPLINE_CURVE_WITH_KNOTS('',3,({}),.UNSPECIFIED.,{closed},.F.,({}),({}),.UNSPECIFIED.)",
+            controls.join(","),
+            multiplicities.join(","),
+            knots.join(",")
+        ));
+        self.add(&format!("EDGE_CURVE('',{from},{to},{curve},.T.)"))
+    }
+
     /// The product whose shape the wireframe is.
     pub fn product(&mut self, name: &str, context: &str) -> String {
         let of_product = self.add(&format!("PRODUCT_CONTEXT('',{context},'mechanical')"));
@@ -132,6 +150,23 @@ impl Entities {
              END-ISO-10303-21;\n",
             self.text
         )
+    }
+}
+
+/// The control points by which a spline is one whose first and last knots are repeated, so that it
+/// begins and ends at the first and the last of them.
+pub(super) fn clamped_controls(spline: &Spline) -> Vec<Vector3<f64>> {
+    let beziers = spline.beziers();
+    match (spline.closed, &beziers[..]) {
+        // Repeated knots leave the control points alone that depend on none of them.
+        (true, [first, .., last]) => {
+            let between = spline.controls[2..].iter().chain([&spline.controls[0]]);
+            let mut controls = vec![first[0], first[1]];
+            controls.extend(between);
+            controls.extend([last[2], first[0]]);
+            controls
+        }
+        _ => spline.controls.clone(),
     }
 }
 

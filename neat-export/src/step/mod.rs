@@ -3,8 +3,8 @@
 //!
 //! A closed shell is a `MANIFOLD_SOLID_BREP`, another a `SHELL_BASED_SURFACE_MODEL`. Every junction
 //! of the wireframe is one `VERTEX_POINT`, which its `EDGE_CURVE`s share. Arcs are `EDGE_CURVE`s of
-//! `CIRCLE`s between vertices of their own; a whole circle begins and ends at one. Open CASCADE
-//! joins the edges of a `CONNECTED_EDGE_SET` to one wire and moves vertices where
+//! `CIRCLE`s and splines those of `B_SPLINE_CURVE_WITH_KNOTS` between vertices of their own; what is
+//! closed begins and ends at one. Open CASCADE joins the edges of a `CONNECTED_EDGE_SET` to one wire and moves vertices where
 //! more than two edges meet; so every edge is a set of its own, and its reader keeps
 //! positions and shared vertices.
 
@@ -13,9 +13,9 @@ mod shells;
 
 use crate::ExportError;
 use crate::target::Target;
-use entities::{Entities, string};
+use entities::{Entities, clamped_controls, string};
 use nalgebra::Vector3;
-use neat_core::CircularArc;
+use neat_core::{CircularArc, Spline};
 use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::faces::{CurveIndex, Shell};
 use std::collections::BTreeSet;
@@ -66,8 +66,8 @@ pub fn write(to: &mut Target) -> Result<(), ExportError> {
 /// What is left out, and how often.
 type Flaws = [(usize, &'static str); 3];
 
-/// The edges and arcs that bound no face, each a set of its own, and what they lack: a line needs
-/// a direction, and a vertex an edge.
+/// The edges, arcs and splines that bound no face, each a set of its own, and what they lack: a line
+/// needs a direction, and a vertex an edge.
 fn edge_sets(step: &mut Entities, document: &WireframeDocument) -> (Vec<String>, Flaws) {
     let bounding: BTreeSet<CurveIndex> = document.shells.iter().flat_map(Shell::curves).collect();
     let mut lonely = vec![true; document.junctions.len()];
@@ -110,6 +110,9 @@ fn edge_sets(step: &mut Entities, document: &WireframeDocument) -> (Vec<String>,
         ),
         (free.len() - (sets.len() - lines), "arcs without length"),
     ];
+    let free = (document.splines.iter().enumerate())
+        .filter(|(index, _)| !bounding.contains(&CurveIndex::Spline(*index)));
+    sets.extend(free.map(|(_, spline)| spline_set(step, spline)));
     (sets, flaws)
 }
 
@@ -127,4 +130,18 @@ fn arc_set(step: &mut Entities, arc: &CircularArc) -> Option<String> {
     };
     let edge = step.arc_edge([&from, &to], arc);
     Some(step.add(&format!("CONNECTED_EDGE_SET('',({edge}))")))
+}
+
+/// A spline as a set of its own.
+fn spline_set(step: &mut Entities, spline: &Spline) -> String {
+    let controls = clamped_controls(spline);
+    let (start, end) = (&controls[0], &controls[controls.len() - 1]);
+    let from = step.vertex(start);
+    let to = if start == end {
+        from.clone()
+    } else {
+        step.vertex(end)
+    };
+    let edge = step.spline_edge([&from, &to], spline);
+    step.add(&format!("CONNECTED_EDGE_SET('',({edge}))"))
 }

@@ -16,7 +16,7 @@ pub(super) fn representations(
     let wireframe = document.wireframe();
     let (mut solids, mut sheets) = (Vec::new(), Vec::new());
     for shell in &document.shells {
-        let geometry = ShellGeometry::new(shell, &wireframe, &document.arcs);
+        let geometry = ShellGeometry::new(shell, &wireframe, &document.arcs, &document.splines);
         let faces = ShellWriter::new(step, &geometry).faces(shell).join(",");
         if shell.closed {
             let shell = step.add(&format!("CLOSED_SHELL('',({faces}))"));
@@ -70,10 +70,14 @@ impl<'a> ShellWriter<'a> {
             .collect();
         let mut edges = BTreeMap::new();
         for (index, curve) in &geometry.curves {
-            let corners = match (curve.ends, &curve.arc) {
-                (Some(ends), _) => ends.map(|end| vertices[&end].clone()),
-                (None, Some(circle)) => {
-                    let point = circle.point_at(circle.angles[0]);
+            let corners = match curve.ends {
+                Some(ends) => ends.map(|end| vertices[&end].clone()),
+                None => {
+                    let of_circle = curve.arc.map(|circle| circle.point_at(circle.angles[0]));
+                    let of_spline = || curve.spline.as_ref().map(|spline| spline.point_at(0.0));
+                    let Some(point) = of_circle.or_else(of_spline) else {
+                        continue;
+                    };
                     let name = step.vertex(&point);
                     [
                         Corner {
@@ -83,12 +87,12 @@ impl<'a> ShellWriter<'a> {
                         Corner { name, point },
                     ]
                 }
-                (None, None) => continue,
             };
             let names = [&corners[0].name, &corners[1].name];
-            let edge = match &curve.arc {
-                Some(arc) => Some(step.arc_edge(names, arc)),
-                None => {
+            let edge = match (&curve.arc, &curve.spline) {
+                (Some(arc), _) => Some(step.arc_edge(names, arc)),
+                (None, Some(spline)) => Some(step.spline_edge(names, spline)),
+                (None, None) => {
                     let inferred = matches!(index, CurveIndex::Smooth(_));
                     let name = if inferred { "inferred" } else { "" };
                     step.named_edge(name, names, [&corners[0].point, &corners[1].point])

@@ -4,8 +4,7 @@ use super::line_drawing::{Pen, draw_disc, draw_segment};
 use super::{segments_of, thinness, visible_part};
 use image::{Rgb, RgbImage};
 use nalgebra::{Matrix3, Vector2, Vector3};
-use neat_core::{Camera, CircularArc, Intrinsics, Scene, Wireframe3d, extent_of_most};
-use neat_wireframe::export::WireframeDocument;
+use neat_core::{Camera, Intrinsics, Scene, Wireframe3d, extent_of_most};
 
 /// Width and height of the picture.
 const SIZE: u32 = 1200;
@@ -27,14 +26,19 @@ const JUNCTION: Pen = Pen {
     radius: 6.0,
 };
 
-/// Draws the wireframe; far lines are paler than near ones. Without junctions
+/// Draws the wireframe, and curves by points along each; far lines are paler than near ones. Without junctions
 /// the picture is white.
 ///
 /// The viewing direction is that of the scene's camera from which the edges
 /// appear least foreshortened.
-pub fn draw_wireframe(wireframe: &Wireframe3d, arcs: &[CircularArc], scene: &Scene) -> RgbImage {
+pub fn draw_wireframe(
+    wireframe: &Wireframe3d,
+    curves: &[Vec<Vector3<f64>>],
+    scene: &Scene,
+) -> RgbImage {
     let mut picture = RgbImage::from_pixel(SIZE, SIZE, Rgb([255; 3]));
-    let points = points_of(wireframe, arcs);
+    let mut points = wireframe.junctions.clone();
+    points.extend(curves.iter().flatten());
     let Some((center, radius)) = ball_around(&points) else {
         return picture;
     };
@@ -50,7 +54,7 @@ pub fn draw_wireframe(wireframe: &Wireframe3d, arcs: &[CircularArc], scene: &Sce
         let nearness = (DISTANCE + 1.0 - depth(point) / radius) / 2.0;
         FAR.mix(&NEAR, nearness.clamp(0.0, 1.0)).scaled(thinness)
     };
-    let mut segments = segments_of(wireframe, arcs);
+    let mut segments = segments_of(wireframe, curves);
     // Near lines go over far ones.
     segments.sort_by(|a, b| depth(&b.point_at(0.5)).total_cmp(&depth(&a.point_at(0.5))));
     for segment in &segments {
@@ -65,15 +69,6 @@ pub fn draw_wireframe(wireframe: &Wireframe3d, arcs: &[CircularArc], scene: &Sce
         }
     }
     picture
-}
-
-/// Junctions, and arcs in pieces.
-fn points_of(wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Vec<Vector3<f64>> {
-    let mut points = wireframe.junctions.clone();
-    for arc in arcs {
-        points.extend(arc.points(WireframeDocument::TURN_OF_DRAWN_ARCS));
-    }
-    points
 }
 
 /// Centre and radius of a ball around all points but strays; `None` without any.

@@ -119,7 +119,7 @@ impl Session<'_> {
         agreement: Option<ImageEvidence>,
     ) -> Result<(Wireframe3d, WireframeDocument), PipelineError> {
         let in_world = &distilled.wireframe;
-        let arcs = &distilled.arcs;
+        let curves = &distilled.drawn_curves()[..];
         let document = WireframeDocument {
             metadata: self.metadata(distilled, agreement),
             ..distilled.document(&self.scene)
@@ -130,7 +130,7 @@ impl Session<'_> {
         let (drawn, triangles) = (document.drawn(), document.drawn_triangles());
         write_obj(&obj, &drawn, &triangles)?;
         write_ply(&ply, &drawn, &triangles)?;
-        write_png(&png, &draw_wireframe(in_world, arcs, &self.scene))?;
+        write_png(&png, &draw_wireframe(in_world, curves, &self.scene))?;
         let mut written = vec![json, obj, ply, png];
 
         let scene = distilled.refined_scene.as_ref().unwrap_or(&self.scene);
@@ -145,10 +145,10 @@ impl Session<'_> {
         let draw = |(view, path): &(&View, PathBuf)| {
             let pixel_center = self.scene.pixel_center;
             let picture = match self.plan.config().distill.overlay {
-                OverlayGround::Photo => draw_overlay(view, pixel_center, (in_world, arcs))?,
+                OverlayGround::Photo => draw_overlay(view, pixel_center, (in_world, curves))?,
                 OverlayGround::Segments => {
                     let min_score = self.plan.config().data.min_segment_score;
-                    draw_sketch(view, pixel_center, min_score, (in_world, arcs))
+                    draw_sketch(view, pixel_center, min_score, (in_world, curves))
                 }
             };
             write_png(path, &picture)

@@ -6,7 +6,7 @@ const LIGHT = normalize([0.35, 0.55, 0.76]);
 
 /** Corners and shades of the triangles of each face, and its edges. */
 function lightFaces({ points, arcs, faces }) {
-  // As the triangles count: behind the junctions those of the arcs, a closed one's first once.
+  // As the triangles count: behind the junctions those of the arcs and splines, a closed one's first once.
   const isClosed = (arc) => norm(subtract(arc[0], arc[arc.length - 1])) === 0;
   const vertices = points.concat(...arcs.map((arc) => (isClosed(arc) ? arc.slice(0, -1) : arc)));
   return faces.map(({ edges, triangles }) => ({

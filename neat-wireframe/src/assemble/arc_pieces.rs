@@ -20,7 +20,7 @@ const OWN_SHARE: f64 = 0.2;
 
 impl Images<'_> {
     /// Whether images speak for an arc by edgels that are not `taken` by others, too.
-    fn has_own(&self, found: &FoundArc, taken: &[Vec<bool>]) -> bool {
+    pub(super) fn has_own(&self, found: &FoundArc, taken: &[Vec<bool>]) -> bool {
         let gain = |taken| self.gain_along(&found.arc, found.arc.angles, found.pixel, taken);
         gain(Some(taken)) > OWN_SHARE * gain(None)
     }
@@ -134,4 +134,72 @@ fn union(circle: &CircularArc, pieces: [&FoundArc; 2], gap: f64) -> Option<[f64;
     let apart = (a[0] - b[1]).max(b[0] - a[1]) * circle.radius;
     let whole = [a[0].min(b[0]), a[1].max(b[1])];
     (apart <= gap).then(|| [whole[0], whole[1].min(whole[0] + TAU)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::circle_fitting::tests::{arc, views_of_arcs};
+    use crate::assemble::test_views::TestViews;
+    use crate::assemble::view_segments::PreparedView;
+    use crate::test_scenes::{cameras_on_sphere, views_of_edges};
+
+    /// Views of two circles, one over the other by so many pixels.
+    fn views_of_rims(apart: f64) -> TestViews {
+        let (mut points, mut edges) = (Vec::new(), Vec::new());
+        for side in [-0.5, 0.5] {
+            let mut rim = arc(2.0);
+            rim.center += side * apart * 0.003 * rim.normal();
+            let first = points.len();
+            points.extend(rim.points(0.05));
+            edges.extend((first + 1..points.len()).map(|k| [k - 1, k]));
+        }
+        let seen = views_of_edges(&cameras_on_sphere(20), &points, &edges);
+        let views = (seen.iter()).map(|view| PreparedView::new(view, 1.0, 0.0));
+        TestViews::of(views.collect())
+    }
+
+    /// A part of an arc as images show it.
+    fn settled(images: &Images, part: CircularArc) -> FoundArc {
+        let found = FoundArc {
+            arc: part,
+            gain: 0.0,
+            pixel: 0.003,
+            sectors: Vec::new(),
+            covariance: None,
+        };
+        images.settle_arc(&found, &images.nothing_taken()).unwrap()
+    }
+
+    #[test]
+    fn pieces_of_one_circle_become_one_arc() {
+        let views = views_of_arcs(20, |_| arc(2.0));
+        let images = views.images();
+        let piece = |angles: [f64; 2]| settled(&images, CircularArc { angles, ..arc(2.0) });
+        let merged = images.merge_arcs(vec![piece([0.0, 0.8]), piece([0.9, 2.0])]);
+        assert_eq!(merged.len(), 1);
+        assert!((merged[0].arc.sweep() - 2.0).abs() < 0.1);
+        assert!((merged[0].arc.radius - arc(2.0).radius).abs() < 1e-3);
+    }
+
+    #[test]
+    fn rims_beside_each_other_stay_two_and_a_third_between_them_goes() {
+        let views = views_of_rims(4.0);
+        let images = views.images();
+        let rim = |side: f64| {
+            let mut rim = arc(2.0);
+            rim.center += side * 4.0 * 0.003 * rim.normal();
+            settled(&images, rim)
+        };
+        let mut arcs = images.merge_arcs(vec![rim(-0.5), rim(0.5)]);
+        assert_eq!(arcs.len(), 2);
+        // Along one of them at its start and along the other one at its end.
+        let mut between = arcs[0].clone();
+        between.gain = 1.0;
+        let axes = between.arc.axes;
+        between.arc.axes[1] = (axes[1] + 0.02 * axes[0].cross(&axes[1])).normalize();
+        arcs.push(between);
+        images.retain_own(&[], &mut arcs);
+        assert_eq!(arcs.len(), 2);
+    }
 }

@@ -62,6 +62,7 @@ mod projected_line;
 mod report;
 mod rounded_corners;
 mod slab_ends;
+mod splines;
 mod straightness;
 mod swept_tubes;
 mod tangent_ends;
@@ -99,12 +100,13 @@ use hypothesis_scoring::{Alternatives, Scoring, score_hypotheses};
 use line_continuation::{continue_lines, meet_in_slivers};
 use line_selection::{Selection, select_lines, sure_lines};
 use nalgebra::Matrix4;
-use neat_core::{CircularArc, EdgelMap, LineSegment2};
+use neat_core::{CircularArc, EdgelMap, LineSegment2, Spline};
 use pose_fitting::fit_poses;
 use profiles::place_curves;
 use progress::part;
 use rayon::prelude::*;
 use slab_ends::{close_by_light, close_slabs};
+use splines::take_splines;
 use std::ops::ControlFlow;
 use tangent_ends::cut_tangent_ends;
 use view_segments::PreparedView;
@@ -223,8 +225,10 @@ pub fn assemble_with_progress(
     )?;
     let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
-    let wireframe = graph_of(selection, arcs, photographs, config, &mut report, progress)?;
+    let (wireframe, splines) =
+        graph_of(selection, arcs, photographs, config, &mut report, progress)?;
     report.arcs = arcs.len();
+    report.splines = splines.len();
     let arc_covariances = covariances_of_arcs(&images, arcs, scene_radius);
     let wireframe = wireframe.map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
@@ -235,6 +239,9 @@ pub fn assemble_with_progress(
         wireframe,
         arcs: scaled_arcs(arcs, scene_radius),
         arc_covariances,
+        splines: (splines.iter())
+            .map(|spline| spline.map(|point| point * scene_radius))
+            .collect(),
         report,
         refined_cameras,
     })
@@ -319,7 +326,7 @@ fn graph_of(
     config: &AssembleConfig,
     report: &mut AssembleReport,
     progress: OnProgress<'_>,
-) -> ControlFlow<(), Wireframe3d> {
+) -> ControlFlow<(), (Wireframe3d, Vec<Spline>)> {
     let images = selection.images;
     let least = config.min_evidence;
     let known = &KnownArcs::new(arcs);
@@ -363,9 +370,10 @@ fn graph_of(
     report.curved_lines += curved.len();
     end_at_junctions(&images, &mut wireframe, &mut sources, &mut curved, arcs);
     fit_edges(&images, &lines, &sources, &mut wireframe);
+    let splines = take_splines(&images, &wireframe.junctions, arcs);
     add_as_arcs(&curved, &wireframe.junctions, arcs);
     let ends_of_curves = curved.iter().flat_map(|edge| edge.ends).collect();
-    ControlFlow::Continue(in_order(&wireframe, ends_of_curves))
+    ControlFlow::Continue((in_order(&wireframe, ends_of_curves), splines))
 }
 
 /// The edgels of a view that is known by its segments only.

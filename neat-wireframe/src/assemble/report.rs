@@ -2,7 +2,7 @@
 
 use crate::Wireframe3d;
 use nalgebra::Matrix4;
-use neat_core::{Camera, CircularArc};
+use neat_core::{Camera, CircularArc, Spline};
 use serde::{Deserialize, Serialize};
 
 /// A wireframe, and how it came about.
@@ -15,6 +15,8 @@ pub struct Assembled {
     /// The covariance of each arc's centre and radius, in squared units of the world; `None` where
     /// the views do not tell.
     pub arc_covariances: Vec<Option<Matrix4<f64>>>,
+    /// Smooth curves that are no circles.
+    pub splines: Vec<Spline>,
     /// What each step found.
     pub report: AssembleReport,
     /// The cameras of all views, from where the images show the wireframe; `None` where they
@@ -45,6 +47,9 @@ pub struct AssembleReport {
     pub curved_lines: usize,
     /// … of which so many arcs came …
     pub arcs: usize,
+    /// … and splines of chains of arcs, which are none of these …
+    #[serde(default)]
+    pub splines: usize,
     /// … and outlines of round things, which are left out, too.
     pub outlines: usize,
     /// Lines that were pieces of others.

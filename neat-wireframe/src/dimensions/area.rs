@@ -1,5 +1,5 @@
 //! The area of a face as a function of the places that it hangs on: the ends of its edges, and
-//! centres, radii and ends of its arcs.
+//! centres, radii and ends of its arcs, control points of its splines.
 //!
 //! A plane's is the integral of x × dx / 2 around it, along its normal; that the normal is off
 //! changes it in second order only. A cylinder's is the mean of its rims' lengths times the
@@ -7,24 +7,31 @@
 
 use super::Place;
 use crate::export::WireframeDocument;
-use crate::faces::{CurveIndex, Face, Step, Surface, nearest_junctions};
+use crate::faces::{
+    CurveIndex, Face, Step, Surface, area_vector_of_spline, ends_of_arc, nearest_junctions,
+};
 use nalgebra::Vector3;
+use neat_core::Spline;
 use std::f64::consts::{PI, TAU};
 
 /// The places of one step after the other: both ends of an edge; of an arc its centre, its radius,
-/// and, if it is no circle, its ends.
+/// and, if it is no circle, its ends; of a spline its control points.
 pub(super) fn places(document: &WireframeDocument, face: &Face) -> Vec<Place> {
     let of_step = |steps: &[Step], step: &Step| match step.curve {
         CurveIndex::Edge(edge) => document.edges[edge].map(Place::Junction).to_vec(),
         CurveIndex::Smooth(ends) => ends.map(Place::Junction).to_vec(),
         CurveIndex::Arc(arc) => {
-            let ends = nearest_junctions(&document.arcs[arc], &document.junctions);
+            let ends = nearest_junctions(ends_of_arc(&document.arcs[arc]), &document.junctions);
             let ends = ends.filter(|_| steps.len() > 1).into_iter().flatten();
             let circle = [Place::Center(arc), Place::Radius(arc)];
             circle
                 .into_iter()
                 .chain(ends.map(Place::Junction))
                 .collect()
+        }
+        CurveIndex::Spline(spline) => {
+            let controls = 0..document.splines[spline].controls.len();
+            controls.map(|k| Place::Control(spline, k)).collect()
         }
     };
     let loops = face.loops.iter();
@@ -36,6 +43,7 @@ pub(super) fn places(document: &WireframeDocument, face: &Face) -> Vec<Place> {
 /// A step with its places where they lie.
 enum Piece {
     Edge([Vector3<f64>; 2]),
+    Spline(Spline),
     Arc {
         center: Vector3<f64>,
         radius: f64,
@@ -64,6 +72,14 @@ pub(super) fn value(document: &WireframeDocument, face: &Face, points: &[Vector3
                     let (center, radius) = (take(), take().x);
                     let ends = (steps.len() > 1).then(|| [take(), take()]);
                     arc_piece(document, arc, center, radius, ends)
+                }
+                CurveIndex::Spline(spline) => {
+                    let mut spline = document.splines[spline].clone();
+                    spline
+                        .controls
+                        .iter_mut()
+                        .for_each(|control| *control = take());
+                    Piece::Spline(spline)
                 }
             };
             pieces.push((step.reversed, piece));
@@ -119,6 +135,7 @@ impl Piece {
         let straight = |[a, b]: &[Vector3<f64>; 2]| 0.5 * (a - origin).cross(&(b - origin));
         match self {
             Self::Edge(ends) => straight(ends),
+            Self::Spline(spline) => 0.5 * area_vector_of_spline(spline, origin),
             Self::Arc {
                 center,
                 radius,
@@ -143,6 +160,7 @@ fn round(axis: &Vector3<f64>, widens: bool, pieces: &[(bool, Piece)]) -> f64 {
     let mut radii = Vec::new();
     for (_, piece) in pieces {
         match piece {
+            Piece::Spline(_) => {}
             Piece::Edge([a, b]) => heights.push(axis.dot(&(b - a)).abs()),
             Piece::Arc {
                 center,

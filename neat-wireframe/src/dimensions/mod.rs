@@ -96,6 +96,8 @@ enum Place {
     Center(usize),
     /// The first coordinate is the radius.
     Radius(usize),
+    /// A control point of a spline.
+    Control(usize, usize),
 }
 
 /// A quantity with its value.
@@ -307,7 +309,7 @@ impl<'a> Dimensions<'a> {
                         sum += both + both.transpose();
                     }
                 }
-                Place::Junction(_) => {}
+                Place::Junction(_) | Place::Control(..) => {}
             }
         }
         let finite = sum.iter().all(|x| x.is_finite());
@@ -328,6 +330,7 @@ impl<'a> Dimensions<'a> {
             Place::Junction(junction) => self.document.junctions[junction],
             Place::Center(arc) => self.document.arcs[arc].center,
             Place::Radius(arc) => Vector3::x() * self.document.arcs[arc].radius,
+            Place::Control(spline, control) => self.document.splines[spline].controls[control],
         }
     }
 
@@ -340,6 +343,8 @@ impl<'a> Dimensions<'a> {
                 [xx, xy, xz, yy, yz, zz]
             }
             Place::Radius(arc) => [of_arc(arc)?[9], 0.0, 0.0, 0.0, 0.0, 0.0],
+            // Nobody has asked the views how sure they are.
+            Place::Control(..) => return None,
         };
         Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
     }

@@ -293,6 +293,7 @@ fn cube_with_faces(sigma: f64) -> (WireframeDocument, Vec<Matrix3<f64>>) {
     let graph = MeasuredGraph {
         wireframe: &wireframe,
         arcs: &[],
+        splines: &[],
         covariances: &[],
     };
     document.shells = find_shells(&graph, &[], &[]);

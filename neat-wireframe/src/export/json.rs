@@ -4,7 +4,7 @@ use super::{EdgeFields, ExportError, JunctionFields, check};
 use crate::Wireframe3d;
 use crate::faces::{Face, Shell, triangles};
 use nalgebra::Vector3;
-use neat_core::{CircularArc, file};
+use neat_core::{CircularArc, Spline, file};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -39,7 +39,10 @@ pub struct WireframeDocument {
     /// Arcs of circles beside the edges, in the frame of the user's files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub arcs: Vec<CircularArc>,
-    /// Faces between edges and arcs, closed shells first, in the frame of the user's files.
+    /// Smooth curves that are no arcs, likewise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub splines: Vec<Spline>,
+    /// Faces between edges, arcs and splines, closed shells first, in the frame of the user's files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shells: Vec<Shell>,
     /// The upper triangle of the covariance of every arc's centre x, y, z and radius, row by row,
@@ -92,22 +95,34 @@ impl WireframeDocument {
         }
     }
 
-    /// The graph with arcs as chains of straight pieces, for what knows no arcs: behind the
-    /// junctions the points of one arc after the other, behind the edges their pieces. Arcs share
-    /// no points; the ends of a whole circle are one.
+    /// The graph with arcs and splines as chains of straight pieces, for what knows none: behind
+    /// the junctions the points of one arc after the other and then of the splines, behind the
+    /// edges their pieces. They share no points; the ends of a closed one are one.
     pub fn drawn(&self) -> Wireframe3d {
         let mut drawn = self.wireframe();
-        for (arc, chain) in self.arcs.iter().zip(self.chains()) {
-            let mut points = arc.points(Self::TURN_OF_DRAWN_ARCS);
-            if arc.is_closed() {
+        for mut points in self.drawn_curves() {
+            let first = drawn.junctions.len();
+            let pieces = points.len() - 1;
+            if points[0] == points[pieces] {
                 points.pop();
             }
+            let count = points.len();
+            let piece = |k: usize| [first + k, first + (k + 1) % count];
+            drawn.edges.extend((0..pieces).map(piece));
             drawn.junctions.extend(points);
-            drawn
-                .edges
-                .extend(chain.windows(2).map(|ends| [ends[0], ends[1]]));
         }
         drawn
+    }
+
+    /// Points along each arc, and then along each spline; the first and the last of a closed one
+    /// are the same.
+    pub fn drawn_curves(&self) -> impl Iterator<Item = Vec<Vector3<f64>>> {
+        let arcs = self
+            .arcs
+            .iter()
+            .map(|arc| arc.points(Self::TURN_OF_DRAWN_ARCS));
+        let splines = self.splines.iter();
+        arcs.chain(splines.map(|spline| spline.points(Self::TURN_OF_DRAWN_ARCS)))
     }
 
     /// The faces as triangles of the junctions of [`Self::drawn`], counterclockwise as seen from
@@ -122,20 +137,22 @@ impl WireframeDocument {
             return Vec::new();
         }
         let points = self.drawn().junctions;
-        triangles(&self.shells, &self.edges, &self.chains(), &points)
+        let chains = self.chains();
+        let (arcs, splines) = chains.split_at(self.arcs.len());
+        triangles(&self.shells, &self.edges, [arcs, splines], &points)
     }
 
-    /// For each arc the junctions of [`Self::drawn`] along it.
+    /// For each arc, and then each spline, the junctions of [`Self::drawn`] along it.
     fn chains(&self) -> Vec<Vec<usize>> {
         let mut first = self.junctions.len();
-        let chain = |arc: &CircularArc| {
-            let pieces = arc.points(Self::TURN_OF_DRAWN_ARCS).len() - 1;
-            let count = pieces + usize::from(!arc.is_closed());
+        let chain = |points: Vec<Vector3<f64>>| {
+            let pieces = points.len() - 1;
+            let count = pieces + usize::from(points[0] != points[pieces]);
             let chain = (0..=pieces).map(|k| first + k % count).collect();
             first += count;
             chain
         };
-        self.arcs.iter().map(chain).collect()
+        self.drawn_curves().map(chain).collect()
     }
 
     /// Checks everything that [`write_json`] and every other export rely on; `path`
@@ -152,8 +169,14 @@ impl WireframeDocument {
                 arc,
             });
         }
+        if let Some(spline) = self.splines.iter().position(|spline| !spline.is_valid()) {
+            return Err(ExportError::BadSpline {
+                path: path.into(),
+                spline,
+            });
+        }
         let wireframe = self.wireframe();
-        let is_valid = |face: &Face| face.is_valid(&wireframe, &self.arcs);
+        let is_valid = |face: &Face| face.is_valid(&wireframe, &self.arcs, &self.splines);
         if let Some(shell) = (self.shells.iter()).position(|s| !s.faces.iter().all(is_valid)) {
             return Err(ExportError::BadShell {
                 path: path.into(),

@@ -62,6 +62,17 @@ pub enum ExportError {
         /// Its index.
         arc: usize,
     },
+    /// A spline is none.
+    #[error(
+        "{path}: spline {spline} is none: it needs four control points, three if it is closed, \
+         that are not one point"
+    )]
+    BadSpline {
+        /// The file.
+        path: PathBuf,
+        /// Its index.
+        spline: usize,
+    },
     /// A shell has a face that is none.
     #[error(
         "{path}: shell {shell} has a face that is none: it needs a plane, a cylinder or a cone, and loops \

@@ -97,6 +97,7 @@ fn round_faces(curves: &Curves) -> Vec<Face> {
     let (arcs, edges): (Vec<&Curve>, Vec<&Curve>) =
         (curves.all.iter()).partition(|curve| curve.arc.is_some());
     let by_ends: BTreeMap<[usize; 2], &Curve> = (edges.into_iter())
+        .filter(|curve| curve.is_straight())
         .filter_map(|edge| Some((sorted(edge.ends?), edge)))
         .collect();
     let pairs = (0..arcs.len()).flat_map(|i| (0..i).map(move |j| (j, i)));

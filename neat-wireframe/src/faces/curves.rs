@@ -1,10 +1,10 @@
-//! The curves of a wireframe as boundaries of faces: straight edges, whole circles, and arcs
-//! whose ends are junctions.
+//! The curves of a wireframe as boundaries of faces: straight edges, closed curves, and arcs and
+//! splines whose ends are junctions.
 
 use super::bounds::Bounds;
 use super::face::{CurveIndex, Step};
 use nalgebra::{Matrix3, Vector3};
-use neat_core::{CircularArc, Wireframe3d};
+use neat_core::{CircularArc, Spline, Wireframe3d};
 
 /// Arcs are drawn in pieces that turn by so much, in radians.
 pub(super) const TURN: f64 = 0.1;
@@ -27,6 +27,8 @@ pub struct MeasuredGraph<'a> {
     pub wireframe: &'a Wireframe3d,
     /// Arcs beside them.
     pub arcs: &'a [CircularArc],
+    /// Smooth curves beside them.
+    pub splines: &'a [Spline],
     /// Covariances of the junctions; empty, or one for each, `None` where it is not determined.
     pub covariances: &'a [Option<Matrix3<f64>>],
 }
@@ -35,9 +37,9 @@ pub struct MeasuredGraph<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct Curve {
     pub index: CurveIndex,
-    /// The junctions at its start and end; `None` for a whole circle.
+    /// The junctions at its start and end; `None` if it is closed.
     pub ends: Option<[usize; 2]>,
-    /// Points along it, the ends among them; the first and last of a circle are the same.
+    /// Points along it, the ends among them; the first and last of a closed one are the same.
     pub points: Vec<Vector3<f64>>,
     /// Points by which its plane is known, each with its covariance.
     pub measured: Vec<(Vector3<f64>, Matrix3<f64>)>,
@@ -49,13 +51,18 @@ pub(super) struct Curve {
 pub(super) struct Curves {
     /// Those that may bound faces, ascending.
     pub all: Vec<Curve>,
-    /// Arcs that may not, as an end is no junction.
+    /// Arcs and splines that may not, as an end is no junction.
     pub loose: Vec<Vec<Vector3<f64>>>,
     /// Greatest side of the box around the wireframe.
     pub extent: f64,
 }
 
 impl Curve {
+    /// Whether it is an edge or an inferred line.
+    pub fn is_straight(&self) -> bool {
+        matches!(self.index, CurveIndex::Edge(_) | CurveIndex::Smooth(_))
+    }
+
     pub fn length(&self) -> f64 {
         let pieces = self.points.windows(2);
         pieces.map(|ends| (ends[1] - ends[0]).norm()).sum()
@@ -91,26 +98,45 @@ impl Curves {
         let edges = graph.wireframe.edges.iter().enumerate().map(edge);
         let mut all: Vec<Curve> = edges.filter(has_length).collect();
         let mut loose = Vec::new();
-        for (index, arc) in graph.arcs.iter().enumerate() {
-            let mut points = arc.points(TURN);
-            let ends = ends_of(arc, junctions, REACH * ARC_NOISE * extent);
-            if !arc.is_closed() {
-                let Some([start, end]) = ends else {
-                    loose.push(points);
-                    continue;
-                };
-                let last = points.len() - 1;
-                (points[0], points[last]) = (junctions[start], junctions[end]);
-            }
-            let angle = |k: usize| arc.angles[0] + arc.sweep() * k as f64 / POINTS_OF_ARC as f64;
-            let on_arc = (0..POINTS_OF_ARC).map(|k| (arc.point_at(angle(k)), floor(ARC_NOISE)));
-            all.push(Curve {
-                index: CurveIndex::Arc(index),
-                ends: ends.filter(|_| !arc.is_closed()),
-                points,
-                measured: on_arc.collect(),
-                arc: Some(*arc),
+        let mut add = |index: CurveIndex, mut points: Vec<Vector3<f64>>, of: Curved| {
+            let ends = of.ends.and_then(|ends| {
+                let reach = REACH * ARC_NOISE * extent;
+                junctions_at(ends, junctions, reach)
             });
+            match (of.ends, ends) {
+                (Some(_), None) => return loose.push(points),
+                (_, Some([start, end])) => {
+                    let last = points.len() - 1;
+                    (points[0], points[last]) = (junctions[start], junctions[end]);
+                }
+                (None, None) => {}
+            }
+            let measured = of.measured.into_iter();
+            all.push(Curve {
+                index,
+                ends,
+                points,
+                measured: measured.map(|point| (point, floor(ARC_NOISE))).collect(),
+                arc: of.arc,
+            });
+        };
+        for (index, arc) in graph.arcs.iter().enumerate() {
+            let angle = |k: usize| arc.angles[0] + arc.sweep() * k as f64 / POINTS_OF_ARC as f64;
+            let of = Curved {
+                ends: (!arc.is_closed()).then(|| ends_of_arc(arc)),
+                measured: (0..POINTS_OF_ARC).map(|k| arc.point_at(angle(k))).collect(),
+                arc: Some(*arc),
+            };
+            add(CurveIndex::Arc(index), arc.points(TURN), of);
+        }
+        for (index, spline) in graph.splines.iter().enumerate() {
+            let points = spline.points(TURN);
+            let of = Curved {
+                ends: (!spline.closed).then(|| ends_of_spline(spline)),
+                measured: points.clone(),
+                arc: None,
+            };
+            add(CurveIndex::Spline(index), points, of);
         }
         Self { all, loose, extent }
     }
@@ -161,31 +187,54 @@ pub(super) fn sorted([a, b]: [usize; 2]) -> [usize; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// The junctions nearest to the ends of an arc; `None` without junctions.
+/// What is known of an arc or a spline, but for its index.
+struct Curved {
+    /// Where it begins and ends; `None` if it is closed.
+    ends: Option<[Vector3<f64>; 2]>,
+    /// Points by which its plane is known.
+    measured: Vec<Vector3<f64>>,
+    arc: Option<CircularArc>,
+}
+
+/// Where an arc begins and ends.
+pub(crate) fn ends_of_arc(arc: &CircularArc) -> [Vector3<f64>; 2] {
+    arc.angles.map(|angle| arc.point_at(angle))
+}
+
+/// Where an open spline begins and ends.
+pub(crate) fn ends_of_spline(spline: &Spline) -> [Vector3<f64>; 2] {
+    [0, spline.controls.len() - 1].map(|end| spline.controls[end])
+}
+
+/// The junctions nearest to two ends; `None` without junctions.
 pub(crate) fn nearest_junctions(
-    arc: &CircularArc,
+    ends: [Vector3<f64>; 2],
     junctions: &[Vector3<f64>],
 ) -> Option<[usize; 2]> {
-    let nearest = |angle: f64| {
-        let point = arc.point_at(angle);
+    let nearest = |point: Vector3<f64>| {
         let distances = junctions.iter().map(|j| (j - point).norm()).enumerate();
         let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some(nearest.0)
     };
-    Some([nearest(arc.angles[0])?, nearest(arc.angles[1])?])
+    Some([nearest(ends[0])?, nearest(ends[1])?])
 }
 
-/// The junctions at the two ends of an arc, if both are near one, and not the same.
-fn ends_of(arc: &CircularArc, junctions: &[Vector3<f64>], reach: f64) -> Option<[usize; 2]> {
-    let ends = nearest_junctions(arc, junctions)?;
-    let near = |k: usize| (junctions[ends[k]] - arc.point_at(arc.angles[k])).norm() <= reach;
-    (ends[0] != ends[1] && near(0) && near(1)).then_some(ends)
+/// The junctions at two ends, if both are near one, and not the same.
+fn junctions_at(
+    ends: [Vector3<f64>; 2],
+    junctions: &[Vector3<f64>],
+    reach: f64,
+) -> Option<[usize; 2]> {
+    let nearest = nearest_junctions(ends, junctions)?;
+    let near = |k: usize| (junctions[nearest[k]] - ends[k]).norm() <= reach;
+    (nearest[0] != nearest[1] && near(0) && near(1)).then_some(nearest)
 }
 
 fn extent(graph: &MeasuredGraph) -> f64 {
     let of_arcs = graph.arcs.iter().flat_map(|arc| arc.points(TURN));
-    let of_arcs: Vec<Vector3<f64>> = of_arcs.collect();
-    let bounds = Bounds::of(graph.wireframe.junctions.iter().chain(&of_arcs));
+    let of_splines = graph.splines.iter().flat_map(|spline| spline.points(TURN));
+    let of_curves: Vec<Vector3<f64>> = of_arcs.chain(of_splines).collect();
+    let bounds = Bounds::of(graph.wireframe.junctions.iter().chain(&of_curves));
     // There may be nothing.
     bounds.extent().max(0.0)
 }

@@ -50,7 +50,7 @@ impl Item<'_> {
 
 /// The planes that explain more than they cost, the one that explains most first.
 pub(super) fn explained_planes(curves: &Curves, points: &[Measured]) -> Vec<PlaneFit> {
-    let edges = || curves.observed().filter(|curve| curve.arc.is_none());
+    let edges = || curves.observed().filter(|curve| curve.is_straight());
     let mut items: Vec<Item> = edges()
         .map(|edge| Item {
             measured: &edge.measured,
@@ -260,6 +260,7 @@ mod tests {
         let curves = Curves::new(&MeasuredGraph {
             wireframe: &wireframe,
             arcs: &[],
+            splines: &[],
             covariances: &[],
         });
         let mut noise = Noise(3);

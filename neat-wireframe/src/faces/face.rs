@@ -1,9 +1,9 @@
 //! Faces and shells: what a boundary representation is made of.
 
-use super::curves::nearest_junctions;
+use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 use super::surface::Surface;
 use nalgebra::Vector3;
-use neat_core::{CircularArc, Wireframe3d};
+use neat_core::{CircularArc, Spline, Wireframe3d};
 use serde::{Deserialize, Serialize};
 
 /// Faces that hang together by the curves that they share.
@@ -16,7 +16,7 @@ pub struct Shell {
     pub faces: Vec<Face>,
 }
 
-/// A part of a surface, bounded by edges and arcs.
+/// A part of a surface, bounded by edges, arcs and splines.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Face {
     /// What it is a part of, with the side to which its normal points.
@@ -38,7 +38,8 @@ pub struct Step {
     pub reversed: bool,
 }
 
-/// What bounds a face: an edge or an arc of the wireframe, by its index, or an inferred line.
+/// What bounds a face: an edge, an arc or a spline of the wireframe, by its index, or an inferred
+/// line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CurveIndex {
@@ -46,6 +47,8 @@ pub enum CurveIndex {
     Edge(usize),
     /// An arc, which may be a whole circle.
     Arc(usize),
+    /// A spline, which may run around.
+    Spline(usize),
     /// No edge, but a straight line between two junctions, the lower first, where two faces meet,
     /// without a crease or with one that no image shows from end to end: inferred.
     Smooth([usize; 2]),
@@ -81,7 +84,7 @@ impl Shell {
         let step = |step: &Step| {
             let curve = match step.curve {
                 CurveIndex::Edge(edge) => CurveIndex::Edge(new_edge(edge)?),
-                arc @ CurveIndex::Arc(_) => arc,
+                curve @ (CurveIndex::Arc(_) | CurveIndex::Spline(_)) => curve,
                 CurveIndex::Smooth([a, b]) => {
                     CurveIndex::Smooth([new_junction(a)?, new_junction(b)?])
                 }
@@ -107,10 +110,16 @@ impl Face {
     /// Whether its surface is one, and its loops are closed chains of curves that exist: any number
     /// on a plane; on a cylinder or a cone two arcs, which are loops of their own or joined by two
     /// edges or inferred lines.
-    pub(crate) fn is_valid(&self, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> bool {
+    pub(crate) fn is_valid(
+        &self,
+        wireframe: &Wireframe3d,
+        arcs: &[CircularArc],
+        splines: &[Spline],
+    ) -> bool {
         let exists = |step: &Step| match step.curve {
             CurveIndex::Edge(edge) => edge < wireframe.edges.len(),
             CurveIndex::Arc(arc) => arc < arcs.len(),
+            CurveIndex::Spline(spline) => spline < splines.len(),
             CurveIndex::Smooth([a, b]) => a < b && b < wireframe.junctions.len(),
         };
         let is_arc = |step: &Step| matches!(step.curve, CurveIndex::Arc(_));
@@ -128,7 +137,7 @@ impl Face {
         self.surface.is_valid()
             && has_shape
             && self.steps().all(exists)
-            && (self.loops.iter()).all(|steps| is_closed(steps, wireframe, arcs))
+            && (self.loops.iter()).all(|steps| is_closed(steps, wireframe, (arcs, splines)))
     }
 
     /// The steps of all loops.
@@ -170,12 +179,21 @@ impl Step {
     }
 }
 
-/// Whether each step begins where the one before it ends. A step alone is a circle.
-fn is_closed(steps: &[Step], wireframe: &Wireframe3d, arcs: &[CircularArc]) -> bool {
+/// Whether each step begins where the one before it ends. A step alone is a circle or a spline that
+/// runs around.
+fn is_closed(
+    steps: &[Step],
+    wireframe: &Wireframe3d,
+    (arcs, splines): (&[CircularArc], &[Spline]),
+) -> bool {
+    let junctions = &wireframe.junctions;
     let ends = |step: &Step| {
         let [start, end] = match step.curve {
             CurveIndex::Edge(edge) => wireframe.edges[edge],
-            CurveIndex::Arc(arc) => nearest_junctions(&arcs[arc], &wireframe.junctions)?,
+            CurveIndex::Arc(arc) => nearest_junctions(ends_of_arc(&arcs[arc]), junctions)?,
+            CurveIndex::Spline(spline) => {
+                nearest_junctions(ends_of_spline(&splines[spline]), junctions)?
+            }
             CurveIndex::Smooth(ends) => ends,
         };
         Some(if step.reversed {
@@ -189,6 +207,7 @@ fn is_closed(steps: &[Step], wireframe: &Wireframe3d, arcs: &[CircularArc]) -> b
         [step] => match step.curve {
             CurveIndex::Edge(_) | CurveIndex::Smooth(_) => false,
             CurveIndex::Arc(arc) => arcs[arc].is_closed(),
+            CurveIndex::Spline(spline) => splines[spline].closed,
         },
         [.., last] => {
             let before = std::iter::once(last).chain(steps);

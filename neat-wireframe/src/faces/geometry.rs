@@ -5,12 +5,12 @@
 //! boundary representation wants them on all of them; they move by the shortest way that leads
 //! there.
 
-use super::curves::nearest_junctions;
+use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 use super::face::{CurveIndex, Face, Shell, Step};
 use super::plane_fit::across;
 use super::surface::Surface;
 use nalgebra::{DMatrix, DVector, Vector3};
-use neat_core::{CircularArc, Wireframe3d};
+use neat_core::{CircularArc, Spline, Wireframe3d};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -23,12 +23,14 @@ const MIN_SINGULAR: f64 = 0.05;
 const STEPS: usize = 4;
 
 /// A curve as a shell has it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShellCurve {
-    /// The junctions at its start and end; `None` for a whole circle.
+    /// The junctions at its start and end; `None` if it is closed.
     pub ends: Option<[usize; 2]>,
     /// The arc, if it is one. Whole circles of one axis start in the same direction.
     pub arc: Option<CircularArc>,
+    /// The spline, if it is one, in the planes of its faces.
+    pub spline: Option<Spline>,
 }
 
 /// Vertices and curves of one shell, by their indices in the wireframe.
@@ -36,7 +38,7 @@ pub struct ShellCurve {
 pub struct ShellGeometry {
     /// The junctions at which its curves end.
     pub vertices: BTreeMap<usize, Vector3<f64>>,
-    /// Its edges and arcs.
+    /// Its edges, arcs and splines.
     pub curves: BTreeMap<CurveIndex, ShellCurve>,
     /// A point of it: far from the origin of the frame, areas and volumes would lose their digits.
     origin: Vector3<f64>,
@@ -47,7 +49,12 @@ impl ShellGeometry {
     ///
     /// # Panics
     /// If the shell names curves that the wireframe does not have.
-    pub fn new(shell: &Shell, wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Self {
+    pub fn new(
+        shell: &Shell,
+        wireframe: &Wireframe3d,
+        arcs: &[CircularArc],
+        splines: &[Spline],
+    ) -> Self {
         let mut surfaces_of: BTreeMap<CurveIndex, Vec<Surface>> = BTreeMap::new();
         let mut curves = BTreeMap::new();
         for face in &shell.faces {
@@ -57,22 +64,7 @@ impl ShellGeometry {
                         .entry(step.curve)
                         .or_default()
                         .push(face.surface);
-                    let curve = match step.curve {
-                        CurveIndex::Edge(edge) => ShellCurve {
-                            ends: Some(wireframe.edges[edge]),
-                            arc: None,
-                        },
-                        CurveIndex::Arc(arc) => ShellCurve {
-                            ends: (steps.len() > 1)
-                                .then(|| nearest_junctions(&arcs[arc], &wireframe.junctions))
-                                .flatten(),
-                            arc: Some(arcs[arc]),
-                        },
-                        CurveIndex::Smooth(ends) => ShellCurve {
-                            ends: Some(ends),
-                            arc: None,
-                        },
-                    };
+                    let curve = as_measured(step, steps.len() > 1, wireframe, (arcs, splines));
                     curves.insert(step.curve, curve);
                 }
             }
@@ -86,10 +78,17 @@ impl ShellGeometry {
                     .extend(&surfaces_of[index]);
             }
         }
-        let vertices = (surfaces_at.into_iter())
+        let vertices: BTreeMap<usize, Vector3<f64>> = (surfaces_at.into_iter())
             .map(|(j, surfaces)| (j, on_surfaces(wireframe.junctions[j], &surfaces)))
             .collect();
         for (index, curve) in &mut curves {
+            if let Some(spline) = &mut curve.spline {
+                *spline = spline.map(|point| on_surfaces(*point, &surfaces_of[index]));
+                let last = spline.controls.len() - 1;
+                for (control, end) in [0, last].into_iter().zip(curve.ends.iter().flatten()) {
+                    spline.controls[control] = vertices[end];
+                }
+            }
             if let Some(arc) = &mut curve.arc {
                 *arc = match curve.ends {
                     None => circle_on_surfaces(arc, &surfaces_of[index], true),
@@ -100,13 +99,12 @@ impl ShellGeometry {
                 }
             }
         }
-        let centers = curves.values().filter_map(|curve| Some(curve.arc?.center));
-        let origin = vertices
-            .values()
-            .copied()
-            .chain(centers)
-            .next()
-            .unwrap_or_default();
+        let inner = curves.values().filter_map(|curve| {
+            let of_spline = curve.spline.as_ref().map(|spline| spline.controls[0]);
+            curve.arc.map(|arc| arc.center).or(of_spline)
+        });
+        let origin = vertices.values().copied().chain(inner).next();
+        let origin = origin.unwrap_or_default();
         Self {
             vertices,
             curves,
@@ -114,15 +112,14 @@ impl ShellGeometry {
         }
     }
 
-    /// Points along a step, both ends among them; arcs turn by `most` radians at most from one to
-    /// the next. The first and the last of a circle are the same.
+    /// Points along a step, both ends among them; arcs and splines turn by `most` radians at most
+    /// from one to the next. The first and the last of a closed one are the same.
     pub fn points(&self, step: &Step, most: f64) -> Vec<Vector3<f64>> {
         let curve = &self.curves[&step.curve];
-        let mut points = match (&curve.arc, curve.ends) {
+        let mut points = match (&curve.arc, &curve.spline) {
             (Some(arc), _) => arc.points(most),
-            (None, ends) => ends
-                .iter()
-                .flatten()
+            (None, Some(spline)) => spline.points(most),
+            (None, None) => (curve.ends.iter().flatten())
                 .map(|end| self.vertices[end])
                 .collect(),
         };
@@ -163,6 +160,9 @@ impl ShellGeometry {
             let ends = curve
                 .ends
                 .map(|ends| ends.map(|end| self.vertices[&end] - self.origin));
+            if let Some(spline) = &curve.spline {
+                return sign * area_vector_of_spline(spline, &self.origin);
+            }
             let twice = match (&curve.arc, ends) {
                 (Some(arc), ends) => {
                     let [start, end] = ends.unwrap_or_default();
@@ -218,6 +218,55 @@ impl ShellGeometry {
             }
         }
     }
+}
+
+/// The curve of a step as the wireframe has it: `open` if others are beside it in its loop.
+fn as_measured(
+    step: &Step,
+    open: bool,
+    wireframe: &Wireframe3d,
+    (arcs, splines): (&[CircularArc], &[Spline]),
+) -> ShellCurve {
+    let junctions = |ends| open.then(|| nearest_junctions(ends, &wireframe.junctions))?;
+    match step.curve {
+        CurveIndex::Edge(edge) => ShellCurve {
+            ends: Some(wireframe.edges[edge]),
+            ..ShellCurve::default()
+        },
+        CurveIndex::Arc(arc) => ShellCurve {
+            ends: junctions(ends_of_arc(&arcs[arc])),
+            arc: Some(arcs[arc]),
+            spline: None,
+        },
+        CurveIndex::Spline(spline) => ShellCurve {
+            ends: junctions(ends_of_spline(&splines[spline])),
+            arc: None,
+            spline: Some(splines[spline].clone()),
+        },
+        CurveIndex::Smooth(ends) => ShellCurve {
+            ends: Some(ends),
+            ..ShellCurve::default()
+        },
+    }
+}
+
+/// The integral of x × dx along a spline, with x from an origin: each piece is a cubic in its
+/// place, so that it is a polynomial of degree 5, which three points of Gauss and Legendre have
+/// exactly.
+pub(crate) fn area_vector_of_spline(spline: &Spline, origin: &Vector3<f64>) -> Vector3<f64> {
+    let spread = 0.6_f64.sqrt();
+    let nodes = [(-spread, 5.0), (0.0, 8.0), (spread, 5.0)];
+    let of_piece = |[a, b, c, d]: &[Vector3<f64>; 4]| -> Vector3<f64> {
+        let of_node = |(node, weight): (f64, f64)| {
+            let t = 0.5 * (1.0 + node);
+            let s = 1.0 - t;
+            let point = a * (s * s * s) + (b * s + c * t) * (3.0 * s * t) + d * (t * t * t);
+            let along = ((b - a) * (s * s) + (c - b) * (2.0 * s * t) + (d - c) * (t * t)) * 3.0;
+            (point - origin).cross(&along) * (weight / 18.0)
+        };
+        nodes.into_iter().map(of_node).sum()
+    };
+    spline.beziers().iter().map(of_piece).sum()
 }
 
 /// The nearest point on all surfaces, or the best one if there is none.

@@ -27,10 +27,10 @@
 //!         .filter(|[a, b]| a != b)
 //!         .collect(),
 //! };
-//! let graph = MeasuredGraph { wireframe: &cube, arcs: &[], covariances: &[] };
+//! let graph = MeasuredGraph { wireframe: &cube, arcs: &[], splines: &[], covariances: &[] };
 //! let shells = find_shells(&graph, &[], &[]);
 //! assert!(shells[0].closed && shells[0].faces.len() == 6);
-//! let geometry = ShellGeometry::new(&shells[0], &cube, &[]);
+//! let geometry = ShellGeometry::new(&shells[0], &cube, &[], &[]);
 //! assert!((geometry.volume(&shells[0]) - 1.0).abs() < 1e-9);
 //! ```
 
@@ -66,10 +66,11 @@ mod sheet_tests;
 mod tests;
 
 pub use curves::MeasuredGraph;
-pub(crate) use curves::nearest_junctions;
+pub(crate) use curves::{ends_of_arc, nearest_junctions};
 pub use face::{CurveIndex, Face, Shell, Step};
 pub(crate) use triangulation::triangles;
 
+pub(crate) use geometry::area_vector_of_spline;
 pub use geometry::{ShellCurve, ShellGeometry};
 pub use surface::Surface;
 pub use surface_points::{SurfacePoint, surface_points};

@@ -166,6 +166,7 @@ mod tests {
         let curves = Curves::new(&MeasuredGraph {
             wireframe: &wireframe,
             arcs: &[],
+            splines: &[],
             covariances: &[],
         });
         let points = curves.all.iter().flat_map(|curve| &curve.measured);

@@ -49,16 +49,26 @@ pub(super) fn coplanar_curves(curves: &Curves) -> Vec<CoplanarCurves> {
     planes
 }
 
-/// Pairs of edges at a junction and single arcs, those first that determine their plane best: by
+/// Pairs of edges at a junction and single arcs and splines, those first that determine their plane best: by
 /// the area that they span.
 fn seeds(curves: &Curves) -> Vec<Vec<usize>> {
     let mut at_junction: Vec<(usize, usize)> = Vec::new();
     let mut seeds: Vec<(f64, Vec<usize>)> = Vec::new();
     for (place, curve) in curves.all.iter().enumerate() {
-        match &curve.arc {
-            Some(arc) => seeds.push((arc.radius.powi(2) * arc.sweep(), vec![place])),
-            None => at_junction.extend(curve.ends.iter().flatten().map(|end| (*end, place))),
+        if curve.is_straight() {
+            at_junction.extend(curve.ends.iter().flatten().map(|end| (*end, place)));
+            continue;
         }
+        let area = match &curve.arc {
+            Some(arc) => arc.radius.powi(2) * arc.sweep(),
+            None => {
+                let from_start = |k: usize| curve.points[k] - curve.points[0];
+                let pieces = 1..curve.points.len();
+                let twice = pieces.map(|k| from_start(k - 1).cross(&from_start(k)));
+                twice.sum::<Vector3<f64>>().norm()
+            }
+        };
+        seeds.push((area, vec![place]));
     }
     at_junction.sort_unstable();
     let along = |place: usize| curves.all[place].points[1] - curves.all[place].points[0];

@@ -116,8 +116,9 @@ impl Leaving {
                     -arc.tangent_at(arc.angles[1]),
                 ],
                 None => {
-                    let along = (curve.points[last] - curve.points[0]).normalize();
-                    [along, -along]
+                    let points = &curve.points;
+                    let ends = [points[1] - points[0], points[last - 1] - points[last]];
+                    ends.map(|along| along.normalize())
                 }
             };
             for (junction, direction) in [start, end].into_iter().zip(directions) {

@@ -61,6 +61,7 @@ fn shells_in(
     let graph = MeasuredGraph {
         wireframe,
         arcs: &[],
+        splines: &[],
         covariances: &[],
     };
     find_shells(&graph, views, points)
@@ -86,11 +87,11 @@ fn points_close_a_wall_that_lacks_an_edge_around_what_they_see_through() {
     let shells = shells_of(&wall, &points);
     let area: f64 = (shells.iter())
         .flat_map(|shell| {
-            let geometry = ShellGeometry::new(shell, &wall, &[]);
+            let geometry = ShellGeometry::new(shell, &wall, &[], &[]);
             shell.faces.iter().map(move |face| geometry.area(face))
         })
         .sum();
-    let is_valid = |face: &Face| face.is_valid(&wall, &[]);
+    let is_valid = |face: &Face| face.is_valid(&wall, &[], &[]);
     assert!(shells.iter().flat_map(|shell| &shell.faces).all(is_valid));
     assert!(shells.iter().all(|shell| !shell.closed));
     assert!((area - (1.44 - 0.16)).abs() < 1e-9, "{area} {shells:?}");

@@ -98,7 +98,7 @@ fn orient(faces: &mut [Face]) -> bool {
 /// Turns all faces if a closed shell has its normals inward, or more of a sheet is seen from
 /// behind.
 fn face_outward(shell: &mut Shell, graph: &MeasuredGraph, views: &[ViewObservation]) {
-    let geometry = ShellGeometry::new(shell, graph.wireframe, graph.arcs);
+    let geometry = ShellGeometry::new(shell, graph.wireframe, graph.arcs, graph.splines);
     let outward = if shell.closed {
         geometry.volume(shell)
     } else {

@@ -1,7 +1,9 @@
 use super::*;
+use crate::export::WireframeDocument;
 use nalgebra::{Rotation3, Vector2, Vector3};
-use neat_core::{CircularArc, Wireframe3d};
+use neat_core::{CircularArc, Spline, Wireframe3d};
 use std::f64::consts::{PI, TAU};
+use std::path::Path;
 
 #[derive(Clone, Default)]
 struct Model {
@@ -53,6 +55,7 @@ impl Model {
         let graph = MeasuredGraph {
             wireframe: &self.wireframe,
             arcs: &self.arcs,
+            splines: &[],
             covariances: &[],
         };
         find_shells(&graph, &[], &[])
@@ -63,9 +66,9 @@ impl Model {
         let shells = self.shells();
         assert_eq!(shells.len(), 1, "{shells:?}");
         assert!(shells[0].closed, "{shells:?}");
-        let is_valid = |face: &Face| face.is_valid(&self.wireframe, &self.arcs);
+        let is_valid = |face: &Face| face.is_valid(&self.wireframe, &self.arcs, &[]);
         assert!(shells[0].faces.iter().all(is_valid));
-        let geometry = ShellGeometry::new(&shells[0], &self.wireframe, &self.arcs);
+        let geometry = ShellGeometry::new(&shells[0], &self.wireframe, &self.arcs, &[]);
         (shells[0].faces.len(), geometry.volume(&shells[0]))
     }
 }
@@ -367,7 +370,7 @@ fn geometry_lies_on_the_surfaces() {
     assert_eq!(faces, 7);
     assert!((volume - 0.8 * (1.0 - PI * 0.04)).abs() < 3e-3, "{volume}");
     let shell = &block.shells()[0];
-    let geometry = ShellGeometry::new(shell, &block.wireframe, &block.arcs);
+    let geometry = ShellGeometry::new(shell, &block.wireframe, &block.arcs, &[]);
     for face in &shell.faces {
         for point in face.steps().flat_map(|step| geometry.points(step, 0.1)) {
             let (off, _) = face.surface.height_of(&point);
@@ -385,7 +388,7 @@ fn normals_point_out_and_loops_keep_the_face_on_their_left() {
         };
         assert!(normal.dot(&Vector3::repeat(0.5)) < offset);
         let frame = plane_fit::PlaneFrame::new(normal, offset);
-        let geometry = ShellGeometry::new(&model.shells()[0], &model.wireframe, &[]);
+        let geometry = ShellGeometry::new(&model.shells()[0], &model.wireframe, &[], &[]);
         let polygon: Vec<Vector2<f64>> = (face.loops[0].iter())
             .map(|step| frame.coordinates(&geometry.points(step, 0.1)[0]))
             .collect();
@@ -404,7 +407,7 @@ fn a_similarity_moves_faces() {
         let shell = model.shells()[0].map(moved);
         let wireframe = model.wireframe.map(moved);
         let arcs: Vec<CircularArc> = model.arcs.iter().map(|arc| arc.map(moved)).collect();
-        let geometry = ShellGeometry::new(&shell, &wireframe, &arcs);
+        let geometry = ShellGeometry::new(&shell, &wireframe, &arcs, &[]);
         let volume = 27.0 * 0.8 * (1.0 - PI * 0.04);
         assert!((geometry.volume(&shell) - volume).abs() < 1e-9 * volume);
         assert!(shell.faces.iter().all(|face| geometry.area(face) > 0.0));
@@ -412,7 +415,7 @@ fn a_similarity_moves_faces() {
             shell
                 .faces
                 .iter()
-                .all(|face| face.is_valid(&wireframe, &arcs))
+                .all(|face| face.is_valid(&wireframe, &arcs, &[]))
         );
     }
 }
@@ -529,4 +532,78 @@ fn nothing_is_inferred_where_an_arc_ends_at_a_corner_or_alone() {
     let at_arc = |edge: &[usize; 2]| edge.iter().any(|end| [2, 3, 7, 8].contains(end));
     bare.wireframe.edges.retain(at_arc);
     assert_eq!(inferred(&bare.turned().shells()), 0);
+}
+
+/// An ellipse with half axes of .3 and .2 about a point, by so many control points.
+fn oval([x, y, z]: [f64; 3], controls: usize) -> Spline {
+    let control = |k: usize| {
+        let (sine, cosine) = (TAU * k as f64 / controls as f64).sin_cos();
+        Vector3::new(x + 0.3 * cosine, y + 0.2 * sine, z)
+    };
+    Spline {
+        controls: (0..controls).map(control).collect(),
+        closed: true,
+    }
+}
+
+#[test]
+fn splines_are_holes_and_borders_of_planes() {
+    // A box with an oval hole in its top, and half of another one upright beside it.
+    let mut model = Model::default().prism(&SQUARE, [0.0, 1.0]);
+    let around = oval([2.0, 0.0, 0.0], 16);
+    let upright = |p: &Vector3<f64>| Vector3::new(p.x, 0.0, p.y);
+    let half = Spline {
+        controls: around.controls[..9].iter().map(upright).collect(),
+        closed: false,
+    };
+    let first = model.wireframe.junctions.len();
+    (model.wireframe.junctions).extend([half.controls[8], half.controls[0]]);
+    model.wireframe.edges.push([first, first + 1]);
+    let splines = [oval([0.5, 0.5, 1.0], 16), half];
+    let graph = MeasuredGraph {
+        wireframe: &model.wireframe,
+        arcs: &[],
+        splines: &splines,
+        covariances: &[],
+    };
+    let shells = find_shells(&graph, &[], &[]);
+    let document = WireframeDocument {
+        shells: shells.clone(),
+        splines: splines.to_vec(),
+        ..WireframeDocument::from(&model.wireframe)
+    };
+    document.check(Path::new("")).unwrap();
+    let triangles = document.triangles_of_faces();
+    let points = document.drawn().junctions;
+    let cut = |[a, b, c]: &[usize; 3]| {
+        let [a, b, c] = [a, b, c].map(|corner| points[*corner]);
+        0.5 * (b - a).cross(&(c - a)).norm()
+    };
+    let (mut face, mut with_splines) = (0, Vec::new());
+    for shell in &shells {
+        assert!(!shell.closed);
+        let geometry = ShellGeometry::new(shell, &model.wireframe, &[], &splines);
+        for bounded in &shell.faces {
+            let is_spline = |step: &Step| matches!(step.curve, CurveIndex::Spline(_));
+            if bounded.steps().any(is_spline) {
+                let area: f64 = triangles[face].iter().map(cut).sum();
+                with_splines.push((bounded.loops.len(), geometry.area(bounded).abs(), area));
+            }
+            face += 1;
+        }
+    }
+    assert_eq!(face, 7);
+    with_splines.sort_by_key(|(loops, ..)| *loops);
+    let [(1, half, half_cut), (2, top, top_cut)] = with_splines[..] else {
+        panic!("{with_splines:?}");
+    };
+    // What the curves enclose, by many points.
+    let enclosed = |spline: &Spline| {
+        let points = spline.points(1e-3);
+        let pairs = points.windows(2).map(|ends| ends[0].cross(&ends[1]));
+        0.5 * pairs.sum::<Vector3<f64>>()
+    };
+    assert!((top - (1.0 - enclosed(&splines[0]).z.abs())).abs() < 1e-5);
+    assert!((half - enclosed(&splines[1]).y.abs()).abs() < 1e-5);
+    assert!((top_cut - top).abs() < 1e-3 && (half_cut - half).abs() < 1e-3);
 }

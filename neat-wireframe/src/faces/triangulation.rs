@@ -15,13 +15,13 @@ type Corner = (usize, Vector2<f64>);
 /// watertight.
 ///
 /// - `edges`: the junctions that each edge joins.
-/// - `chains`: for each arc the points along it from start to end; of a whole circle the first
-///   comes once more.
-/// - `points`: what both are indices of. Junctions come first, and stand for the ends of arcs.
+/// - `chains`: for each arc, and for each spline, the points along it from start to end; of a
+///   closed one the first comes once more.
+/// - `points`: what all are indices of. Junctions come first, and stand for the ends of arcs.
 pub(crate) fn triangles(
     shells: &[Shell],
     edges: &[[usize; 2]],
-    chains: &[Vec<usize>],
+    chains: [&[Vec<usize>]; 2],
     points: &[Vector3<f64>],
 ) -> Vec<Vec<[usize; 3]>> {
     let of_face = |face: &Face| {
@@ -58,18 +58,19 @@ pub(crate) fn triangles(
     faces.map(of_face).collect()
 }
 
-/// The points along a step of a loop, both ends among them. The ends of an arc are those of the
+/// The points along a step of a loop, both ends among them. The ends of a curve are those of the
 /// edges beside it.
 fn indices_along(
     steps: &[Step],
     place: usize,
     edges: &[[usize; 2]],
-    chains: &[Vec<usize>],
+    [arcs, splines]: [&[Vec<usize>]; 2],
 ) -> Vec<usize> {
     let along = |step: &Step| {
         let mut along = match step.curve {
             CurveIndex::Edge(edge) => edges[edge].to_vec(),
-            CurveIndex::Arc(arc) => chains[arc].clone(),
+            CurveIndex::Arc(arc) => arcs[arc].clone(),
+            CurveIndex::Spline(spline) => splines[spline].clone(),
             CurveIndex::Smooth(ends) => ends.to_vec(),
         };
         if step.reversed {
@@ -80,7 +81,7 @@ fn indices_along(
     let count = steps.len();
     let mut indices = along(&steps[place]);
     let [before, after] = [count - 1, 1].map(|k| &steps[(place + k) % count]);
-    let is_edge = |step: &Step| !matches!(step.curve, CurveIndex::Arc(_));
+    let is_edge = |step: &Step| matches!(step.curve, CurveIndex::Edge(_) | CurveIndex::Smooth(_));
     let last = indices.len() - 1;
     if is_edge(before) {
         indices[0] = along(before)[1];

@@ -3,7 +3,7 @@
 use super::EdgeKinds;
 use crate::used_junctions::UsedJunctions;
 use nalgebra::Vector3;
-use neat_core::{CircularArc, Wireframe3d};
+use neat_core::{CircularArc, Spline, Wireframe3d};
 
 /// Cosine of the largest angle at which two pieces go on in each other, about 2°: pieces of one
 /// edge are fitted each on its own.
@@ -24,13 +24,13 @@ pub struct WithoutPaint {
 
 /// The wireframe without the edges that are structure with less than this probability, and the
 /// kinds of the others. Edges that were cut only where one of these met them are whole again, and
-/// junctions that had no other edge are gone, unless an arc ends there.
+/// junctions that had no other edge are gone, unless an arc or a spline ends there.
 ///
 /// # Panics
 /// If the kinds are of another wireframe.
 pub fn without_paint(
     wireframe: &Wireframe3d,
-    arcs: &[CircularArc],
+    (arcs, splines): (&[CircularArc], &[Spline]),
     kinds: &[EdgeKinds],
     min_structure: f64,
 ) -> WithoutPaint {
@@ -49,15 +49,19 @@ pub fn without_paint(
             ends.iter().for_each(|end| touched[*end] = true);
         }
     }
-    let ends_arc = |point: &Vector3<f64>| {
+    let ends_curve = |point: &Vector3<f64>| {
         let is_end = |arc: &CircularArc| {
             let apart = arc.angles.map(|angle| (arc.point_at(angle) - point).norm());
             apart.into_iter().any(|apart| apart <= AT_END * arc.radius)
         };
-        arcs.iter().any(is_end)
+        let ends_spline = |spline: &Spline| {
+            let ends = [spline.controls.first(), spline.controls.last()];
+            !spline.closed && ends.contains(&Some(point))
+        };
+        arcs.iter().any(is_end) || splines.iter().any(ends_spline)
     };
     let is_cut =
-        |junction: &usize| touched[*junction] && !ends_arc(&wireframe.junctions[*junction]);
+        |junction: &usize| touched[*junction] && !ends_curve(&wireframe.junctions[*junction]);
     let (cut, others): (Vec<usize>, Vec<usize>) = (0..touched.len()).partition(is_cut);
     for junction in cut {
         graph.heal(junction);
@@ -177,13 +181,13 @@ mod tests {
     }
 
     fn left(wireframe: &Wireframe3d, arcs: &[CircularArc], kinds: &[EdgeKinds]) -> Wireframe3d {
-        without_paint(wireframe, arcs, kinds, 0.5).wireframe
+        without_paint(wireframe, (arcs, &[]), kinds, 0.5).wireframe
     }
 
     #[test]
     fn edges_that_paint_has_cut_are_whole_again() {
         let (wireframe, kinds) = crossed();
-        let left = without_paint(&wireframe, &[], &kinds, 0.5);
+        let left = without_paint(&wireframe, (&[], &[]), &kinds, 0.5);
         assert_eq!(left.wireframe.edges, [[0, 1]]);
         let ends = [wireframe.junctions[0], wireframe.junctions[2]];
         assert_eq!(left.wireframe.junctions, ends);
@@ -214,9 +218,9 @@ mod tests {
     fn what_is_not_asked_for_stays() {
         let (mut wireframe, kinds) = crossed();
         wireframe.junctions.push(Vector3::new(9.0, 0.0, 0.0));
-        let all = without_paint(&wireframe, &[], &kinds, 0.0);
+        let all = without_paint(&wireframe, (&[], &[]), &kinds, 0.0);
         assert_eq!((&all.wireframe, &all.kinds), (&wireframe, &kinds));
-        let nothing = without_paint(&wireframe, &[], &kinds, 1.0).wireframe;
+        let nothing = without_paint(&wireframe, (&[], &[]), &kinds, 1.0).wireframe;
         assert_eq!(nothing.junctions, [wireframe.junctions[4]]);
         assert!(nothing.edges.is_empty());
     }
