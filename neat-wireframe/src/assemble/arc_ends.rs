@@ -56,9 +56,7 @@ pub(super) fn end_at_junctions(
     let kept: Vec<bool> = left.by_ref().take(edges.len()).collect();
     retain_edges(&kept, edges, sources);
     curved.retain(|_| left.next() == Some(true));
-    let of_curves = curved.iter().flat_map(|edge| edge.ends);
-    let used: BTreeSet<usize> = edges.iter().flatten().copied().chain(of_curves).collect();
-    let junctions: Vec<Vector3<f64>> = used.iter().map(|j| junctions[*j]).collect();
+    let junctions = junctions_of_edges(wireframe, curved);
     let ended = arcs.par_iter().map(|found| {
         if is_small(found) {
             return vec![found.clone()];
@@ -67,6 +65,17 @@ pub(super) fn end_at_junctions(
         Ends::new(images, &ended, &junctions).without_gaps()
     });
     *arcs = ended.flatten_iter().collect();
+}
+
+/// The junctions at which edges end, straight and curved ones.
+pub(super) fn junctions_of_edges(
+    wireframe: &Wireframe3d,
+    curved: &[CurvedEdge],
+) -> Vec<Vector3<f64>> {
+    let of_curves = curved.iter().flat_map(|edge| edge.ends);
+    let of_edges = wireframe.edges.iter().flatten().copied();
+    let used: BTreeSet<usize> = of_edges.chain(of_curves).collect();
+    used.iter().map(|j| wireframe.junctions[*j]).collect()
 }
 
 /// Takes the edges, each by its start, middle and end, that lie on the circle of an arc and along

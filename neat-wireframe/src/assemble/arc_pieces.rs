@@ -1,7 +1,10 @@
-//! Arcs that are pieces of one circle become one: growth stops where an arc drifts to another rim,
-//! and the rest of the circle is found by another chord.
+//! Each arc once, and whole.
+//!
+//! Growth stops where an arc drifts to another rim, and the rest of its circle is found by another
+//! chord: arcs that one circle explains become one. And what runs along one rim here and along
+//! another one there is none: lines and surer arcs have its edgels.
 
-use super::circle_fitting::{FoundArc, Sector};
+use super::circle_fitting::FoundArc;
 use super::claimed_edgels::claim_edgels;
 use super::corners::WINDOW_IN_PIXELS;
 use super::curves::BESIDE_IN_PIXELS;
@@ -76,12 +79,8 @@ impl Images<'_> {
             ..circle
         };
         let mut views: Vec<usize> = (pieces.iter())
-            .flat_map(|piece| {
-                piece
-                    .sectors
-                    .iter()
-                    .flat_map(|s: &Sector| s.evidence.views())
-            })
+            .flat_map(|piece| &piece.sectors)
+            .flat_map(|sector| sector.evidence.views())
             .collect();
         views.sort_unstable();
         views.dedup();

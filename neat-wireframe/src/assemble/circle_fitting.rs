@@ -88,6 +88,13 @@ pub(super) fn changed(circle: &CircularArc, change: &[f64], scale: f64) -> Circu
     }
 }
 
+/// How many sectors of equal length a curve of this length has.
+pub(super) fn sectors_along(length: f64, pixel: f64) -> f64 {
+    (length / (SECTOR_IN_PIXELS * pixel))
+        .ceil()
+        .clamp(1.0, MAX_SECTORS)
+}
+
 fn angles_of(sectors: &[Sector]) -> [f64; 2] {
     [sectors[0].angles[0], sectors[sectors.len() - 1].angles[1]]
 }
@@ -145,7 +152,7 @@ impl Images<'_> {
     /// Takes the edgels beside an arc, in all views.
     pub(super) fn claim_arc(&self, found: &FoundArc, taken: &mut [Vec<bool>]) {
         let FoundArc { arc, pixel, .. } = found;
-        let parts = (arc.length() / (SECTOR_IN_PIXELS * pixel)).ceil().max(1.0);
+        let parts = sectors_along(arc.length(), *pixel);
         let width = arc.sweep() / parts;
         taken.par_iter_mut().enumerate().for_each(|(view, taken)| {
             for part in 0..parts as usize {
@@ -281,15 +288,13 @@ impl Images<'_> {
         pixel: f64,
         taken: Option<&[Vec<bool>]>,
     ) -> f64 {
-        let count = ((to - from) * arc.radius / (SECTOR_IN_PIXELS * pixel)).ceil();
-        let width = (to - from) / count.max(1.0);
+        let count = sectors_along((to - from) * arc.radius, pixel);
+        let width = (to - from) / count;
         let sector = |k: usize| {
             let low = from + k as f64 * width;
             self.evidence_of_sector(arc, [low, low + width], taken).gain
         };
-        (0..count.clamp(1.0, MAX_SECTORS) as usize)
-            .map(sector)
-            .sum()
+        (0..count as usize).map(sector).sum()
     }
 
     /// Samples of a part of an arc in a view; `None` where it does not see enough of it.

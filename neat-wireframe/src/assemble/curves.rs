@@ -56,11 +56,11 @@ pub(super) fn find_arcs(
     chords.extend(rounded_corners(images, &selection.lines, &taken));
     tracing::debug!(pieces, chords = chords.len(), "curves are proposed");
     let grown = grown_arcs(images, &chords);
-    let chosen = chosen_arcs(images, grown, taken.clone(), config.min_evidence);
-    let count = chosen.len();
-    let merged = images.merge_arcs(chosen);
-    tracing::debug!(count, merged = merged.len(), "arcs are merged");
-    let mut arcs = chosen_arcs(images, merged, taken, config.min_evidence);
+    let mut arcs = chosen_arcs(images, grown, taken.clone(), config.min_evidence);
+    let merged = images.merge_arcs(arcs.clone());
+    if merged.len() < arcs.len() {
+        arcs = chosen_arcs(images, merged, taken, config.min_evidence);
+    }
     retain_steady(images, &mut arcs);
     ControlFlow::Continue(arcs)
 }

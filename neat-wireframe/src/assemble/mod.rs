@@ -80,7 +80,7 @@ pub use report::{AssembleReport, Assembled};
 
 use crate::paper::NeatLine;
 use crate::{ViewObservation, Wireframe3d};
-use arc_ends::end_at_junctions;
+use arc_ends::{end_at_junctions, junctions_of_edges};
 use arc_joints::{end_on_arcs, join_tangents};
 use arc_tubes::KnownArcs;
 use circle_fitting::FoundArc;
@@ -370,7 +370,8 @@ fn graph_of(
     report.curved_lines += curved.len();
     end_at_junctions(&images, &mut wireframe, &mut sources, &mut curved, arcs);
     fit_edges(&images, &lines, &sources, &mut wireframe);
-    let splines = take_splines(&images, &wireframe.junctions, arcs);
+    let junctions = junctions_of_edges(&wireframe, &curved);
+    let splines = take_splines(&images, &junctions, arcs);
     add_as_arcs(&curved, &wireframe.junctions, arcs);
     let ends_of_curves = curved.iter().flat_map(|edge| edge.ends).collect();
     ControlFlow::Continue((in_order(&wireframe, ends_of_curves), splines))

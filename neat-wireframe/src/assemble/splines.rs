@@ -6,7 +6,7 @@
 //! touch are two arcs, as things are made of them.
 
 use super::arc_joints::wrapped;
-use super::circle_fitting::{FoundArc, SECTOR_IN_PIXELS};
+use super::circle_fitting::{FoundArc, SECTOR_IN_PIXELS, sectors_along};
 use super::claimed_edgels::{CLAIM_DENSITY, take_beside};
 use super::corners::{MAX_GAP, WINDOW_IN_PIXELS};
 use super::curve_samples::{SPACING, distance_of_curve};
@@ -22,10 +22,11 @@ use std::collections::BTreeSet;
 /// An arc goes on as another one if it turns by less there: cosine of 30°, judged. The arcs of an
 /// ellipse turn by 1 to 15°.
 const GOES_ON: f64 = 0.866;
-/// Beside the end of one, the other is no farther away in pixels: both have left the curve there, each
-/// by no more than what arcs of the same edge may lie beside each other.
+/// Beside the end of one, the other is no farther away in pixels: both may have left the curve
+/// there by as much as arcs of one edge lie beside each other.
 const DRIFT: f64 = 2.0 * BESIDE_IN_PIXELS;
-/// Overlapping arcs have at most this share of the shorter one in common.
+/// Overlapping arcs have at most this share of the shorter one in common, judged: those of the
+/// ellipses of `part-009` have up to .55.
 const MOST_COMMON: f64 = 0.75;
 /// Fewer arcs are no chain, unless they close.
 const MIN_ARCS: usize = 3;
@@ -55,7 +56,7 @@ struct Chain {
     closed: bool,
 }
 
-/// Takes the chains among the arcs that one spline explains as well.
+/// Takes the chains among the arcs that one spline explains as well; `junctions` are those of edges.
 pub(super) fn take_splines(
     images: &Images,
     junctions: &[Vector3<f64>],
@@ -127,11 +128,9 @@ fn chains(images: &Images, junctions: &[Vector3<f64>], arcs: &[FoundArc]) -> Vec
             next[other.0][other.1] = Some(one);
         }
     }
-    let mut seen = vec![false; arcs.len()];
-    let mut follow = |first: usize, mut end: usize| {
+    let follow = |first: usize, mut end: usize| {
         let (mut chain, mut arc) = (Vec::new(), first);
         loop {
-            seen[arc] = true;
             chain.push((arc, end == 0));
             match next[arc][end] {
                 Some((following, _)) if following == first => return (chain, true),
@@ -148,7 +147,8 @@ fn chains(images: &Images, junctions: &[Vector3<f64>], arcs: &[FoundArc]) -> Vec
         .collect();
     let rest = (0..arcs.len()).filter(|arc| next[*arc].iter().all(Option::is_some));
     for (first, begin) in begins.into_iter().chain(rest.map(|arc| (arc, 0))) {
-        if seen_already(&chains, first) {
+        let mut known = chains.iter().flat_map(|chain: &Chain| &chain.arcs);
+        if known.any(|(arc, _)| *arc == first) {
             continue;
         }
         let (arcs, closed) = follow(first, 1 - begin);
@@ -157,11 +157,6 @@ fn chains(images: &Images, junctions: &[Vector3<f64>], arcs: &[FoundArc]) -> Vec
     let is_chain = |chain: &Chain| chain.arcs.len() >= MIN_ARCS - usize::from(chain.closed);
     chains.retain(is_chain);
     chains
-}
-
-fn seen_already(chains: &[Chain], arc: usize) -> bool {
-    let mut all = chains.iter().flat_map(|chain| &chain.arcs);
-    all.any(|(other, _)| *other == arc)
 }
 
 /// How far apart two ends are at which one arc goes on as another; `None` if it does not.
@@ -268,20 +263,16 @@ impl Chain {
     }
 }
 
-/// What parts of about a sector's length say together, by length: they are as long as whole parts
-/// can be.
+/// What the sectors of a curve say, by length: they are as long as whole ones can be.
 fn gain_by_length(gain: f64, length: f64, pixel: f64) -> f64 {
-    let parts = length / (SECTOR_IN_PIXELS * pixel);
-    gain * parts / parts.ceil().max(1.0)
+    gain * length / (SECTOR_IN_PIXELS * pixel * sectors_along(length, pixel))
 }
 
-/// From where to where parts of a spline run that are at most about as long as a sector of an arc.
+/// From where to where the parts of a spline run that are as long as sectors of arcs.
 fn parts_of(spline: &Spline, pixel: f64) -> Vec<[f64; 2]> {
-    let parts = (spline.length() / (SECTOR_IN_PIXELS * pixel))
-        .ceil()
-        .max(1.0);
-    let step = spline.pieces() as f64 / parts;
-    (0..parts as usize)
+    let count = sectors_along(spline.length(), pixel);
+    let step = spline.pieces() as f64 / count;
+    (0..count as usize)
         .map(|k| [k as f64 * step, (k + 1) as f64 * step])
         .collect()
 }
@@ -383,7 +374,7 @@ impl Images<'_> {
                 return None;
             }
             let loss = loss_of_reach(reach);
-            let mut equations = Equations::new(&spline, RIDGE, ends);
+            let mut equations = Equations::new(&spline, ends);
             for row in &rows {
                 let weight = loss.weight(row.distance * row.distance);
                 equations.add(row, weight);
@@ -442,19 +433,17 @@ struct Row {
 struct Equations {
     matrix: DMatrix<f64>,
     right: DVector<f64>,
-    ridge: f64,
     fixed: Vec<usize>,
 }
 
 impl Equations {
     /// Control points at the `ends` stay.
-    fn new(spline: &Spline, ridge: f64, ends: [Option<Vector3<f64>>; 2]) -> Self {
+    fn new(spline: &Spline, ends: [Option<Vector3<f64>>; 2]) -> Self {
         let count = spline.controls.len();
         let of_end = [0, count - 1].into_iter().zip(ends);
         Self {
             matrix: DMatrix::zeros(3 * count, 3 * count),
             right: DVector::zeros(3 * count),
-            ridge,
             fixed: of_end
                 .filter_map(|(control, end)| end.map(|_| control))
                 .collect(),
@@ -474,7 +463,7 @@ impl Equations {
 
     fn solved(mut self, spline: &Spline) -> Option<Spline> {
         let count = spline.controls.len();
-        let ridge = self.ridge * self.matrix.trace() / (3 * count) as f64;
+        let ridge = RIDGE * self.matrix.trace() / (3 * count) as f64;
         for control in 0..count {
             let held = if self.fixed.contains(&control) {
                 AT_JUNCTION
