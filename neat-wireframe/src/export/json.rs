@@ -2,7 +2,7 @@
 
 use super::{EdgeFields, ExportError, JunctionFields, check};
 use crate::Wireframe3d;
-use crate::faces::{Face, Shell, triangles};
+use crate::faces::{Face, Shell, ends_of_arc, ends_of_spline, nearest_junctions, triangles};
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Spline, file};
 use serde::{Deserialize, Serialize};
@@ -137,7 +137,7 @@ impl WireframeDocument {
             return Vec::new();
         }
         let points = self.drawn().junctions;
-        let chains = self.chains();
+        let chains = self.chains_between_junctions();
         let (arcs, splines) = chains.split_at(self.arcs.len());
         triangles(&self.shells, &self.edges, [arcs, splines], &points)
     }
@@ -153,6 +153,23 @@ impl WireframeDocument {
             chain
         };
         self.drawn_curves().map(chain).collect()
+    }
+
+    /// Likewise, from the junctions nearest to the ends of open ones: those at which they end, if
+    /// they bound a face.
+    fn chains_between_junctions(&self) -> Vec<Vec<usize>> {
+        let of_arcs = (self.arcs.iter()).map(|arc| (arc.is_closed(), ends_of_arc(arc)));
+        let of_splines = self.splines.iter();
+        let of_splines = of_splines.map(|spline| (spline.closed, ends_of_spline(spline)));
+        let mut chains = self.chains();
+        for (chain, (closed, ends)) in chains.iter_mut().zip(of_arcs.chain(of_splines)) {
+            let last = chain.len() - 1;
+            if let (false, Some([start, end])) = (closed, nearest_junctions(ends, &self.junctions))
+            {
+                (chain[0], chain[last]) = (start, end);
+            }
+        }
+        chains
     }
 
     /// Checks everything that [`write_json`] and every other export rely on; `path`

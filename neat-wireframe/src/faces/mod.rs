@@ -66,7 +66,7 @@ mod sheet_tests;
 mod tests;
 
 pub use curves::MeasuredGraph;
-pub(crate) use curves::{ends_of_arc, nearest_junctions};
+pub(crate) use curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 pub use face::{CurveIndex, Face, Shell, Step};
 pub(crate) use triangulation::triangles;
 

@@ -448,13 +448,36 @@ fn triangles_of_a_solid_are_watertight() {
     let pin = block()
         .circle([0.4, 0.5, 0.8], 0.2, WHOLE)
         .circle([0.4, 0.5, 1.2], 0.2, WHOLE);
-    for model in [block(), through, pin, rounded_block(), slotted_block()] {
+    for model in [
+        block(),
+        through,
+        pin,
+        rounded_block(),
+        slotted_block(),
+        lens(),
+    ] {
         let model = model.turned();
         let (volume, watertight) = of_triangles(&model);
         assert!(watertight);
         let exact = model.solid().1;
         assert!((volume / exact - 1.0).abs() < 2e-3, "{volume} {exact}");
     }
+}
+
+/// A prism of height 0.8 over two arcs that meet at two junctions, each a little beside them.
+fn lens() -> Model {
+    let mut model = Model::default().prism(&[[0.0, 0.0], [1.0, 0.0]], [0.0, 0.8]);
+    model.wireframe.edges = vec![[0, 2], [1, 3]];
+    let half = 1.4_f64;
+    let (radius, depth) = (0.5 / half.sin(), 0.5 / half.tan());
+    for height in [0.0, 0.8] {
+        for (center, middle) in [(-depth, 0.25 * TAU), (depth, 0.75 * TAU)] {
+            // Shorter than from junction to junction by a thousandth of a radian at each end.
+            let angles = [-1.0, 1.0].map(|sign| middle + sign * (half - 1e-3));
+            model = model.circle([0.5, center, height], radius, angles);
+        }
+    }
+    model
 }
 
 /// A prism of height 0.8 over the unit square with one corner cut by an arc around this point of

@@ -15,9 +15,9 @@ type Corner = (usize, Vector2<f64>);
 /// watertight.
 ///
 /// - `edges`: the junctions that each edge joins.
-/// - `chains`: for each arc, and for each spline, the points along it from start to end; of a
-///   closed one the first comes once more.
-/// - `points`: what all are indices of. Junctions come first, and stand for the ends of arcs.
+/// - `chains`: for each arc, and for each spline, the points along it from the junction at its
+///   start to that at its end; of a closed one the first comes once more.
+/// - `points`: what all are indices of.
 pub(crate) fn triangles(
     shells: &[Shell],
     edges: &[[usize; 2]],
@@ -31,8 +31,8 @@ pub(crate) fn triangles(
                 let frame = PlaneFrame::new(normal, offset);
                 let flat = |steps: &Vec<Step>| {
                     let mut indices: Vec<usize> = Vec::new();
-                    for place in 0..steps.len() {
-                        indices.extend(indices_along(steps, place, edges, chains));
+                    for step in steps {
+                        indices.extend(indices_along(step, edges, chains));
                         indices.pop();
                     }
                     let corner = |index: usize| (index, frame.coordinates(&points[index]));
@@ -42,10 +42,9 @@ pub(crate) fn triangles(
                 cut(&loops, &mut triangles);
             }
             Surface::Cylinder { .. } | Surface::Cone { .. } => {
-                let rims: Vec<Vec<usize>> = (face.loops.iter())
-                    .flat_map(|steps| (0..steps.len()).map(move |place| (steps, place)))
-                    .filter(|(steps, place)| matches!(steps[*place].curve, CurveIndex::Arc(_)))
-                    .map(|(steps, place)| indices_along(steps, place, edges, chains))
+                let rims: Vec<Vec<usize>> = (face.steps())
+                    .filter(|step| matches!(step.curve, CurveIndex::Arc(_)))
+                    .map(|step| indices_along(step, edges, chains))
                     .collect();
                 if let [one, other] = &rims[..] {
                     strip(&face.surface, one, other, points, &mut triangles);
@@ -58,38 +57,22 @@ pub(crate) fn triangles(
     faces.map(of_face).collect()
 }
 
-/// The points along a step of a loop, both ends among them. The ends of a curve are those of the
-/// edges beside it.
+/// The points along a step of a loop, both ends among them.
 fn indices_along(
-    steps: &[Step],
-    place: usize,
+    step: &Step,
     edges: &[[usize; 2]],
     [arcs, splines]: [&[Vec<usize>]; 2],
 ) -> Vec<usize> {
-    let along = |step: &Step| {
-        let mut along = match step.curve {
-            CurveIndex::Edge(edge) => edges[edge].to_vec(),
-            CurveIndex::Arc(arc) => arcs[arc].clone(),
-            CurveIndex::Spline(spline) => splines[spline].clone(),
-            CurveIndex::Smooth(ends) => ends.to_vec(),
-        };
-        if step.reversed {
-            along.reverse();
-        }
-        along
+    let mut along = match step.curve {
+        CurveIndex::Edge(edge) => edges[edge].to_vec(),
+        CurveIndex::Arc(arc) => arcs[arc].clone(),
+        CurveIndex::Spline(spline) => splines[spline].clone(),
+        CurveIndex::Smooth(ends) => ends.to_vec(),
     };
-    let count = steps.len();
-    let mut indices = along(&steps[place]);
-    let [before, after] = [count - 1, 1].map(|k| &steps[(place + k) % count]);
-    let is_edge = |step: &Step| matches!(step.curve, CurveIndex::Edge(_) | CurveIndex::Smooth(_));
-    let last = indices.len() - 1;
-    if is_edge(before) {
-        indices[0] = along(before)[1];
+    if step.reversed {
+        along.reverse();
     }
-    if is_edge(after) {
-        indices[last] = along(after)[0];
-    }
-    indices
+    along
 }
 
 /// Appends the triangles between two rims of a round face, from angle to angle: each shares its
