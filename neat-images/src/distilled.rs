@@ -136,10 +136,7 @@ impl BackEndReport {
 impl Distilled {
     /// Points along the arcs and the splines, in the world frame.
     pub fn drawn_curves(&self) -> Vec<Vec<Vector3<f64>>> {
-        let turn = WireframeDocument::TURN_OF_DRAWN_ARCS;
-        let arcs = self.arcs.iter().map(|arc| arc.points(turn));
-        let splines = self.splines.iter().map(|spline| spline.points(turn));
-        arcs.chain(splines).collect()
+        WireframeDocument::points_along(&self.arcs, &self.splines).collect()
     }
 
     /// The wireframe in the frame of the user's files, with what is known about its

@@ -95,6 +95,18 @@ pub(super) fn sectors_along(length: f64, pixel: f64) -> f64 {
         .clamp(1.0, MAX_SECTORS)
 }
 
+/// The parts of equal length, about that of a sector, of a curve of this length between two
+/// parameters.
+pub(super) fn equal_parts([low, high]: [f64; 2], length: f64, pixel: f64) -> Vec<[f64; 2]> {
+    let count = sectors_along(length, pixel);
+    let width = (high - low) / count;
+    let part = |k: usize| {
+        let start = low + k as f64 * width;
+        [start, start + width]
+    };
+    (0..count as usize).map(part).collect()
+}
+
 fn angles_of(sectors: &[Sector]) -> [f64; 2] {
     [sectors[0].angles[0], sectors[sectors.len() - 1].angles[1]]
 }
@@ -152,13 +164,20 @@ impl Images<'_> {
     /// Takes the edgels beside an arc, in all views.
     pub(super) fn claim_arc(&self, found: &FoundArc, taken: &mut [Vec<bool>]) {
         let FoundArc { arc, pixel, .. } = found;
-        let parts = sectors_along(arc.length(), *pixel);
-        let width = arc.sweep() / parts;
+        let parts = equal_parts(arc.angles, arc.length(), *pixel);
+        self.claim_curve(&parts, |angle| Some(arc.point_at(angle)), taken);
+    }
+
+    /// Takes the edgels beside parts of a curve, in all views.
+    pub(super) fn claim_curve(
+        &self,
+        parts: &[[f64; 2]],
+        at: impl Fn(f64) -> Option<Vector3<f64>> + Sync,
+        taken: &mut [Vec<bool>],
+    ) {
         taken.par_iter_mut().enumerate().for_each(|(view, taken)| {
-            for part in 0..parts as usize {
-                let low = arc.angles[0] + part as f64 * width;
-                let spacing = 1.0 / CLAIM_DENSITY;
-                let samples = self.samples_of_sector(view, arc, [low, low + width], spacing);
+            for part in parts {
+                let samples = self.samples_of_curve(view, *part, CLAIM_DENSITY.recip(), &at);
                 let samples = samples.unwrap_or_default();
                 take_beside(&self.maps[view], &samples, self.reach, taken);
             }
@@ -284,17 +303,15 @@ impl Images<'_> {
     pub(super) fn gain_along(
         &self,
         arc: &CircularArc,
-        [from, to]: [f64; 2],
+        angles: [f64; 2],
         pixel: f64,
         taken: Option<&[Vec<bool>]>,
     ) -> f64 {
-        let count = sectors_along((to - from) * arc.radius, pixel);
-        let width = (to - from) / count;
-        let sector = |k: usize| {
-            let low = from + k as f64 * width;
-            self.evidence_of_sector(arc, [low, low + width], taken).gain
-        };
-        (0..count as usize).map(sector).sum()
+        let length = (angles[1] - angles[0]) * arc.radius;
+        let sectors = equal_parts(angles, length, pixel).into_iter();
+        sectors
+            .map(|sector| self.evidence_of_sector(arc, sector, taken).gain)
+            .sum()
     }
 
     /// Samples of a part of an arc in a view; `None` where it does not see enough of it.

@@ -6,8 +6,7 @@
 //! touch are two arcs, as things are made of them.
 
 use super::arc_joints::wrapped;
-use super::circle_fitting::{FoundArc, SECTOR_IN_PIXELS, sectors_along};
-use super::claimed_edgels::{CLAIM_DENSITY, take_beside};
+use super::circle_fitting::{FoundArc, SECTOR_IN_PIXELS, equal_parts, sectors_along};
 use super::corners::{MAX_GAP, WINDOW_IN_PIXELS};
 use super::curve_samples::{SPACING, distance_of_curve};
 use super::curves::BESIDE_IN_PIXELS;
@@ -56,7 +55,8 @@ struct Chain {
     closed: bool,
 }
 
-/// Takes the chains among the arcs that one spline explains as well; `junctions` are those of edges.
+/// Takes the chains among the arcs that one spline explains as well; `junctions` are those of
+/// edges.
 pub(super) fn take_splines(
     images: &Images,
     junctions: &[Vector3<f64>],
@@ -70,7 +70,8 @@ pub(super) fn take_splines(
         .collect();
     let mut edgels = images.nothing_taken();
     for (chain, spline) in &found {
-        images.claim_spline(spline, chain.pixel(arcs), &mut edgels);
+        let parts = parts_of(spline, chain.pixel(arcs));
+        images.claim_curve(&parts, |place| Some(spline.point_at(place)), &mut edgels);
     }
     let taken: BTreeSet<usize> = (found.iter())
         .flat_map(|(chain, _)| chain.arcs.iter().map(|(arc, _)| *arc))
@@ -270,11 +271,7 @@ fn gain_by_length(gain: f64, length: f64, pixel: f64) -> f64 {
 
 /// From where to where the parts of a spline run that are as long as sectors of arcs.
 fn parts_of(spline: &Spline, pixel: f64) -> Vec<[f64; 2]> {
-    let count = sectors_along(spline.length(), pixel);
-    let step = spline.pieces() as f64 / count;
-    (0..count as usize)
-        .map(|k| [k as f64 * step, (k + 1) as f64 * step])
-        .collect()
+    equal_parts([0.0, spline.pieces() as f64], spline.length(), pixel)
 }
 
 impl Images<'_> {
@@ -335,23 +332,6 @@ impl Images<'_> {
             .into_par_iter()
             .map(evidence)
             .collect()
-    }
-
-    /// Takes the edgels beside a spline, in all views.
-    fn claim_spline(&self, spline: &Spline, pixel: f64, taken: &mut [Vec<bool>]) {
-        let parts = parts_of(spline, pixel);
-        taken.par_iter_mut().enumerate().for_each(|(view, taken)| {
-            for places in parts.iter().copied() {
-                let at = |place: f64| Some(spline.point_at(place));
-                let samples = self.samples_of_curve(view, places, CLAIM_DENSITY.recip(), at);
-                take_beside(
-                    &self.maps[view],
-                    &samples.unwrap_or_default(),
-                    self.reach,
-                    taken,
-                );
-            }
-        });
     }
 
     /// A spline moved to the edgels of the views that show it.

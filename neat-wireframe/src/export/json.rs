@@ -42,7 +42,8 @@ pub struct WireframeDocument {
     /// Smooth curves that are no arcs, likewise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub splines: Vec<Spline>,
-    /// Faces between edges, arcs and splines, closed shells first, in the frame of the user's files.
+    /// Faces between edges, arcs and splines, closed shells first, in the frame of the user's
+    /// files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shells: Vec<Shell>,
     /// The upper triangle of the covariance of every arc's centre x, y, z and radius, row by row,
@@ -100,16 +101,13 @@ impl WireframeDocument {
     /// edges their pieces. They share no points; the ends of a closed one are one.
     pub fn drawn(&self) -> Wireframe3d {
         let mut drawn = self.wireframe();
-        for mut points in self.drawn_curves() {
-            let first = drawn.junctions.len();
-            let pieces = points.len() - 1;
-            if points[0] == points[pieces] {
+        for (mut points, chain) in self.drawn_curves().zip(self.chains()) {
+            if points.first() == points.last() {
                 points.pop();
             }
-            let count = points.len();
-            let piece = |k: usize| [first + k, first + (k + 1) % count];
-            drawn.edges.extend((0..pieces).map(piece));
             drawn.junctions.extend(points);
+            let pieces = chain.windows(2).map(|ends| [ends[0], ends[1]]);
+            drawn.edges.extend(pieces);
         }
         drawn
     }
@@ -117,12 +115,17 @@ impl WireframeDocument {
     /// Points along each arc, and then along each spline; the first and the last of a closed one
     /// are the same.
     pub fn drawn_curves(&self) -> impl Iterator<Item = Vec<Vector3<f64>>> {
-        let arcs = self
-            .arcs
-            .iter()
-            .map(|arc| arc.points(Self::TURN_OF_DRAWN_ARCS));
-        let splines = self.splines.iter();
-        arcs.chain(splines.map(|spline| spline.points(Self::TURN_OF_DRAWN_ARCS)))
+        Self::points_along(&self.arcs, &self.splines)
+    }
+
+    /// Likewise, of arcs and splines in any frame.
+    pub fn points_along(
+        arcs: &[CircularArc],
+        splines: &[Spline],
+    ) -> impl Iterator<Item = Vec<Vector3<f64>>> {
+        let turn = Self::TURN_OF_DRAWN_ARCS;
+        let of_arcs = arcs.iter().map(move |arc| arc.points(turn));
+        of_arcs.chain(splines.iter().map(move |spline| spline.points(turn)))
     }
 
     /// The faces as triangles of the junctions of [`Self::drawn`], counterclockwise as seen from

@@ -49,8 +49,8 @@ pub(super) fn coplanar_curves(curves: &Curves) -> Vec<CoplanarCurves> {
     planes
 }
 
-/// Pairs of edges at a junction and single arcs and splines, those first that determine their plane best: by
-/// the area that they span.
+/// Pairs of edges at a junction and single arcs and splines, those first that determine their plane
+/// best: by the area that they span.
 fn seeds(curves: &Curves) -> Vec<Vec<usize>> {
     let mut at_junction: Vec<(usize, usize)> = Vec::new();
     let mut seeds: Vec<(f64, Vec<usize>)> = Vec::new();
