@@ -151,36 +151,55 @@ def volume(shell, wireframe):
             area = sum((area_of_step(step, wireframe) for loop in face["loops"] for step in loop),
                        np.zeros(3))
             return face["plane"]["offset"] * float(np.dot(face["plane"]["normal"], area))
-        one, other = (wireframe.arcs[step["arc"]] for loop in face["loops"] for step in loop
-                      if "arc" in step)
-        # The integral of the direction from the axis over the angle.
-        sine, cosine = np.diff(np.sin(one.angles)), np.diff(np.cos(one.angles))
-        outward = sine * one.axes[0] - cosine * one.axes[1]
-        surface = face.get("cylinder") or face["cone"]
-        sign = 1.0 if surface["convex"] else -1.0
-        axis = np.array(surface["axis"])
-        height = abs(float(np.dot(axis, other.center - one.center)))
-        if "cylinder" in face:
-            radius = surface["radius"]
-            beside = float(np.dot(surface["point"], outward))
-            return sign * radius * height * (radius * one.sweep + beside)
-        radius, angle = 0.5 * (one.radius + other.radius), surface["half_angle"]
-        # Every plane that touches a cone passes through its apex.
-        normals = radius * height * (outward - math.tan(angle) * one.sweep * axis)
-        return sign * float(np.dot(surface["apex"], normals))
+        return flux_of_round(face, wireframe)
 
     return sum(flux(face) for face in shell["faces"]) / 3.0
 
 
-def area_of_step(step, wireframe):
-    """Half the integral of x × dx along an edge, an arc or a spline."""
-    sign = -0.5 if step.get("reversed") else 0.5
+def flux_of_round(face, wireframe):
+    """Of x through a cylinder or a cone: an integral over the angle around it."""
+    surface = face.get("cylinder") or face["cone"]
+    axis = np.array(surface["axis"])
+    origin = np.array(surface.get("point") or surface["apex"])
+    radius = surface.get("radius", 0.0)
+    slope = math.tan(surface.get("half_angle", 0.0))
+    across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    across /= np.linalg.norm(across)
+    beside = np.cross(axis, across)
+    total = 0.0
+    for loop in face["loops"]:
+        offsets = np.concatenate([points_of_step(step, wireframe) for step in loop]) - origin
+        angles = np.unwrap(np.arctan2(offsets @ beside, offsets @ across))
+        heights = offsets @ axis
+        turns, angles = np.diff(angles), 0.5 * (angles[1:] + angles[:-1])
+        heights = 0.5 * (heights[1:] + heights[:-1])
+        outward = np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * beside
+        along = outward @ origin + radius - slope * (axis @ origin)
+        total -= float((along * heights * (radius + 0.5 * slope * heights) * turns).sum())
+    return total
+
+
+def points_of_step(step, wireframe):
+    """Points along a step of a loop, in its direction."""
+    shares = np.linspace(0.0, 1.0, 1001)
     if "edge" in step:
-        return sign * np.cross(*wireframe.vertices[wireframe.edges[step["edge"]]])
-    if "spline" in step:
+        points = wireframe.vertices[wireframe.edges[step["edge"]]]
+    elif "smooth" in step:
+        points = wireframe.vertices[step["smooth"]]
+    elif "spline" in step:
         spline = wireframe.splines[step["spline"]]
-        points = spline.points(np.linspace(0, spline.pieces, 100 * spline.pieces + 1))
-        return sign * np.cross(points[:-1], points[1:]).sum(axis=0)
+        points = spline.points(shares * spline.pieces)
+    else:
+        points = wireframe.arcs[step["arc"]].points(shares)
+    return points[::-1] if step.get("reversed") else points
+
+
+def area_of_step(step, wireframe):
+    """Half the integral of x × dx along it."""
+    if "arc" not in step:
+        points = points_of_step(step, wireframe)
+        return 0.5 * np.cross(points[:-1], points[1:]).sum(axis=0)
+    sign = -0.5 if step.get("reversed") else 0.5
     arc = wireframe.arcs[step["arc"]]
     start, end = arc.points([0.0, 1.0])
     swept = arc.radius**2 * arc.sweep * np.cross(*arc.axes)

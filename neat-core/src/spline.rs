@@ -1,11 +1,13 @@
 //! Smooth curves in space.
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// Control points that a piece of a cubic curve depends on.
 const ORDER: usize = 4;
+/// Places of each piece at which a spline is fitted to another curve.
+const PLACES: usize = 4;
 /// Straight pieces of one cubic piece at most, when it is drawn.
 const MOST_PIECES: f64 = 64.0;
 
@@ -36,6 +38,52 @@ pub struct Spline {
 }
 
 impl Spline {
+    /// The nearest one to a curve, given by its points at shares of its length from 0 to 1, by least
+    /// squares at the same shares. An open one ends where the curve does. `None` with too few control
+    /// points, or where the curve has no coordinates.
+    pub fn nearest_to(
+        curve: impl Fn(f64) -> Vector3<f64>,
+        controls: usize,
+        closed: bool,
+    ) -> Option<Self> {
+        let mut spline = Self {
+            controls: vec![Vector3::zeros(); controls],
+            closed,
+        };
+        let pieces = spline.pieces();
+        if !closed && pieces > 0 {
+            spline.controls[0] = curve(0.0);
+            spline.controls[controls - 1] = curve(1.0);
+        }
+        // Ends of an open one are known.
+        let first = usize::from(!closed);
+        let count = controls.checked_sub(2 * first)?;
+        let mut normal = DMatrix::zeros(count, count);
+        let mut right = DMatrix::zeros(count, 3);
+        for place in (0..=PLACES * pieces).map(|k| k as f64 / PLACES as f64) {
+            let off = curve(place / pieces as f64) - spline.point_at(place);
+            let weights = spline.weights_at(place);
+            let free = || {
+                let of_free = |(k, w): &(usize, f64)| Some((k.checked_sub(first)?, *w));
+                let free = weights.iter().filter_map(of_free);
+                free.filter(|(k, _)| *k < count)
+            };
+            for (row, weight) in free() {
+                for (column, other) in free() {
+                    normal[(row, column)] += weight * other;
+                }
+                for axis in 0..3 {
+                    right[(row, axis)] += weight * off[axis];
+                }
+            }
+        }
+        let solved = normal.cholesky()?.solve(&right);
+        for (k, row) in solved.row_iter().enumerate() {
+            spline.controls[first + k] = Vector3::new(row[0], row[1], row[2]);
+        }
+        spline.is_valid().then_some(spline)
+    }
+
     /// How many cubic pieces it has.
     pub fn pieces(&self) -> usize {
         match self.closed {
@@ -218,6 +266,36 @@ mod tests {
             let middle = (a + 3.0 * (b + c) + d) / 8.0;
             assert!((middle - spline.point_at(piece as f64 + 0.5)).norm() < 1e-12);
         }
+    }
+
+    #[test]
+    fn the_nearest_spline_is_near() {
+        let arc = |sweep: f64| {
+            move |share: f64| Vector3::new((sweep * share).cos(), (sweep * share).sin(), 0.5)
+        };
+        for (sweep, controls, closed) in [(2.0 * PI, 16, true), (2.0, 8, false), (0.3, 4, false)] {
+            let spline = Spline::nearest_to(arc(sweep), controls, closed).unwrap();
+            for point in spline.points(0.01) {
+                assert!((point.xy().norm() - 1.0).abs() < 1e-4);
+                assert!((point.z - 0.5).abs() < 1e-12);
+            }
+            if !closed {
+                assert_eq!(spline.controls[0], arc(sweep)(0.0));
+                assert_eq!(spline.controls[controls - 1], arc(sweep)(1.0));
+            }
+        }
+        // Another spline is found again.
+        for spline in [wavy(9, false), wavy(7, true)] {
+            let pieces = spline.pieces() as f64;
+            let curve = |share: f64| spline.point_at(share * pieces);
+            let again = Spline::nearest_to(curve, spline.controls.len(), spline.closed).unwrap();
+            for (found, control) in again.controls.iter().zip(&spline.controls) {
+                assert!((found - control).norm() < 1e-9);
+            }
+        }
+        assert!(Spline::nearest_to(arc(1.0), 3, false).is_none());
+        assert!(Spline::nearest_to(|_| Vector3::x(), 8, true).is_none());
+        assert!(Spline::nearest_to(|_| Vector3::repeat(f64::NAN), 8, true).is_none());
     }
 
     #[test]

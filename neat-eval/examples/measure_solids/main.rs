@@ -8,7 +8,7 @@
 //! `--out` keeps documents with their shells, `NAME/true.json` and `NAME/assembled.json`. With
 //! `--kept` wireframes and segments are those that `measure_assembler --out` has left there; a
 //! scene that it lacks is measured in the true wireframe only. A true wireframe gets no views: only
-//! its edges speak. Its curves that are no arcs of circles are left out.
+//! its edges speak. Its curves that are no arcs of circles are splines.
 //! Faces are measured by the protocols `cad-faces` and `scene-faces`. `--planes` lists the plane of
 //! each large face of rendered photographs, with how far it is from that of the surface, and
 //! measures faces once more with their corners moved onto their planes.
@@ -86,16 +86,16 @@ fn main() -> Result<()> {
         let of_truth = Input {
             wireframe: truth.wireframe.clone(),
             arcs: truth.arcs.clone(),
-            splines: Vec::new(),
+            splines: truth.splines.clone(),
             covariances: Vec::new(),
             views: Vec::new(),
             points: Vec::new(),
         };
         println!(
-            "{name}: {} edges, {} arcs, {} other curves, {} faces",
+            "{name}: {} edges, {} arcs, {} splines, {} faces",
             truth.wireframe.edges.len(),
             truth.arcs.len(),
-            truth.other_curves,
+            truth.splines.len(),
             truth.faces.len()
         );
         let measure = |kind: &str, input: &Input| -> Result<()> {

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use nalgebra::Vector3;
-use neat_core::{CircularArc, Wireframe3d};
+use neat_core::{CircularArc, Spline, Wireframe3d};
 use neat_eval::{TrueFace, foreign};
 use serde::Deserialize;
 use std::fs;
@@ -10,14 +10,16 @@ use std::path::Path;
 
 /// Points of a curve lie within so much of its arc; what does not is another curve.
 const TOLERANCE: f64 = 1e-4;
+/// Control points of splines along them.
+const CONTROLS: usize = 24;
 
 /// The truth of one scene, in the frame of its files.
 pub struct Truth {
     pub wireframe: Wireframe3d,
     /// The curves that are arcs of circles.
     pub arcs: Vec<CircularArc>,
-    /// How many curves are none.
-    pub other_curves: usize,
+    /// The others.
+    pub splines: Vec<Spline>,
     /// Empty where the truth has none.
     pub faces: Vec<TrueFace>,
     /// Of the mesh.
@@ -41,13 +43,19 @@ impl Truth {
             curves.extend(beside.into_iter().map(|curve| curve.points));
         }
         let curves = joined(curves);
-        let arcs: Vec<CircularArc> = curves.iter().filter_map(|points| arc_of(points)).collect();
+        let (mut arcs, mut splines) = (Vec::new(), Vec::new());
+        for points in &curves {
+            match arc_of(points) {
+                Some(arc) => arcs.push(arc),
+                None => splines.extend(spline_of(points)),
+            }
+        }
         // Other meshes are in frames of their own.
         let mesh = dir.join("mesh.obj");
         Ok(Self {
             wireframe: truth.wireframe,
-            other_curves: curves.len() - arcs.len(),
             arcs,
+            splines,
             faces: TrueFace::read(&path)?,
             volume: mesh.exists().then(|| mesh_volume(&mesh)).transpose()?,
         })
@@ -95,6 +103,24 @@ fn arc_of(points: &[Vector3<f64>]) -> Option<CircularArc> {
     }
     let on_arc = |point: &Vector3<f64>| arc.distance_to_circle(point) < TOLERANCE;
     points.iter().all(on_arc).then_some(arc)
+}
+
+/// A spline along a chain of points.
+fn spline_of(points: &[Vector3<f64>]) -> Option<Spline> {
+    let closed = (points.first()? - points.last()?).norm() < TOLERANCE;
+    let mut lengths = vec![0.0];
+    for ends in points.windows(2) {
+        lengths.push(lengths[lengths.len() - 1] + (ends[1] - ends[0]).norm());
+    }
+    let at = |share: f64| {
+        let length = share * lengths[lengths.len() - 1];
+        let next = lengths
+            .partition_point(|l| *l < length)
+            .clamp(1, points.len() - 1);
+        let part = (length - lengths[next - 1]) / (lengths[next] - lengths[next - 1]);
+        points[next - 1] + (points[next] - points[next - 1]) * part
+    };
+    Spline::nearest_to(at, CONTROLS, closed)
 }
 
 /// The volume that the triangles of a Wavefront OBJ enclose.

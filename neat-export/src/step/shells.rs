@@ -115,8 +115,14 @@ impl<'a> ShellWriter<'a> {
 
     fn face(&mut self, face: &Face) -> String {
         let (surface, same_sense) = self.surface(face);
+        let is_circle = |steps: &Vec<Step>| {
+            let mut curves = steps.iter().map(|step| &self.geometry.curves[&step.curve]);
+            curves.all(|curve| curve.arc.is_some() && curve.ends.is_none())
+        };
         let loops: Vec<Vec<String>> = match (&face.surface, &face.loops[..]) {
-            (Surface::Cylinder { .. } | Surface::Cone { .. }, [first, second]) => {
+            (Surface::Cylinder { .. } | Surface::Cone { .. }, [first, second])
+                if is_circle(first) && is_circle(second) =>
+            {
                 vec![self.seamed(first, second)]
             }
             (_, loops) => loops.iter().map(|steps| self.oriented(steps)).collect(),

@@ -2,16 +2,18 @@
 //! centres, radii and ends of its arcs, control points of its splines.
 //!
 //! A plane's is the integral of x × dx / 2 around it, along its normal; that the normal is off
-//! changes it in second order only. A cylinder's is the mean of its rims' lengths times the
-//! distance between them, a cone's that times the way along it.
+//! changes it in second order only. A cylinder's between two rims is the mean of their lengths times
+//! the distance between them, a cone's that times the way along it; other parts of these are the
+//! integral of the height over the angle around the axis.
 
 use super::Place;
 use crate::export::WireframeDocument;
 use crate::faces::{
-    CurveIndex, Face, Step, Surface, area_vector_of_spline, ends_of_arc, nearest_junctions,
+    Chain, CurveIndex, FINE, Face, Step, Surface, Unrolled, area_vector_of_spline, ends_of_arc,
+    goes_around, nearest_junctions,
 };
 use nalgebra::Vector3;
-use neat_core::Spline;
+use neat_core::{CircularArc, Spline};
 use std::f64::consts::{PI, TAU};
 
 /// The places of one step after the other: both ends of an edge; of an arc its centre, its radius,
@@ -45,13 +47,9 @@ enum Piece {
     Edge([Vector3<f64>; 2]),
     Spline(Spline),
     Arc {
-        center: Vector3<f64>,
-        radius: f64,
-        normal: Vector3<f64>,
-        /// From the start to the end, in radians.
-        sweep: f64,
-        /// Its own ends, and the junctions there; `None` of a whole circle.
-        ends: Option<[[Vector3<f64>; 2]; 2]>,
+        arc: CircularArc,
+        /// The junctions at its ends; `None` of a whole circle.
+        ends: Option<[Vector3<f64>; 2]>,
     },
 }
 
@@ -96,8 +94,9 @@ pub(super) fn value(document: &WireframeDocument, face: &Face, points: &[Vector3
                 .sum();
             normal.dot(&sum).abs()
         }
-        Surface::Cylinder { axis, .. } => round(&axis, false, &pieces),
-        Surface::Cone { axis, .. } => round(&axis, true, &pieces),
+        Surface::Cylinder { axis, .. } if is_between_rims(face) => round(&axis, false, &pieces),
+        Surface::Cone { axis, .. } if is_between_rims(face) => round(&axis, true, &pieces),
+        Surface::Cylinder { .. } | Surface::Cone { .. } => unrolled(face, &pieces),
     }
 }
 
@@ -118,15 +117,7 @@ fn arc_piece(
         };
         arc.angles = [near(from, start), near(to, end)];
     }
-    let sweep = arc.angles[1] - arc.angles[0];
-    let own = arc.angles.map(|angle| arc.point_at(angle));
-    Piece::Arc {
-        center,
-        radius,
-        normal: arc.normal(),
-        sweep,
-        ends: ends.map(|[from, to]| [[from, own[0]], [own[1], to]]),
-    }
+    Piece::Arc { arc, ends }
 }
 
 impl Piece {
@@ -136,23 +127,76 @@ impl Piece {
         match self {
             Self::Edge(ends) => straight(ends),
             Self::Spline(spline) => 0.5 * area_vector_of_spline(spline, origin),
-            Self::Arc {
-                center,
-                radius,
-                normal,
-                sweep,
-                ends,
-            } => {
-                let sector = 0.5 * normal * radius.powi(2) * *sweep;
-                let Some([from, to]) = ends else {
+            Self::Arc { arc, ends } => {
+                let sector = 0.5 * arc.normal() * arc.radius.powi(2) * arc.sweep();
+                let Some([from, to]) = *ends else {
                     return sector;
                 };
                 // Junctions lie beside the circle: straight to it, along it, and back.
-                let along = 0.5 * (center - origin).cross(&(to[0] - from[1]));
-                straight(from) + along + sector + straight(to)
+                let [start, end] = ends_of_arc(arc);
+                let along = 0.5 * (arc.center - origin).cross(&(end - start));
+                straight(&[from, start]) + along + sector + straight(&[end, to])
             }
         }
     }
+
+    /// Points along it, from junction to junction.
+    fn points(&self) -> Vec<Vector3<f64>> {
+        let (mut points, ends) = match self {
+            Self::Edge(ends) => (ends.to_vec(), None),
+            Self::Spline(spline) => (spline.points(FINE), None),
+            Self::Arc { arc, ends } => (arc.points(FINE), *ends),
+        };
+        if let (Some(ends), [first, .., last]) = (ends, &mut points[..]) {
+            [*first, *last] = ends;
+        }
+        points
+    }
+}
+
+/// Whether a round face is between two arcs, as loops of their own or joined by straight lines.
+fn is_between_rims(face: &Face) -> bool {
+    let is_arc = |step: &Step| matches!(step.curve, CurveIndex::Arc(_));
+    let shape: Vec<Vec<bool>> = (face.loops.iter())
+        .map(|steps| steps.iter().map(is_arc).collect())
+        .collect();
+    shape == [[true], [true]]
+        || shape == [[true, false, true, false]]
+        || shape == [[false, true, false, true]]
+}
+
+/// The area of any part of a round surface. A cylinder is as wide as the arcs around its axis say; a
+/// cone stays where it is.
+fn unrolled(face: &Face, pieces: &[(bool, Piece)]) -> f64 {
+    let mut surface = face.surface;
+    if let Surface::Cylinder { axis, radius, .. } = &mut surface {
+        let of_rim = |(_, piece): &(bool, Piece)| match piece {
+            Piece::Arc { arc, .. } if goes_around(arc, axis) => Some(arc.radius),
+            _ => None,
+        };
+        let radii: Vec<f64> = pieces.iter().filter_map(of_rim).collect();
+        if !radii.is_empty() {
+            *radius = radii.iter().sum::<f64>() / radii.len() as f64;
+        }
+    }
+    let Some(surface) = Unrolled::new(&surface) else {
+        return 0.0;
+    };
+    let mut left = pieces;
+    let chain = |steps: &Vec<Step>| {
+        let (own, others) = left.split_at(steps.len());
+        left = others;
+        let along = own.iter().map(|(reversed, piece)| {
+            let mut points = piece.points();
+            if *reversed {
+                points.reverse();
+            }
+            points
+        });
+        surface.chain(&along.collect::<Vec<_>>().concat())
+    };
+    let loops: Vec<Chain> = face.loops.iter().map(chain).collect();
+    surface.moments(&loops, &Vector3::zeros())[0].abs()
 }
 
 fn round(axis: &Vector3<f64>, widens: bool, pieces: &[(bool, Piece)]) -> f64 {
@@ -162,15 +206,10 @@ fn round(axis: &Vector3<f64>, widens: bool, pieces: &[(bool, Piece)]) -> f64 {
         match piece {
             Piece::Spline(_) => {}
             Piece::Edge([a, b]) => heights.push(axis.dot(&(b - a)).abs()),
-            Piece::Arc {
-                center,
-                radius,
-                sweep,
-                ..
-            } => {
-                rims.push(radius * sweep);
-                radii.push(*radius);
-                centers.push(axis.dot(center));
+            Piece::Arc { arc, .. } => {
+                rims.push(arc.radius * arc.sweep());
+                radii.push(arc.radius);
+                centers.push(axis.dot(&arc.center));
             }
         }
     }

@@ -7,6 +7,7 @@ use super::curves::{Curve, Curves, sorted};
 use super::face::{CurveIndex, Face, Step};
 use super::plane_fit::{PlaneFit, PlaneFrame};
 use super::planes::{CoplanarCurves, coplanar_curves};
+use super::round_cells::round_cells;
 use super::surface::Surface;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -58,7 +59,8 @@ pub(super) fn candidates(curves: Curves) -> (Curves, Vec<Face>) {
         let length = |curves: &[&Curve]| curves.iter().map(|curve| curve.length()).sum::<f64>();
         inferred.len() <= seen.len() || length(&inferred) <= length(&seen)
     };
-    let all = planar.into_iter().chain(round_faces(&curves));
+    let round = rims(&curves).into_iter().chain(round_cells(&curves));
+    let all = planar.into_iter().chain(round);
     for face in all.filter(is_seen) {
         let mut boundary: Vec<CurveIndex> = face.steps().map(|step| step.curve).collect();
         boundary.sort_unstable();
@@ -93,7 +95,7 @@ fn planar_face(curves: &Curves, loops: Vec<Vec<Step>>, frame: &PlaneFrame) -> Op
 
 /// Cylinders and cones between two whole circles, or two arcs whose ends edges or inferred lines
 /// join.
-fn round_faces(curves: &Curves) -> Vec<Face> {
+fn rims(curves: &Curves) -> Vec<Face> {
     let (arcs, edges): (Vec<&Curve>, Vec<&Curve>) =
         (curves.all.iter()).partition(|curve| curve.arc.is_some());
     let by_ends: BTreeMap<[usize; 2], &Curve> = (edges.into_iter())

@@ -6,7 +6,7 @@ use super::face::{CurveIndex, Step};
 use super::groups::groups;
 use super::plane_fit::PlaneFrame;
 use super::polygon::{contains, crosses_itself, signed_area};
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 
 type Polygon = Vec<Vector2<f64>>;
@@ -24,22 +24,42 @@ struct Cycle {
 
 /// The bounded cells between some curves of a plane.
 pub(super) fn cells(curves: &Curves, members: Vec<&Curve>, frame: &PlaneFrame) -> Vec<Cell> {
-    let (circles, mut open): (Vec<&Curve>, Vec<&Curve>) =
+    let direction = |from: &Vector3<f64>, to: &Vector3<f64>| {
+        let along = frame.coordinates(to) - frame.coordinates(from);
+        along.y.atan2(along.x)
+    };
+    let found = boundaries(curves, members, &direction).into_iter();
+    let mut cycles: Vec<Cycle> = found
+        .map(|(component, steps)| Cycle::new(curves, steps, component, frame))
+        .collect();
+    let sound = |cycle: &Cycle| cycle.polygon.len() > 2 && !crosses_itself(&cycle.polygon);
+    cycles.retain(sound);
+    nested(&cycles)
+}
+
+/// All closed chains of some curves of a surface that have a part of it on their left, each with
+/// the number of the component of the graph that it bounds. `direction` is the angle in which one
+/// goes on from a point to another one, counterclockwise.
+pub(super) fn boundaries(
+    curves: &Curves,
+    members: Vec<&Curve>,
+    direction: &dyn Fn(&Vector3<f64>, &Vector3<f64>) -> f64,
+) -> Vec<(usize, Vec<Step>)> {
+    let (closed, mut open): (Vec<&Curve>, Vec<&Curve>) =
         members.into_iter().partition(|curve| curve.ends.is_none());
-    let mut cycles: Vec<Cycle> = Vec::new();
-    for circle in &circles {
-        let component = cycles.len();
+    let mut found = Vec::new();
+    for (component, circle) in closed.iter().enumerate() {
         for reversed in [false, true] {
             let step = Step {
                 curve: circle.index,
                 reversed,
             };
-            cycles.push(Cycle::new(curves, vec![step], component, frame));
+            found.push((component, vec![step]));
         }
     }
     // A curve with the same cycle on both sides divides nothing.
     let of_graph = loop {
-        let found = half_edge_cycles(curves, &open, frame);
+        let found = half_edge_cycles(curves, &open, direction);
         let bridges: BTreeSet<CurveIndex> = found.iter().flat_map(|cycle| twice(cycle)).collect();
         if bridges.is_empty() {
             break found;
@@ -47,13 +67,9 @@ pub(super) fn cells(curves: &Curves, members: Vec<&Curve>, frame: &PlaneFrame) -
         open.retain(|curve| !bridges.contains(&curve.index));
     };
     let component_of = components(&open);
-    for steps in of_graph {
-        let component = circles.len() * 2 + component_of[&steps[0].curve];
-        cycles.push(Cycle::new(curves, steps, component, frame));
-    }
-    let sound = |cycle: &Cycle| cycle.polygon.len() > 2 && !crosses_itself(&cycle.polygon);
-    cycles.retain(sound);
-    nested(&cycles)
+    let of_graph = of_graph.into_iter();
+    found.extend(of_graph.map(|steps| (closed.len() + component_of[&steps[0].curve], steps)));
+    found
 }
 
 impl Cycle {
@@ -70,14 +86,30 @@ impl Cycle {
 
 /// The points of a loop in the plane, each once.
 pub(super) fn polygon_of(curves: &Curves, steps: &[Step], frame: &PlaneFrame) -> Polygon {
-    let mut polygon = Vec::new();
+    let mut points = closed_points(curves, steps);
+    points.pop();
+    points
+        .iter()
+        .map(|point| frame.coordinates(point))
+        .collect()
+}
+
+/// The points along a loop; the last one is the first.
+pub(super) fn closed_points(curves: &Curves, steps: &[Step]) -> Vec<Vector3<f64>> {
+    let mut points: Vec<Vector3<f64>> = Vec::new();
     for step in steps {
-        let points = (curves.find(step.curve)).map(|curve| curve.points_along(step));
-        let points = points.unwrap_or_default();
-        let all_but_last = points.len().saturating_sub(1);
-        polygon.extend(points[..all_but_last].iter().map(|p| frame.coordinates(p)));
+        points.pop();
+        points.extend(
+            curves
+                .find(step.curve)
+                .map(|curve| curve.points_along(step))
+                .unwrap_or_default(),
+        );
     }
-    polygon
+    if let [first, .., last] = &mut points[..] {
+        *last = *first;
+    }
+    points
 }
 
 /// The curves that a cycle runs along both ways.
@@ -90,7 +122,11 @@ fn twice(steps: &[Step]) -> Vec<CurveIndex> {
 
 /// The cycles that keep to the left: at every junction the next curve clockwise from the one
 /// that led there. Bounded cells run counterclockwise, the outside of a component clockwise.
-fn half_edge_cycles(curves: &Curves, open: &[&Curve], frame: &PlaneFrame) -> Vec<Vec<Step>> {
+fn half_edge_cycles(
+    curves: &Curves,
+    open: &[&Curve],
+    direction: &dyn Fn(&Vector3<f64>, &Vector3<f64>) -> f64,
+) -> Vec<Vec<Step>> {
     // Steps that leave each junction, counterclockwise.
     let mut leaving: BTreeMap<usize, Vec<(f64, Step)>> = BTreeMap::new();
     for curve in open {
@@ -101,8 +137,7 @@ fn half_edge_cycles(curves: &Curves, open: &[&Curve], frame: &PlaneFrame) -> Vec
                 reversed,
             };
             let points = curve.points_along(&step);
-            let along = frame.coordinates(&points[1]) - frame.coordinates(&points[0]);
-            let angle = along.y.atan2(along.x);
+            let angle = direction(&points[0], &points[1]);
             leaving.entry(from).or_default().push((angle, step));
         }
     }

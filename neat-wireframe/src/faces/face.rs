@@ -22,7 +22,8 @@ pub struct Face {
     /// What it is a part of, with the side to which its normal points.
     #[serde(flatten)]
     pub surface: Surface,
-    /// Closed chains of curves, the outer one of a plane first; the others are holes. Seen from the
+    /// Closed chains of curves, the outer one of a plane first; the others are holes. On what is
+    /// round one may be the outer one, or two run around the axis, and these come first. Seen from the
     /// side to which the normal points, the face lies on the left of each.
     pub loops: Vec<Vec<Step>>,
 }
@@ -107,9 +108,7 @@ impl Shell {
 }
 
 impl Face {
-    /// Whether its surface is one, and its loops are closed chains of curves that exist: any number
-    /// on a plane; on a cylinder or a cone two arcs, which are loops of their own or joined by two
-    /// edges or inferred lines.
+    /// Whether its surface is one, and its loops are closed chains of curves that exist.
     pub(crate) fn is_valid(
         &self,
         wireframe: &Wireframe3d,
@@ -122,20 +121,8 @@ impl Face {
             CurveIndex::Spline(spline) => spline < splines.len(),
             CurveIndex::Smooth([a, b]) => a < b && b < wireframe.junctions.len(),
         };
-        let is_arc = |step: &Step| matches!(step.curve, CurveIndex::Arc(_));
-        let shape: Vec<Vec<bool>> = (self.loops.iter())
-            .map(|steps| steps.iter().map(is_arc).collect())
-            .collect();
-        let has_shape = match &self.surface {
-            Surface::Plane { .. } => !self.loops.is_empty(),
-            Surface::Cylinder { .. } | Surface::Cone { .. } => {
-                let joined =
-                    shape == [[true, false, true, false]] || shape == [[false, true, false, true]];
-                joined || shape == [[true], [true]]
-            }
-        };
         self.surface.is_valid()
-            && has_shape
+            && !self.loops.is_empty()
             && self.steps().all(exists)
             && (self.loops.iter()).all(|steps| is_closed(steps, wireframe, (arcs, splines)))
     }

@@ -9,6 +9,7 @@ use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 use super::face::{CurveIndex, Face, Shell, Step};
 use super::plane_fit::across;
 use super::surface::Surface;
+use super::unrolled::{Chain, Unrolled, turn};
 use nalgebra::{DMatrix, DVector, Vector3};
 use neat_core::{CircularArc, Spline, Wireframe3d};
 use std::collections::BTreeMap;
@@ -19,6 +20,13 @@ use std::f64::consts::TAU;
 pub(super) const NO_AXIS: [f64; 3] = [0.5381, 0.2837, 0.7937];
 /// Surfaces whose normals differ by a smaller sine do not say where along them they meet.
 const MIN_SINGULAR: f64 = 0.05;
+/// Boundaries of round faces are followed in pieces that turn by so much, in radians.
+pub(crate) const FINE: f64 = 0.02;
+/// Arcs that go around no axis become splines whose pieces turn by so much: these differ from the
+/// arc by less than a hundred thousandth of its radius.
+const TURN_OF_PIECES: f64 = 0.4;
+/// They go around one that is turned against theirs by less than this sine: 10°.
+const TILTED: f64 = 0.174;
 /// Round surfaces are not flat: the way to them is gone in so many steps.
 const STEPS: usize = 4;
 
@@ -27,9 +35,10 @@ const STEPS: usize = 4;
 pub struct ShellCurve {
     /// The junctions at its start and end; `None` if it is closed.
     pub ends: Option<[usize; 2]>,
-    /// The arc, if it is one. Whole circles of one axis start in the same direction.
+    /// The arc, if it is still one. Whole circles of one axis start in the same direction.
     pub arc: Option<CircularArc>,
-    /// The spline, if it is one, in the planes of its faces.
+    /// The spline, if it is one, on the surfaces of its faces: also of an arc that goes around no axis
+    /// of them.
     pub spline: Option<Spline>,
 }
 
@@ -82,12 +91,13 @@ impl ShellGeometry {
             .map(|(j, surfaces)| (j, on_surfaces(wireframe.junctions[j], &surfaces)))
             .collect();
         for (index, curve) in &mut curves {
+            let surfaces = &surfaces_of[index];
+            if let Some(arc) = curve.arc.filter(|arc| !is_rim(arc, surfaces)) {
+                (curve.arc, curve.spline) = (None, as_spline(&arc));
+            }
             if let Some(spline) = &mut curve.spline {
-                *spline = spline.map(|point| on_surfaces(*point, &surfaces_of[index]));
-                let last = spline.controls.len() - 1;
-                for (control, end) in [0, last].into_iter().zip(curve.ends.iter().flatten()) {
-                    spline.controls[control] = vertices[end];
-                }
+                let ends = curve.ends.map(|ends| ends.map(|end| vertices[&end]));
+                *spline = spline_on_surfaces(spline, surfaces, ends);
             }
             if let Some(arc) = &mut curve.arc {
                 *arc = match curve.ends {
@@ -136,7 +146,7 @@ impl ShellGeometry {
     pub fn area(&self, face: &Face) -> f64 {
         match face.surface {
             Surface::Plane { normal, .. } => normal.dot(&self.area_vector(face)),
-            Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face).0,
+            Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face)[0],
         }
     }
 
@@ -147,7 +157,7 @@ impl ShellGeometry {
             Surface::Plane { normal, offset } => {
                 (offset - normal.dot(&self.origin)) * normal.dot(&self.area_vector(face))
             }
-            Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face).1,
+            Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face)[1],
         };
         shell.faces.iter().map(flux).sum::<f64>() / 3.0
     }
@@ -178,45 +188,20 @@ impl ShellGeometry {
     }
 
     /// Area of a cylinder or a cone, and the flux of x through it.
-    fn moments_of_round(&self, face: &Face) -> (f64, f64) {
-        let rims = face.steps().filter_map(|step| self.curves[&step.curve].arc);
-        let rims: Vec<CircularArc> = rims.collect();
-        let [one, other] = rims[..] else {
-            return (0.0, 0.0);
+    fn moments_of_round(&self, face: &Face) -> [f64; 2] {
+        let Some(surface) = Unrolled::new(&face.surface) else {
+            return [0.0, 0.0];
         };
-        // The integral of the direction from the axis, over the angle.
-        let [start, end] = one.angles;
-        let outward = one.toward(end - 0.25 * TAU) - one.toward(start - 0.25 * TAU);
-        let between = other.center - one.center;
-        match face.surface {
-            Surface::Plane { .. } => (0.0, 0.0),
-            Surface::Cylinder {
-                point,
-                axis,
-                radius,
-                convex,
-            } => {
-                let height = axis.dot(&between).abs();
-                let area = radius * one.sweep() * height;
-                let flux = radius * area + radius * height * (point - self.origin).dot(&outward);
-                (area, if convex { flux } else { -flux })
-            }
-            Surface::Cone {
-                apex,
-                axis,
-                half_angle,
-                convex,
-            } => {
-                let (sine, cosine) = half_angle.sin_cos();
-                let slant = axis.dot(&between).abs() / cosine;
-                let radius = 0.5 * (one.radius + other.radius);
-                let area = radius * one.sweep() * slant;
-                // Every plane that touches a cone passes through its apex.
-                let normals = outward * (radius * slant * cosine) - axis * (area * sine);
-                let flux = (apex - self.origin).dot(&normals);
-                (area, if convex { flux } else { -flux })
-            }
-        }
+        let chain = |steps: &Vec<Step>| {
+            let points: Vec<_> = steps
+                .iter()
+                .flat_map(|step| self.points(step, FINE))
+                .collect();
+            surface.chain(&points)
+        };
+        let loops: Vec<Chain> = face.loops.iter().map(chain).collect();
+        let [area, flux] = surface.moments(&loops, &self.origin);
+        [area.abs(), flux]
     }
 }
 
@@ -285,6 +270,48 @@ fn on_surfaces(start: Vector3<f64>, surfaces: &[Surface]) -> Vector3<f64> {
     position
 }
 
+/// Whether an arc goes around the axes of all round faces that it bounds, or bounds none.
+fn is_rim(arc: &CircularArc, surfaces: &[Surface]) -> bool {
+    let mut axes = surfaces.iter().filter_map(Surface::axis);
+    axes.all(|(_, axis)| goes_around(arc, &axis))
+}
+
+/// Whether the axis of an arc is nearly in this direction, of length 1.
+pub(crate) fn goes_around(arc: &CircularArc, axis: &Vector3<f64>) -> bool {
+    arc.normal().cross(axis).norm() <= TILTED
+}
+
+/// The spline nearest to an arc.
+fn as_spline(arc: &CircularArc) -> Option<Spline> {
+    let pieces = (arc.sweep().abs() / TURN_OF_PIECES).ceil() as usize;
+    let at = |share: f64| arc.point_at(arc.angles[0] + arc.sweep() * share);
+    let ends = if arc.is_closed() { 0 } else { 3 };
+    Spline::nearest_to(at, ends + pieces.max(1), arc.is_closed())
+}
+
+/// A spline where all surfaces are, from one vertex to the other if it is open. In planes its
+/// control points move; on what is round it needs more of them.
+fn spline_on_surfaces(
+    spline: &Spline,
+    surfaces: &[Surface],
+    ends: Option<[Vector3<f64>; 2]>,
+) -> Spline {
+    let is_plane = |surface: &Surface| matches!(surface, Surface::Plane { .. });
+    let mut moved = if surfaces.iter().all(is_plane) {
+        spline.map(|point| on_surfaces(*point, surfaces))
+    } else {
+        let pieces = spline.pieces();
+        let at = |share: f64| on_surfaces(spline.point_at(share * pieces as f64), surfaces);
+        let controls = spline.controls.len() + pieces;
+        Spline::nearest_to(at, controls, spline.closed).unwrap_or_else(|| spline.clone())
+    };
+    let last = moved.controls.len() - 1;
+    for (control, end) in [0, last].into_iter().zip(ends.into_iter().flatten()) {
+        moved.controls[control] = end;
+    }
+    moved
+}
+
 /// The circle of an arc in the plane of a face and around the axis of another, or where two round
 /// faces of one axis meet. A whole one begins where all circles around this axis do.
 fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> CircularArc {
@@ -349,15 +376,37 @@ fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> C
     }
 }
 
-/// The arc from one vertex to the other, in its direction.
+/// The arc from one vertex to the other: a short one whose ends change places is no long one.
 fn between(
     arc: &CircularArc,
     ends: [usize; 2],
     vertices: &BTreeMap<usize, Vector3<f64>>,
 ) -> CircularArc {
     let [start, end] = ends.map(|end| arc.angle_of(&vertices[&end]));
+    let sweep = arc.sweep() + turn(arc.sweep(), end - start);
     CircularArc {
-        angles: [start, start + (end - start).rem_euclid(TAU)],
+        angles: [start, start + sweep],
         ..*arc
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_arc_stays_short_and_a_long_one_long() {
+        for (sweep, by) in [(1e-4, -2e-4), (TAU - 1e-4, 2e-4), (2.0, 0.3)] {
+            let arc = CircularArc {
+                center: Vector3::zeros(),
+                axes: [Vector3::x(), Vector3::y()],
+                radius: 10.0,
+                angles: [0.5, 0.5 + sweep],
+            };
+            let vertices =
+                BTreeMap::from([(0, arc.point_at(0.5)), (1, arc.point_at(0.5 + sweep + by))]);
+            let moved = between(&arc, [0, 1], &vertices);
+            assert!((moved.sweep() - sweep - by).abs() < 1e-9);
+        }
     }
 }

@@ -51,6 +51,8 @@ mod planes;
 mod point_evidence;
 mod polygon;
 mod region;
+mod round_cells;
+mod round_triangulation;
 mod rulings;
 mod selection;
 mod sheets;
@@ -58,8 +60,11 @@ mod shells;
 mod surface;
 mod surface_points;
 mod triangulation;
+mod unrolled;
 mod visibility;
 
+#[cfg(test)]
+mod round_tests;
 #[cfg(test)]
 mod sheet_tests;
 #[cfg(test)]
@@ -70,10 +75,11 @@ pub(crate) use curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 pub use face::{CurveIndex, Face, Shell, Step};
 pub(crate) use triangulation::triangles;
 
-pub(crate) use geometry::area_vector_of_spline;
+pub(crate) use geometry::{FINE, area_vector_of_spline, goes_around};
 pub use geometry::{ShellCurve, ShellGeometry};
 pub use surface::Surface;
 pub use surface_points::{SurfacePoint, surface_points};
+pub(crate) use unrolled::{Chain, Unrolled};
 
 use crate::ViewObservation;
 use curves::Curves;

@@ -30,7 +30,8 @@ fn sides(polygon: &[Vector2<f64>]) -> impl Iterator<Item = [Vector2<f64>; 2]> + 
     (0..polygon.len()).map(|k| [polygon[k], polygon[(k + 1) % polygon.len()]])
 }
 
-fn segments_cross([a, b]: &[Vector2<f64>; 2], [c, d]: &[Vector2<f64>; 2]) -> bool {
+/// Whether two straight pieces cross; touching is none.
+pub(super) fn segments_cross([a, b]: &[Vector2<f64>; 2], [c, d]: &[Vector2<f64>; 2]) -> bool {
     let side =
         |from: &Vector2<f64>, to: &Vector2<f64>, p: &Vector2<f64>| (to - from).perp(&(p - from));
     side(a, b, c) * side(a, b, d) < 0.0 && side(c, d, a) * side(c, d, b) < 0.0

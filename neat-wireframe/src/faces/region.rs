@@ -1,13 +1,14 @@
 //! Where a face lies in space: what a ray hits.
 
-use super::cells::polygon_of;
+use super::cells::{closed_points, polygon_of};
 use super::curves::Curves;
-use super::face::Face;
+use super::face::{Face, Step};
 use super::plane_fit::PlaneFrame;
 use super::polygon::contains;
 use super::surface::Surface;
+use super::unrolled::{self, Chain, Unrolled};
 use nalgebra::{Vector2, Vector3};
-use neat_core::CircularArc;
+use std::f64::consts::TAU;
 
 /// A round face is asked about along so many straight lines on it …
 const RULINGS: usize = 16;
@@ -26,11 +27,8 @@ pub(super) enum Region {
     },
     /// Of a cylinder or a cone.
     Round {
-        /// The rim at height 0, around the axis.
-        rim: CircularArc,
-        height: f64,
-        /// By how much the radius grows with the height.
-        slope: f64,
+        surface: Unrolled,
+        loops: Vec<Chain>,
     },
 }
 
@@ -47,24 +45,10 @@ impl Region {
                 })
             }
             round => {
-                let (point, axis) = round.axis()?;
-                let mut rims = face.steps().filter_map(|step| curves.find(step.curve)?.arc);
-                let [one, other] = [rims.next()?, rims.next()?];
-                let center = |arc: &CircularArc| point + axis * axis.dot(&(arc.center - point));
-                let along = center(&other) - center(&one);
-                let height = along.norm();
-                // Angles run as on the arc, wherever the axis points.
-                let normal = one.normal().dot(&along).signum() * along / height;
-                let x = (one.axes[0] - normal * normal.dot(&one.axes[0])).normalize();
-                let [radius, slope] = round.radius_at(&one.center, &normal)?;
-                let rim = CircularArc {
-                    center: center(&one),
-                    axes: [x, normal.cross(&x)],
-                    radius,
-                    angles: one.angles,
-                };
-                let height = along.dot(&rim.normal());
-                Some(Self::Round { rim, height, slope })
+                let surface = Unrolled::new(&round)?;
+                let around = |steps: &Vec<Step>| surface.chain(&closed_points(curves, steps));
+                let loops: Vec<Chain> = face.loops.iter().map(around).collect();
+                Some(Self::Round { surface, loops })
             }
         }
     }
@@ -79,31 +63,9 @@ impl Region {
                 let inside = polygons.iter().filter(|p| contains(p, &point)).count() % 2 == 1;
                 [(t.is_finite() && inside).then_some(t), None]
             }
-            Self::Round { rim, height, slope } => {
-                let axis = rim.normal();
-                let flat = |v: Vector3<f64>| v - axis * axis.dot(&v);
-                let (from, along) = (origin - rim.center, *direction);
-                // Distance from the axis less radius, both squared, is a t² + 2 b t + c.
-                let (radius, widens) = (
-                    rim.radius + slope * axis.dot(&from),
-                    slope * axis.dot(&along),
-                );
-                let (from, along) = (flat(from), flat(along));
-                let a = along.norm_squared() - widens * widens;
-                let b = from.dot(&along) - radius * widens;
-                let c = from.norm_squared() - radius * radius;
-                let root = (b * b - a * c).sqrt().copysign(b);
-                let mut hits = [-(b + root) / a, -c / (b + root)];
-                hits.sort_by(f64::total_cmp);
-                let range = [height.min(0.0), height.max(0.0)];
-                hits.map(|t| {
-                    let point = origin + direction * t;
-                    let h = axis.dot(&(point - rim.center));
-                    let on_face = t.is_finite()
-                        && (range[0]..=range[1]).contains(&h)
-                        && rim.contains(rim.angle_of(&point), 0.0);
-                    on_face.then_some(t)
-                })
+            Self::Round { surface, loops } => {
+                let hits = surface.hits(origin, direction);
+                hits.map(|hit| Some(hit.filter(|(_, place)| unrolled::contains(loops, place))?.0))
             }
         }
     }
@@ -116,17 +78,22 @@ impl Region {
 
     /// Whether a round face passes through another one.
     pub fn passes_through(&self, other: &Self) -> bool {
-        let Self::Round { rim, height, slope } = self else {
+        let Self::Round { surface, loops } = self else {
             return false;
         };
+        let angles = || loops.iter().flatten().map(|place| place.x);
+        let from = angles().fold(f64::MAX, f64::min);
+        let sweep = (angles().fold(f64::MIN, f64::max) - from).min(TAU);
         let passes = |ruling: &usize| {
-            let angle = rim.angles[0] + rim.sweep() * (*ruling as f64 + 0.5) / RULINGS as f64;
-            let outward = rim.toward(angle);
-            let at = |share: f64| {
-                let along = share * height;
-                rim.center + outward * (rim.radius + slope * along) + rim.normal() * along
-            };
-            other.is_between(&at(AT_END), &at(1.0 - AT_END))
+            let angle = from + sweep * (*ruling as f64 + 0.5) / RULINGS as f64;
+            let heights = unrolled::crossings(loops, angle);
+            heights.chunks_exact(2).any(|ends| {
+                let at = |share: f64| {
+                    let height = ends[0] + (ends[1] - ends[0]) * share;
+                    surface.point(&Vector2::new(angle, height))
+                };
+                other.is_between(&at(AT_END), &at(1.0 - AT_END))
+            })
         };
         (0..RULINGS).filter(passes).count() > FEW_RULINGS
     }
@@ -152,11 +119,18 @@ impl Region {
     pub fn distance_to_surface(&self, point: &Vector3<f64>) -> f64 {
         match self {
             Self::Plane { frame, .. } => (frame.normal.dot(point) - frame.offset).abs(),
-            Self::Round { rim, slope, .. } => {
-                let offset = point - rim.center;
-                let along = rim.normal().dot(&offset);
-                let from_axis = (offset - rim.normal() * along).norm();
-                (from_axis - rim.radius - slope * along).abs() / slope.hypot(1.0)
+            Self::Round { surface, .. } => surface.distance(point),
+        }
+    }
+
+    /// Where a chain of points near the face lies on it, in lengths.
+    pub fn unrolled(&self, points: impl Iterator<Item = Vector3<f64>>) -> Vec<Vector2<f64>> {
+        match self {
+            Self::Plane { frame, .. } => points.map(|point| frame.coordinates(&point)).collect(),
+            Self::Round { surface, .. } => {
+                let mut chain = surface.chain(&points.collect::<Vec<_>>());
+                (chain.iter_mut()).for_each(|place| place.x *= surface.radius_at(place.y));
+                chain
             }
         }
     }
@@ -165,7 +139,7 @@ impl Region {
     pub fn is_near(&self, point: &Vector3<f64>, distance: f64) -> bool {
         let toward = match self {
             Self::Plane { frame, .. } => frame.normal,
-            Self::Round { rim, .. } => rim.toward(rim.angle_of(point)),
+            Self::Round { surface, .. } => surface.outward(surface.place(point).x),
         };
         let hits = self.hits(point, &toward);
         hits.iter().flatten().any(|t| t.abs() <= distance)

@@ -9,13 +9,16 @@ use super::groups::groups;
 use super::region::Region;
 use super::surface::Surface;
 use crate::ViewObservation;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Points of each curve that are asked whether they lie within a solid or on it.
 const POINTS: usize = 7;
 /// Points are on a face or an edge that are so near to it, by the extent of the shell.
 const MARGIN: f64 = 0.02;
+/// Of a face, what other curves on it may take without the rest being another face: area to a
+/// twentieth.
+const LITTLE: f64 = 0.05;
 
 /// The shells of the chosen faces: closed ones first, then those with the most faces.
 pub(super) fn shells(
@@ -42,8 +45,9 @@ pub(super) fn shells(
             closed: orientable && two_each,
             faces,
         };
-        face_outward(&mut shell, graph, views);
-        if shell.closed && leave_out_where_curves_are(&mut shell, curves) {
+        let geometry = ShellGeometry::new(&shell, graph.wireframe, graph.arcs, graph.splines);
+        face_outward(&mut shell, &geometry, views);
+        if shell.closed && leave_out_where_curves_are(&mut shell, curves, &geometry) {
             // What is left may fall apart.
             shells.extend(self::shells(graph, curves, shell.faces, views));
         } else {
@@ -97,13 +101,12 @@ fn orient(faces: &mut [Face]) -> bool {
 
 /// Turns all faces if a closed shell has its normals inward, or more of a sheet is seen from
 /// behind.
-fn face_outward(shell: &mut Shell, graph: &MeasuredGraph, views: &[ViewObservation]) {
-    let geometry = ShellGeometry::new(shell, graph.wireframe, graph.arcs, graph.splines);
+fn face_outward(shell: &mut Shell, geometry: &ShellGeometry, views: &[ViewObservation]) {
     let outward = if shell.closed {
         geometry.volume(shell)
     } else {
         let toward_cameras = |face: &Face| {
-            let Some((point, normal)) = middle(face, &geometry) else {
+            let Some((point, normal)) = middle(face, geometry) else {
                 return 0.0;
             };
             let centers = views.iter().map(|view| view.camera.center_in_world);
@@ -135,35 +138,35 @@ fn middle(face: &Face, geometry: &ShellGeometry) -> Option<(Vector3<f64>, Vector
 
 /// Makes a sheet of a closed shell if other curves of the wireframe lie within it or on it: nothing
 /// is seen within a solid, and what lies on a face is the rim of something that the shell lacks.
-/// The faces on which they lie are left out; returns whether there are such.
-fn leave_out_where_curves_are(shell: &mut Shell, curves: &Curves) -> bool {
+/// Faces of which that may take more than a little are left out; returns whether there are such.
+fn leave_out_where_curves_are(
+    shell: &mut Shell,
+    curves: &Curves,
+    geometry: &ShellGeometry,
+) -> bool {
     let own: BTreeSet<CurveIndex> = shell.curves().collect();
     let bounding: Vec<&Curve> = (curves.all.iter())
         .filter(|curve| own.contains(&curve.index))
         .collect();
-    let others = curves
-        .observed()
-        .filter(|curve| !own.contains(&curve.index));
     let bounds = Bounds::of(bounding.iter().flat_map(|curve| &curve.points));
     let margin = MARGIN * bounds.extent();
     let around = bounds.widened(margin);
+    let others: Vec<Other> = (curves.observed())
+        .filter(|curve| !own.contains(&curve.index))
+        .map(|curve| (curve.ends, &curve.points))
+        .chain(curves.loose.iter().map(|points| (None, points)))
+        .filter(|(_, points)| Bounds::of(*points).meets(&around))
+        .collect();
     // Beside an edge of the shell another one may be that edge once more.
     let apart = |point: &Vector3<f64>| {
         (bounding.iter()).all(|curve| distance_to_chain(&curve.points, point) > margin)
     };
-    let chains = others
-        .map(|curve| &curve.points)
-        .chain(&curves.loose)
-        .filter(|points| Bounds::of(*points).meets(&around));
-    let samples: Vec<Vec<Vector3<f64>>> = chains
-        .map(|points| {
-            let places = (0..POINTS).map(|k| (k as f64 + 0.5) / POINTS as f64);
-            places
-                .map(|place| point_along(points, place))
-                .filter(apart)
-                .collect()
-        })
-        .collect();
+    let samples = |points: &[Vector3<f64>]| -> Vec<Vector3<f64>> {
+        let places = (0..POINTS).map(|k| (k as f64 + 0.5) / POINTS as f64);
+        let along = places.map(|place| point_along(points, place));
+        along.filter(apart).collect()
+    };
+    let samples: Vec<Vec<Vector3<f64>>> = others.iter().map(|(_, p)| samples(p)).collect();
     let most = |of_curve: &Vec<Vector3<f64>>, holds: &dyn Fn(&Vector3<f64>) -> bool| {
         2 * of_curve.iter().filter(|point| holds(point)).count() > POINTS
     };
@@ -179,18 +182,44 @@ fn leave_out_where_curves_are(shell: &mut Shell, curves: &Curves) -> bool {
             .flat_map(|region| region.hits(point, &ray));
         hits.flatten().filter(|t| *t > 0.0).count() % 2 == 1
     };
-    let is_free = |region: &Option<Region>| {
-        let on_face = |point: &Vector3<f64>| {
-            region
-                .as_ref()
-                .is_some_and(|region| region.is_near(point, margin))
+    shell.closed = !samples.iter().any(|of_curve| most(of_curve, &within));
+    let mut regions = regions.iter();
+    let count = shell.faces.len();
+    shell.faces.retain(|face| {
+        let Some(Some(region)) = regions.next() else {
+            return true;
         };
-        !samples.iter().any(|of_curve| most(of_curve, &on_face))
+        let on_face = |point: &Vector3<f64>| region.is_near(point, margin);
+        let on_face: Vec<Other> = (others.iter().zip(&samples))
+            .filter(|(_, samples)| most(samples, &on_face))
+            .map(|(other, _)| *other)
+            .collect();
+        shell.closed &= on_face.is_empty();
+        enclosed(region, &on_face) <= LITTLE * geometry.area(face).abs()
+    });
+    shell.faces.len() < count
+}
+
+/// A curve with the junctions at its ends, and points along it.
+type Other<'a> = (Option<[usize; 2]>, &'a Vec<Vector3<f64>>);
+
+/// The area that curves on a face may enclose: a square around each of those that hang together, as
+/// one line alone does not say how wide that is of which it is a rim.
+fn enclosed(region: &Region, on_face: &[Other]) -> f64 {
+    let mut joined: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (place, (ends, _)) in on_face.iter().enumerate() {
+        for end in ends.iter().flatten() {
+            joined.entry(*end).or_default().push(place);
+        }
+    }
+    let mut joined: Vec<Vec<usize>> = joined.into_values().collect();
+    joined.extend((0..on_face.len()).map(|place| vec![place]));
+    let square_around = |group: &Vec<usize>| {
+        let points = group.iter().flat_map(|place| on_face[*place].1);
+        let places = region.unrolled(points.copied());
+        let low = (places.iter()).fold(Vector2::repeat(f64::MAX), |low, place| low.inf(place));
+        let high = (places.iter()).fold(Vector2::repeat(f64::MIN), |high, place| high.sup(place));
+        (high - low).max().powi(2)
     };
-    let free: Vec<bool> = regions.iter().map(is_free).collect();
-    let all_free = free.iter().all(|free| *free);
-    shell.closed = all_free && !samples.iter().any(|of_curve| most(of_curve, &within));
-    let mut free = free.into_iter();
-    shell.faces.retain(|_| free.next().unwrap_or(true));
-    !all_free
+    groups(&joined).iter().map(square_around).sum()
 }

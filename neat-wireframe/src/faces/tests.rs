@@ -6,14 +6,15 @@ use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 #[derive(Clone, Default)]
-struct Model {
-    wireframe: Wireframe3d,
-    arcs: Vec<CircularArc>,
+pub(super) struct Model {
+    pub wireframe: Wireframe3d,
+    pub arcs: Vec<CircularArc>,
+    pub splines: Vec<Spline>,
 }
 
 impl Model {
     /// The edges of a prism over a polygon, between two heights.
-    fn prism(mut self, corners: &[[f64; 2]], heights: [f64; 2]) -> Self {
+    pub fn prism(mut self, corners: &[[f64; 2]], heights: [f64; 2]) -> Self {
         let count = corners.len();
         let first = self.wireframe.junctions.len();
         for height in heights {
@@ -32,7 +33,7 @@ impl Model {
         self
     }
 
-    fn circle(mut self, center: [f64; 3], radius: f64, angles: [f64; 2]) -> Self {
+    pub fn circle(mut self, center: [f64; 3], radius: f64, angles: [f64; 2]) -> Self {
         self.arcs.push(CircularArc {
             center: center.into(),
             axes: [Vector3::x(), Vector3::y()],
@@ -43,33 +44,44 @@ impl Model {
     }
 
     /// Turned and moved, so that no axis is special.
-    fn turned(mut self) -> Self {
+    pub fn turned(mut self) -> Self {
         let turn = Rotation3::new(Vector3::new(0.3, -0.7, 0.5));
         let moved = |p: &Vector3<f64>| turn * p * 1.7 + Vector3::new(0.2, -4.0, 1.0);
         self.wireframe = self.wireframe.map(moved);
         self.arcs = self.arcs.iter().map(|arc| arc.map(moved)).collect();
+        self.splines = self
+            .splines
+            .iter()
+            .map(|spline| spline.map(moved))
+            .collect();
         self
     }
 
-    fn shells(&self) -> Vec<Shell> {
+    pub fn shells(&self) -> Vec<Shell> {
         let graph = MeasuredGraph {
             wireframe: &self.wireframe,
             arcs: &self.arcs,
-            splines: &[],
+            splines: &self.splines,
             covariances: &[],
         };
         find_shells(&graph, &[], &[])
     }
 
     /// Number of faces and volume of the one shell, which is closed.
-    fn solid(&self) -> (usize, f64) {
+    pub fn solid(&self) -> (usize, f64) {
         let shells = self.shells();
         assert_eq!(shells.len(), 1, "{shells:?}");
         assert!(shells[0].closed, "{shells:?}");
-        let is_valid = |face: &Face| face.is_valid(&self.wireframe, &self.arcs, &[]);
+        let is_valid = |face: &Face| face.is_valid(&self.wireframe, &self.arcs, &self.splines);
         assert!(shells[0].faces.iter().all(is_valid));
-        let geometry = ShellGeometry::new(&shells[0], &self.wireframe, &self.arcs, &[]);
+        let geometry = self.geometry(&shells[0]);
         (shells[0].faces.len(), geometry.volume(&shells[0]))
+    }
+}
+
+impl Model {
+    pub fn geometry(&self, shell: &Shell) -> ShellGeometry {
+        ShellGeometry::new(shell, &self.wireframe, &self.arcs, &self.splines)
     }
 }
 
@@ -82,11 +94,11 @@ const L_PROFILE: [[f64; 2]; 6] = [
     [0.3, 1.0],
     [0.0, 1.0],
 ];
-const WHOLE: [f64; 2] = [-1.0, -1.0 + TAU];
+pub(super) const WHOLE: [f64; 2] = [-1.0, -1.0 + TAU];
 /// Volume of the unit cube of a model that is turned.
-const UNIT: f64 = 1.7 * 1.7 * 1.7;
+pub(super) const UNIT: f64 = 1.7 * 1.7 * 1.7;
 
-fn assert_solid(model: Model, faces: usize, volume: f64) {
+pub(super) fn assert_solid(model: Model, faces: usize, volume: f64) {
     let (found, of_model) = model.turned().solid();
     assert_eq!(found, faces);
     assert!(
@@ -421,9 +433,10 @@ fn a_similarity_moves_faces() {
 }
 
 /// Volume between triangles and origin, and whether each side of one is a side of another.
-fn of_triangles(model: &Model) -> (f64, bool) {
+pub(super) fn of_triangles(model: &Model) -> (f64, bool) {
     let document = crate::export::WireframeDocument {
         arcs: model.arcs.clone(),
+        splines: model.splines.clone(),
         shells: model.shells(),
         ..crate::export::WireframeDocument::from(&model.wireframe)
     };

@@ -1,0 +1,107 @@
+//! Cylinders with notches and holes.
+
+use super::tests::{Model, UNIT, WHOLE, assert_solid, of_triangles};
+use crate::dimensions::Dimensions;
+use crate::export::WireframeDocument;
+use nalgebra::Vector3;
+use neat_core::Spline;
+use std::f64::consts::{PI, TAU};
+
+/// A cylinder of radius 0.5 and height 1 without the quarter over `step` between the directions of
+/// x and y.
+fn notched(step: f64) -> Model {
+    let mut model = Model::default();
+    let places = [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]];
+    for height in [1.0, step] {
+        let at = places.map(|[x, y]| Vector3::new(x, y, height));
+        model.wireframe.junctions.extend(at);
+    }
+    model.wireframe.edges = [[0, 1], [0, 2], [3, 4], [3, 5], [0, 3], [1, 4], [2, 5]].to_vec();
+    model
+        .circle([0.0, 0.0, 0.0], 0.5, WHOLE)
+        .circle([0.0, 0.0, 1.0], 0.5, [0.25 * TAU, TAU])
+        .circle([0.0, 0.0, step], 0.5, [0.0, 0.25 * TAU])
+}
+
+/// A pipe of radius 0.2 that ends at x = 1, on a closed cylinder of radius 0.5 from z = -1 to 1.
+pub(super) fn tee() -> Model {
+    let meeting = |share: f64| {
+        let (sine, cosine) = (TAU * share).sin_cos();
+        let (y, z) = (0.2 * cosine, 0.2 * sine);
+        Vector3::new((0.25_f64 - y * y).sqrt(), y, z)
+    };
+    let mut model = Model::default()
+        .circle([0.0, 0.0, -1.0], 0.5, WHOLE)
+        .circle([0.0, 0.0, 1.0], 0.5, WHOLE)
+        .circle([1.0, 0.0, 0.0], 0.2, WHOLE);
+    model.arcs[2].axes = [Vector3::y(), Vector3::z()];
+    model.splines = Spline::nearest_to(meeting, 16, true).into_iter().collect();
+    model
+}
+
+/// Of the tee: the pipe begins where the cylinder ends.
+fn volume_of_tee() -> f64 {
+    let steps = 2000;
+    let inside: f64 = (0..steps)
+        .map(|k| {
+            let y = 0.2 * ((f64::from(k) + 0.5) / f64::from(steps) * 2.0 - 1.0);
+            (0.25 - y * y).sqrt() * 2.0 * (0.04 - y * y).sqrt() * 0.4 / f64::from(steps)
+        })
+        .sum();
+    PI * 0.25 * 2.0 + PI * 0.04 - inside
+}
+
+#[test]
+fn a_rim_may_go_up_and_down() {
+    for step in [0.3, 0.6] {
+        let volume = PI * 0.25 * (1.0 - 0.25 * (1.0 - step));
+        assert_solid(notched(step), 6, volume);
+        let (cut, watertight) = of_triangles(&notched(step).turned());
+        assert!(watertight && (cut / UNIT / volume - 1.0).abs() < 2e-3);
+    }
+}
+
+#[test]
+fn a_pipe_meets_another_one() {
+    let exact = volume_of_tee();
+    let (faces, volume) = tee().turned().solid();
+    assert_eq!(faces, 5);
+    assert!((volume / UNIT / exact - 1.0).abs() < 1e-4, "{volume}");
+    let (cut, watertight) = of_triangles(&tee().turned());
+    assert!(watertight);
+    assert!((cut / UNIT / exact - 1.0).abs() < 2e-3, "{cut}");
+    let model = tee().turned();
+    let shell = &model.shells()[0];
+    let geometry = model.geometry(shell);
+    for face in &shell.faces {
+        for point in face.steps().flat_map(|step| geometry.points(step, 0.01)) {
+            assert!(face.surface.height_of(&point).0.abs() < 1e-4);
+        }
+    }
+}
+
+#[test]
+fn the_dimension_of_a_notched_wall_is_its_area() {
+    let model = notched(0.6).turned();
+    let shells = model.shells();
+    let geometry = model.geometry(&shells[0]);
+    let areas: Vec<f64> = shells[0]
+        .faces
+        .iter()
+        .map(|face| geometry.area(face))
+        .collect();
+    let document = WireframeDocument {
+        arcs: model.arcs.clone(),
+        shells: shells.clone(),
+        ..WireframeDocument::from(&model.wireframe)
+    };
+    let measured = Dimensions::new(&document, None).unwrap().areas();
+    assert!(
+        areas
+            .iter()
+            .any(|area| (area / UNIT * 1.7 - 0.9 * PI).abs() < 1e-9)
+    );
+    for (area, dimension) in areas.iter().zip(&measured) {
+        assert!((area - dimension.value).abs() < 1e-9);
+    }
+}

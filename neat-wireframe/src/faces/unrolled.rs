@@ -1,0 +1,177 @@
+//! Cylinders and cones unrolled: angles around the axis and heights along it.
+//!
+//! Seen from away from the axis, with the axis upward, angles grow to the right: a loop that keeps
+//! the face on its left runs as in a plane, or once around the axis, to the right below the face
+//! and to the left above it.
+
+use super::plane_fit::across;
+use super::surface::Surface;
+use nalgebra::{Vector2, Vector3};
+use std::f64::consts::{PI, TAU};
+
+/// An angle and a height for each point of a chain. From one to the next angles change by less than
+/// half a turn, so that they may grow beyond a whole one.
+pub(crate) type Chain = Vec<Vector2<f64>>;
+
+/// A round surface with an angle and a height for each point.
+pub(crate) struct Unrolled {
+    origin: Vector3<f64>,
+    axis: Vector3<f64>,
+    across: [Vector3<f64>; 2],
+    /// At height 0, and by how much it grows with the height.
+    radius: f64,
+    slope: f64,
+}
+
+impl Unrolled {
+    /// `None` of a plane.
+    pub fn new(surface: &Surface) -> Option<Self> {
+        let (origin, axis) = surface.axis()?;
+        let [radius, slope] = surface.radius_at(&origin, &axis)?;
+        Some(Self {
+            origin,
+            axis,
+            across: across(&axis),
+            radius,
+            slope,
+        })
+    }
+
+    pub fn radius_at(&self, height: f64) -> f64 {
+        self.radius + self.slope * height
+    }
+
+    /// By how much its way along a ruling is longer than along the axis.
+    pub fn slant(&self) -> f64 {
+        self.slope.hypot(1.0)
+    }
+
+    /// From -π to π, and the height.
+    pub fn place(&self, point: &Vector3<f64>) -> Vector2<f64> {
+        let offset = point - self.origin;
+        let [u, v] = self.across.map(|axis| axis.dot(&offset));
+        Vector2::new(v.atan2(u), self.axis.dot(&offset))
+    }
+
+    /// The direction away from the axis.
+    pub fn outward(&self, angle: f64) -> Vector3<f64> {
+        let (sine, cosine) = angle.sin_cos();
+        self.across[0] * cosine + self.across[1] * sine
+    }
+
+    /// The point of the surface.
+    pub fn point(&self, place: &Vector2<f64>) -> Vector3<f64> {
+        let along = self.origin + self.axis * place.y;
+        along + self.outward(place.x) * self.radius_at(place.y)
+    }
+
+    /// The distance of a point from the surface.
+    pub fn distance(&self, point: &Vector3<f64>) -> f64 {
+        let place = self.place(point);
+        let from_axis = self.outward(place.x).dot(&(point - self.origin));
+        (from_axis - self.radius_at(place.y)).abs() / self.slant()
+    }
+
+    /// The angle of a direction that leads on along the surface from a point: 0 to the right.
+    pub fn direction(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
+        let (along, up) = (to - from, self.axis.dot(&(to - from)));
+        let right = self.axis.cross(&self.outward(self.place(from).x));
+        up.atan2(right.dot(&along))
+    }
+
+    pub fn chain<'a>(&self, points: impl IntoIterator<Item = &'a Vector3<f64>>) -> Chain {
+        let mut last = None;
+        let places = points.into_iter().map(|point| {
+            let mut place = self.place(point);
+            if let Some(last) = last {
+                place.x = last + turn(last, place.x);
+            }
+            last = Some(place.x);
+            place
+        });
+        places.collect()
+    }
+
+    /// Where a ray meets the surface, by its parameter, with the places there; ascending.
+    pub fn hits(
+        &self,
+        origin: &Vector3<f64>,
+        direction: &Vector3<f64>,
+    ) -> [Option<(f64, Vector2<f64>)>; 2] {
+        let flat = |v: &Vector3<f64>| v - self.axis * self.axis.dot(v);
+        let offset = origin - self.origin;
+        // Distance from the axis less radius, both squared, is a t² + 2 b t + c.
+        let radius = self.radius_at(self.axis.dot(&offset));
+        let widens = self.slope * self.axis.dot(direction);
+        let (from, along) = (flat(&offset), flat(direction));
+        let a = along.norm_squared() - widens * widens;
+        let b = from.dot(&along) - radius * widens;
+        let c = from.norm_squared() - radius * radius;
+        let root = (b * b - a * c).sqrt().copysign(b);
+        let mut hits = [-(b + root) / a, -c / (b + root)];
+        hits.sort_by(f64::total_cmp);
+        hits.map(|t| {
+            let place = self.place(&(origin + direction * t));
+            let on_surface = t.is_finite() && self.radius_at(place.y) > 0.0;
+            on_surface.then_some((t, place))
+        })
+    }
+
+    /// Area of a face within loops, which end where they begin, and the flux through it of x from a
+    /// point, away from the axis: by Gauss' theorem as integrals over the angle around it.
+    pub fn moments(&self, loops: &[Chain], from: &Vector3<f64>) -> [f64; 2] {
+        let offset = self.origin - from;
+        let apex = self.radius - self.slope * self.axis.dot(&offset);
+        // Over heights, of the radius.
+        let below = |height: f64| height * (self.radius + 0.5 * self.slope * height);
+        let spread = 0.6_f64.sqrt();
+        let mut moments = [0.0, 0.0];
+        for [start, end] in loops.iter().flat_map(pieces) {
+            for (node, weight) in [(-spread, 5.0), (0.0, 8.0), (spread, 5.0)] {
+                let place = start + (end - start) * (0.5 * (1.0 + node));
+                let share = (start.x - end.x) * weight / 18.0 * below(place.y);
+                moments[0] += share * self.slant();
+                moments[1] += share * (apex + self.outward(place.x).dot(&offset));
+            }
+        }
+        moments
+    }
+}
+
+/// The way from one angle to another, from -π to π.
+pub(super) fn turn(from: f64, to: f64) -> f64 {
+    (to - from + PI).rem_euclid(TAU) - PI
+}
+
+/// How often a loop that ends where it begins runs around the axis, to the right.
+pub(super) fn turns(chain: &Chain) -> i32 {
+    match (chain.first(), chain.last()) {
+        (Some(first), Some(last)) => ((last.x - first.x) / TAU).round() as i32,
+        _ => 0,
+    }
+}
+
+/// Whether loops have the place within them: as often as not they pass over it.
+pub(super) fn contains(loops: &[Chain], place: &Vector2<f64>) -> bool {
+    let above = |height: &&f64| **height > place.y;
+    crossings(loops, place.x).iter().filter(above).count() % 2 == 1
+}
+
+/// The heights at which loops pass an angle, ascending.
+pub(super) fn crossings(loops: &[Chain], angle: f64) -> Vec<f64> {
+    let turned = |place: &Vector2<f64>| ((place.x - angle) / TAU).floor();
+    let mut heights: Vec<f64> = (loops.iter())
+        .flat_map(pieces)
+        .filter(|[a, b]| turned(a) != turned(b))
+        .map(|[a, b]| {
+            let at = angle + TAU * turned(&a).max(turned(&b));
+            a.y + (b.y - a.y) * (at - a.x) / (b.x - a.x)
+        })
+        .collect();
+    heights.sort_by(f64::total_cmp);
+    heights
+}
+
+fn pieces(chain: &Chain) -> impl Iterator<Item = [Vector2<f64>; 2]> + '_ {
+    chain.windows(2).map(|ends| [ends[0], ends[1]])
+}
