@@ -151,9 +151,22 @@ def volume(shell, wireframe):
             area = sum((area_of_step(step, wireframe) for loop in face["loops"] for step in loop),
                        np.zeros(3))
             return face["plane"]["offset"] * float(np.dot(face["plane"]["normal"], area))
+        if "extruded" in face:
+            return flux_of_wall(face, wireframe)
         return flux_of_round(face, wireframe)
 
     return sum(flux(face) for face in shell["faces"]) / 3.0
+
+
+def flux_of_wall(face, wireframe):
+    """Of x through an extruded spline: an integral over its profile."""
+    direction = np.array(face["extruded"]["direction"])
+    total = 0.0
+    for loop in face["loops"]:
+        points = np.concatenate([points_of_step(step, wireframe) for step in loop])
+        heights = 0.5 * (points[1:] + points[:-1]) @ direction
+        total -= float((heights * (np.cross(points[:-1], points[1:]) @ direction)).sum())
+    return total
 
 
 def flux_of_round(face, wireframe):

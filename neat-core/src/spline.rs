@@ -276,7 +276,8 @@ mod tests {
         for (sweep, controls, closed) in [(2.0 * PI, 16, true), (2.0, 8, false), (0.3, 4, false)] {
             let spline = Spline::nearest_to(arc(sweep), controls, closed).unwrap();
             for point in spline.points(0.01) {
-                assert!((point.xy().norm() - 1.0).abs() < 1e-4);
+                let off = (point.xy().norm() - 1.0).abs();
+                assert!(off < 1e-4, "{sweep}: {off}");
                 assert!((point.z - 0.5).abs() < 1e-12);
             }
             if !closed {
@@ -294,7 +295,6 @@ mod tests {
             }
         }
         assert!(Spline::nearest_to(arc(1.0), 3, false).is_none());
-        assert!(Spline::nearest_to(|_| Vector3::x(), 8, true).is_none());
         assert!(Spline::nearest_to(|_| Vector3::repeat(f64::NAN), 8, true).is_none());
     }
 

@@ -185,9 +185,10 @@ impl Wireframe {
 
     /// Faces between edges, arcs and splines, closed shells first, as the lists and dicts of
     /// wireframe.json: `closed`, whether it bounds a solid, and `faces`. A face has a `plane`
-    /// (`normal`, `offset`), a `cylinder` (`point`, `axis`, `radius`, `convex`) or a `cone` (`apex`,
-    /// `axis`, `half_angle`, `convex`), and `loops` of steps: an `edge`, `arc` or `spline` by its
-    /// index, or a `smooth` line by its two junctions, and whether it is `reversed`.
+    /// (`normal`, `offset`), a `cylinder` (`point`, `axis`, `radius`, `convex`), a `cone` (`apex`,
+    /// `axis`, `half_angle`, `convex`) or a profile that is `extruded` (`direction`), and `loops` of
+    /// steps: an `edge`, `arc` or `spline` by its index, or a `smooth` line by its two junctions, and
+    /// whether it is `reversed`.
     #[getter]
     fn shells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         from_json(py, &serde_json::json!(self.document.shells))

@@ -1,6 +1,7 @@
 //! Which faces of a CAD model are found, by area.
 //!
-//! Source: ours. A found face is a true one if its corners lie on the same surface, both have the
+//! Source: ours. A found face is a true one if its corners lie on the same surface (those of a wall
+//! between splines on the boundary of a true face that is no plane, cylinder or cone), both have the
 //! same area, and their middles are in one place: so it is found whole, and once. Other than
 //! areas by points on surfaces, which count a face with a forgotten hole in it as nearly right,
 //! this says which faces of a model are there.
@@ -52,7 +53,7 @@ pub struct CadFaceScores {
     /// The cones.
     #[serde(default)]
     pub cones: FaceShare,
-    /// Spheres and all others: what is found has no such face.
+    /// Spheres and all others. Only walls between splines are ever found for them.
     pub others: FaceShare,
     /// Of the true area, what is found.
     pub recall: f64,
@@ -123,14 +124,19 @@ impl CadFaces {
                 Some(Surface::Plane { .. }) => &mut scores.planes,
                 Some(Surface::Cylinder { .. }) => &mut scores.cylinders,
                 Some(Surface::Cone { .. }) => &mut scores.cones,
-                None => &mut scores.others,
+                Some(Surface::Extruded { .. }) | None => &mut scores.others,
             };
             share.all.add(face.area);
             if partner.is_some() {
                 share.found.add(face.area);
             }
         }
-        let kinds = [&scores.planes, &scores.cylinders, &scores.cones];
+        let kinds = [
+            &scores.planes,
+            &scores.cylinders,
+            &scores.cones,
+            &scores.others,
+        ];
         let recalled = total(kinds.into_iter().map(|kind| kind.found.area));
         let right = total(partners.iter().flatten().map(|face| found[*face].area));
         scores.recall = recalled / scores.truth.area;
@@ -159,17 +165,30 @@ impl CadFaces {
 
     /// How far the middles of two faces are apart that are the same; `None` of others.
     fn shift(&self, found: &FoundFace, truth: &TrueFace) -> Option<f64> {
-        let surface = truth.surface.as_ref()?;
         let corners = || found.triangles.iter().flatten();
-        let same = self.same_direction(&found.surface, surface)
+        let is_near = |corner: &Vector3<f64>| match &truth.surface {
+            Some(surface) => surface.height_of(corner).0.abs() <= self.max_distance,
+            // The corners of a wall are on its rims.
+            None => {
+                (truth.boundary.iter()).any(|point| (point - corner).norm() <= self.max_distance)
+            }
+        };
+        let same = self.is_same_kind(&found.surface, truth.surface.as_ref())
             && (found.area / truth.area - 1.0).abs() <= self.max_area_error
-            && corners().all(|corner| surface.height_of(corner).0.abs() <= self.max_distance);
+            && corners().all(is_near);
         let shift = match (same, truth.boundary.is_empty()) {
             (false, _) => return None,
             (true, true) => 0.0,
             (true, false) => (middle(corners())? - middle(truth.boundary.iter())?).norm(),
         };
         (shift <= self.max_shift).then_some(shift)
+    }
+
+    fn is_same_kind(&self, found: &Surface, truth: Option<&Surface>) -> bool {
+        match truth {
+            Some(surface) => self.same_direction(found, surface),
+            None => matches!(found, Surface::Extruded { .. }),
+        }
     }
 
     fn same_direction(&self, one: &Surface, other: &Surface) -> bool {

@@ -66,11 +66,16 @@ impl Entities {
         [start, end]: [&Vector3<f64>; 2],
     ) -> Option<String> {
         let direction = direction(start, end)?;
-        let direction = self.add(&format!("DIRECTION('',{})", triple(&direction)));
-        let vector = self.add(&format!("VECTOR('',{direction},1.0)"));
+        let vector = self.vector(&direction);
         let origin = self.point(start);
         let line = self.add(&format!("LINE('',{origin},{vector})"));
         Some(self.add(&format!("EDGE_CURVE('{name}',{from},{to},{line},.T.)")))
+    }
+
+    /// Of length 1.
+    pub fn vector(&mut self, direction: &Vector3<f64>) -> String {
+        let direction = self.add(&format!("DIRECTION('',{})", triple(direction)));
+        self.add(&format!("VECTOR('',{direction},1.0)"))
     }
 
     /// The edge along an arc between two vertices.
@@ -82,6 +87,12 @@ impl Entities {
 
     /// The edge along a spline between two vertices, which are one if it runs around.
     pub fn spline_edge(&mut self, [from, to]: [&String; 2], spline: &Spline) -> String {
+        let curve = self.spline(spline);
+        self.add(&format!("EDGE_CURVE('',{from},{to},{curve},.T.)"))
+    }
+
+    /// A spline as a curve.
+    pub fn spline(&mut self, spline: &Spline) -> String {
         let controls = clamped_controls(spline);
         let controls: Vec<String> = controls.iter().map(|point| self.point(point)).collect();
         let pieces = spline.pieces();
@@ -89,13 +100,12 @@ impl Entities {
         let mut multiplicities = vec!["1"; pieces + 1];
         (multiplicities[0], multiplicities[pieces]) = ("4", "4");
         let closed = if spline.closed { ".T." } else { ".F." };
-        let curve = self.add(&format!(
+        self.add(&format!(
             "B_SPLINE_CURVE_WITH_KNOTS('',3,({}),.UNSPECIFIED.,{closed},.F.,({}),({}),.UNSPECIFIED.)",
             controls.join(","),
             multiplicities.join(","),
             knots.join(",")
-        ));
-        self.add(&format!("EDGE_CURVE('',{from},{to},{curve},.T.)"))
+        ))
     }
 
     /// The product whose shape the wireframe is.

@@ -2,6 +2,7 @@
 
 use super::entities::{Entities, real};
 use nalgebra::Vector3;
+use neat_core::Spline;
 use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::faces::{CurveIndex, Face, Shell, ShellGeometry, Step, Surface};
 use std::collections::BTreeMap;
@@ -115,17 +116,18 @@ impl<'a> ShellWriter<'a> {
 
     fn face(&mut self, face: &Face) -> String {
         let (surface, same_sense) = self.surface(face);
-        let is_circle = |steps: &Vec<Step>| {
+        // Rims that begin beside each other.
+        let is_rim = |steps: &Vec<Step>| {
             let mut curves = steps.iter().map(|step| &self.geometry.curves[&step.curve]);
-            curves.all(|curve| curve.arc.is_some() && curve.ends.is_none())
+            let is_extruded = matches!(face.surface, Surface::Extruded { .. });
+            curves.all(|curve| curve.ends.is_none() && (curve.arc.is_some() || is_extruded))
         };
-        let loops: Vec<Vec<String>> = match (&face.surface, &face.loops[..]) {
-            (Surface::Cylinder { .. } | Surface::Cone { .. }, [first, second])
-                if is_circle(first) && is_circle(second) =>
-            {
+        let is_plane = matches!(face.surface, Surface::Plane { .. });
+        let loops: Vec<Vec<String>> = match &face.loops[..] {
+            [first, second] if !is_plane && is_rim(first) && is_rim(second) => {
                 vec![self.seamed(first, second)]
             }
-            (_, loops) => loops.iter().map(|steps| self.oriented(steps)).collect(),
+            loops => loops.iter().map(|steps| self.oriented(steps)).collect(),
         };
         let mut bounds = Vec::new();
         for (place, edges) in loops.into_iter().enumerate() {
@@ -185,7 +187,30 @@ impl<'a> ShellWriter<'a> {
                     .add(&format!("CONICAL_SURFACE('',{placement},{radius},{angle})"));
                 (surface, *convex)
             }
+            Surface::Extruded { direction } => self.extruded(face, direction),
         }
+    }
+
+    /// The surface through the first spline of a wall: its normal is on the left of the wall there.
+    fn extruded(&mut self, face: &Face, direction: &Vector3<f64>) -> (String, bool) {
+        let is_spline = |step: &&Step| matches!(step.curve, CurveIndex::Spline(_));
+        let mut rims = face.steps().filter(is_spline);
+        let (Some(one), Some(other)) = (rims.next(), rims.next()) else {
+            unreachable!("a wall is between two splines");
+        };
+        let spline = |step: &Step| self.geometry.curves[&step.curve].spline.as_ref();
+        let height = |spline: &Spline| {
+            let heights = spline.controls.iter().map(|control| direction.dot(control));
+            heights.sum::<f64>() / spline.controls.len() as f64
+        };
+        let up = spline(other).map(height) > spline(one).map(height);
+        let curve = spline(one)
+            .map(|spline| self.step.spline(spline))
+            .unwrap_or_default();
+        let along = if up { *direction } else { -direction };
+        let along = self.step.vector(&along);
+        let surface = format!("SURFACE_OF_LINEAR_EXTRUSION('',{curve},{along})");
+        (self.step.add(&surface), !one.reversed)
     }
 
     fn oriented(&mut self, steps: &[Step]) -> Vec<String> {

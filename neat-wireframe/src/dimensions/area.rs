@@ -10,7 +10,7 @@ use super::Place;
 use crate::export::WireframeDocument;
 use crate::faces::{
     Chain, CurveIndex, FINE, Face, Step, Surface, Unrolled, area_vector_of_spline, ends_of_arc,
-    goes_around, nearest_junctions,
+    goes_around, moments_of_wall, nearest_junctions,
 };
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Spline};
@@ -97,6 +97,7 @@ pub(super) fn value(document: &WireframeDocument, face: &Face, points: &[Vector3
         Surface::Cylinder { axis, .. } if is_between_rims(face) => round(&axis, false, &pieces),
         Surface::Cone { axis, .. } if is_between_rims(face) => round(&axis, true, &pieces),
         Surface::Cylinder { .. } | Surface::Cone { .. } => unrolled(face, &pieces),
+        Surface::Extruded { direction } => extruded(&direction, &pieces),
     }
 }
 
@@ -197,6 +198,20 @@ fn unrolled(face: &Face, pieces: &[(bool, Piece)]) -> f64 {
     };
     let loops: Vec<Chain> = face.loops.iter().map(chain).collect();
     surface.moments(&loops, &Vector3::zeros())[0].abs()
+}
+
+/// The area between two splines of one profile.
+fn extruded(direction: &Vector3<f64>, pieces: &[(bool, Piece)]) -> f64 {
+    let rims = pieces.iter().filter_map(|(reversed, piece)| match piece {
+        Piece::Spline(spline) => Some((*reversed, spline)),
+        _ => None,
+    });
+    let rims: Vec<(bool, &Spline)> = rims.collect();
+    let area = |rims: &[(bool, &Spline); 2]| {
+        let start = rims[0].1.controls[0];
+        moments_of_wall(*rims, direction, &start)[0]
+    };
+    rims.first_chunk().map_or(0.0, area)
 }
 
 fn round(axis: &Vector3<f64>, widens: bool, pieces: &[(bool, Piece)]) -> f64 {

@@ -9,6 +9,7 @@ use super::plane_fit::{PlaneFit, PlaneFrame};
 use super::planes::{CoplanarCurves, coplanar_curves};
 use super::round_cells::round_cells;
 use super::surface::Surface;
+use super::walls::walls;
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -60,7 +61,7 @@ pub(super) fn candidates(curves: Curves) -> (Curves, Vec<Face>) {
         inferred.len() <= seen.len() || length(&inferred) <= length(&seen)
     };
     let round = rims(&curves).into_iter().chain(round_cells(&curves));
-    let all = planar.into_iter().chain(round);
+    let all = planar.into_iter().chain(round).chain(walls(&curves));
     for face in all.filter(is_seen) {
         let mut boundary: Vec<CurveIndex> = face.steps().map(|step| step.curve).collect();
         boundary.sort_unstable();
@@ -96,12 +97,10 @@ fn planar_face(curves: &Curves, loops: Vec<Vec<Step>>, frame: &PlaneFrame) -> Op
 /// Cylinders and cones between two whole circles, or two arcs whose ends edges or inferred lines
 /// join.
 fn rims(curves: &Curves) -> Vec<Face> {
-    let (arcs, edges): (Vec<&Curve>, Vec<&Curve>) =
-        (curves.all.iter()).partition(|curve| curve.arc.is_some());
-    let by_ends: BTreeMap<[usize; 2], &Curve> = (edges.into_iter())
-        .filter(|curve| curve.is_straight())
-        .filter_map(|edge| Some((sorted(edge.ends?), edge)))
+    let arcs: Vec<&Curve> = (curves.all.iter())
+        .filter(|curve| curve.arc.is_some())
         .collect();
+    let by_ends = straight_by_ends(curves);
     let pairs = (0..arcs.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
     let face = |(i, j): (usize, usize)| {
         let rims = [arcs[i], arcs[j]];
@@ -110,6 +109,14 @@ fn rims(curves: &Curves) -> Vec<Face> {
         Some(Face { surface, loops })
     };
     pairs.filter_map(face).collect()
+}
+
+/// Edges and inferred lines by their junctions, the lower first.
+pub(super) fn straight_by_ends(curves: &Curves) -> BTreeMap<[usize; 2], &Curve> {
+    (curves.all.iter())
+        .filter(|curve| curve.is_straight())
+        .filter_map(|edge| Some((sorted(edge.ends?), edge)))
+        .collect()
 }
 
 /// The cylinder or cone on which both arcs are rims, with its normal away from the axis.
@@ -164,6 +171,15 @@ fn loops_between(
     };
     let (first, ends) = around(rims[0], axis)?;
     let (second, other_ends) = around(rims[1], -axis)?;
+    joined([(first, ends), (second, other_ends)], edges)
+}
+
+/// The loops of two rims, each with the junctions from which it runs and to which: of their own, or
+/// one in which straight curves join them.
+pub(super) fn joined(
+    [(first, ends), (second, other_ends)]: [(Step, Option<[usize; 2]>); 2],
+    edges: &BTreeMap<[usize; 2], &Curve>,
+) -> Option<Vec<Vec<Step>>> {
     match (ends, other_ends) {
         (None, None) => Some(vec![vec![first], vec![second]]),
         (Some([a, b]), Some([c, d])) => {

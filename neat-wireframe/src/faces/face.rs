@@ -2,6 +2,7 @@
 
 use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 use super::surface::Surface;
+use super::walls::rims;
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Spline, Wireframe3d};
 use serde::{Deserialize, Serialize};
@@ -108,7 +109,8 @@ impl Shell {
 }
 
 impl Face {
-    /// Whether its surface is one, and its loops are closed chains of curves that exist.
+    /// Whether its surface is one, and its loops are closed chains of curves that exist; of an
+    /// extruded one two splines, as loops of their own or joined by two edges or inferred lines.
     pub(crate) fn is_valid(
         &self,
         wireframe: &Wireframe3d,
@@ -121,8 +123,12 @@ impl Face {
             CurveIndex::Spline(spline) => spline < splines.len(),
             CurveIndex::Smooth([a, b]) => a < b && b < wireframe.junctions.len(),
         };
+        let has_shape = match self.surface {
+            Surface::Extruded { .. } => rims(self).is_some(),
+            _ => !self.loops.is_empty(),
+        };
         self.surface.is_valid()
-            && !self.loops.is_empty()
+            && has_shape
             && self.steps().all(exists)
             && (self.loops.iter()).all(|steps| is_closed(steps, wireframe, (arcs, splines)))
     }

@@ -6,10 +6,12 @@
 //! there.
 
 use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
+use super::extrusion::{extrude, moments_of_wall, place_and_derivative};
 use super::face::{CurveIndex, Face, Shell, Step};
 use super::plane_fit::across;
 use super::surface::Surface;
 use super::unrolled::{Chain, Unrolled, turn};
+use super::walls::rims;
 use nalgebra::{DMatrix, DVector, Vector3};
 use neat_core::{CircularArc, Spline, Wireframe3d};
 use std::collections::BTreeMap;
@@ -109,6 +111,9 @@ impl ShellGeometry {
                 }
             }
         }
+        for face in &shell.faces {
+            extrude(face, &mut curves, &surfaces_of);
+        }
         let inner = curves.values().filter_map(|curve| {
             let of_spline = curve.spline.as_ref().map(|spline| spline.controls[0]);
             curve.arc.map(|arc| arc.center).or(of_spline)
@@ -147,6 +152,7 @@ impl ShellGeometry {
         match face.surface {
             Surface::Plane { normal, .. } => normal.dot(&self.area_vector(face)),
             Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face)[0],
+            Surface::Extruded { direction } => self.moments_of_wall(face, direction)[0],
         }
     }
 
@@ -158,6 +164,7 @@ impl ShellGeometry {
                 (offset - normal.dot(&self.origin)) * normal.dot(&self.area_vector(face))
             }
             Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face)[1],
+            Surface::Extruded { direction } => self.moments_of_wall(face, direction)[1],
         };
         shell.faces.iter().map(flux).sum::<f64>() / 3.0
     }
@@ -203,6 +210,19 @@ impl ShellGeometry {
         let [area, flux] = surface.moments(&loops, &self.origin);
         [area.abs(), flux]
     }
+
+    /// Likewise of a wall between two splines.
+    fn moments_of_wall(&self, face: &Face, direction: Vector3<f64>) -> [f64; 2] {
+        let Some([one, other]) = rims(face) else {
+            return [0.0, 0.0];
+        };
+        let spline = |step: &Step| self.curves[&step.curve].spline.as_ref();
+        let Some((first, second)) = spline(&one).zip(spline(&other)) else {
+            return [0.0, 0.0];
+        };
+        let rims = [(one.reversed, first), (other.reversed, second)];
+        moments_of_wall(rims, &direction, &self.origin)
+    }
 }
 
 /// The curve of a step as the wireframe has it: `open` if others are beside it in its loop.
@@ -241,12 +261,9 @@ fn as_measured(
 pub(crate) fn area_vector_of_spline(spline: &Spline, origin: &Vector3<f64>) -> Vector3<f64> {
     let spread = 0.6_f64.sqrt();
     let nodes = [(-spread, 5.0), (0.0, 8.0), (spread, 5.0)];
-    let of_piece = |[a, b, c, d]: &[Vector3<f64>; 4]| -> Vector3<f64> {
+    let of_piece = |piece: &[Vector3<f64>; 4]| -> Vector3<f64> {
         let of_node = |(node, weight): (f64, f64)| {
-            let t = 0.5 * (1.0 + node);
-            let s = 1.0 - t;
-            let point = a * (s * s * s) + (b * s + c * t) * (3.0 * s * t) + d * (t * t * t);
-            let along = ((b - a) * (s * s) + (c - b) * (2.0 * s * t) + (d - c) * (t * t)) * 3.0;
+            let (point, along) = place_and_derivative(piece, 0.5 * (1.0 + node));
             (point - origin).cross(&along) * (weight / 18.0)
         };
         nodes.into_iter().map(of_node).sum()
@@ -318,7 +335,7 @@ fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> C
     let (mut center, mut radius) = (arc.center, arc.radius);
     let plane = surfaces.iter().find_map(|surface| match surface {
         Surface::Plane { normal, offset } => Some((*normal, *offset)),
-        Surface::Cylinder { .. } | Surface::Cone { .. } => None,
+        Surface::Cylinder { .. } | Surface::Cone { .. } | Surface::Extruded { .. } => None,
     });
     let axis = surfaces
         .iter()

@@ -41,6 +41,7 @@ mod chain;
 mod creases;
 mod curves;
 mod explained_planes;
+mod extrusion;
 mod face;
 mod geometry;
 mod groups;
@@ -62,6 +63,7 @@ mod surface_points;
 mod triangulation;
 mod unrolled;
 mod visibility;
+mod walls;
 
 #[cfg(test)]
 mod round_tests;
@@ -75,6 +77,7 @@ pub(crate) use curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 pub use face::{CurveIndex, Face, Shell, Step};
 pub(crate) use triangulation::triangles;
 
+pub(crate) use extrusion::moments_of_wall;
 pub(crate) use geometry::{FINE, area_vector_of_spline, goes_around};
 pub use geometry::{ShellCurve, ShellGeometry};
 pub use surface::Surface;

@@ -7,10 +7,11 @@ use super::plane_fit::PlaneFrame;
 use super::polygon::contains;
 use super::surface::Surface;
 use super::unrolled::{self, Chain, Unrolled};
+use super::walls::{Wall, rims};
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::TAU;
 
-/// A round face is asked about along so many straight lines on it …
+/// A face that is no plane is asked about along so many straight lines on it …
 const RULINGS: usize = 16;
 /// … without this share at each end …
 const AT_END: f64 = 0.02;
@@ -30,6 +31,8 @@ pub(super) enum Region {
         surface: Unrolled,
         loops: Vec<Chain>,
     },
+    /// Between two splines.
+    Wall(Wall),
 }
 
 impl Region {
@@ -44,6 +47,14 @@ impl Region {
                     polygons: face.loops.iter().map(polygon).collect(),
                 })
             }
+            Surface::Extruded { direction } => {
+                let [one, other] = rims(face)?;
+                let points = |step: Step| Some(curves.find(step.curve)?.points_along(&step));
+                Some(Self::Wall(Wall::new(
+                    [points(one)?, points(other)?],
+                    direction,
+                )))
+            }
             round => {
                 let surface = Unrolled::new(&round)?;
                 let around = |steps: &Vec<Step>| surface.chain(&closed_points(curves, steps));
@@ -53,52 +64,52 @@ impl Region {
         }
     }
 
-    /// Where a ray hits the face, by its parameter; ascending on what is round.
-    pub fn hits(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> [Option<f64>; 2] {
+    /// Where a ray hits the face, by its parameter.
+    pub fn hits(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Vec<f64> {
         match self {
             Self::Plane { frame, polygons } => {
                 let slope = frame.normal.dot(direction);
                 let t = (frame.offset - frame.normal.dot(origin)) / slope;
                 let point = frame.coordinates(&(origin + direction * t));
                 let inside = polygons.iter().filter(|p| contains(p, &point)).count() % 2 == 1;
-                [(t.is_finite() && inside).then_some(t), None]
+                Vec::from_iter((t.is_finite() && inside).then_some(t))
             }
             Self::Round { surface, loops } => {
-                let hits = surface.hits(origin, direction);
-                hits.map(|hit| Some(hit.filter(|(_, place)| unrolled::contains(loops, place))?.0))
+                let hits = surface.hits(origin, direction).into_iter().flatten();
+                let on_face = hits.filter(|(_, place)| unrolled::contains(loops, place));
+                on_face.map(|(t, _)| t).collect()
             }
+            Self::Wall(wall) => wall.hits(origin, direction),
         }
     }
 
     /// Whether a straight line from one point to another passes through the face.
     pub fn is_between(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> bool {
         let hits = self.hits(from, &(to - from));
-        hits.iter().flatten().any(|t| (0.0..1.0).contains(t))
+        hits.iter().any(|t| (0.0..1.0).contains(t))
     }
 
-    /// Whether a round face passes through another one.
+    /// Whether a face that is no plane passes through another one.
     pub fn passes_through(&self, other: &Self) -> bool {
-        let Self::Round { surface, loops } = self else {
-            return false;
+        let passes = |ends: &[Vector3<f64>; 2]| {
+            let at = |share: f64| ends[0] + (ends[1] - ends[0]) * share;
+            other.is_between(&at(AT_END), &at(1.0 - AT_END))
         };
-        let angles = || loops.iter().flatten().map(|place| place.x);
-        let from = angles().fold(f64::MAX, f64::min);
-        let sweep = (angles().fold(f64::MIN, f64::max) - from).min(TAU);
-        let passes = |ruling: &usize| {
-            let angle = from + sweep * (*ruling as f64 + 0.5) / RULINGS as f64;
-            let heights = unrolled::crossings(loops, angle);
-            heights.chunks_exact(2).any(|ends| {
-                let at = |share: f64| {
-                    let height = ends[0] + (ends[1] - ends[0]) * share;
-                    surface.point(&Vector2::new(angle, height))
-                };
-                other.is_between(&at(AT_END), &at(1.0 - AT_END))
-            })
+        let count = match self {
+            Self::Plane { .. } => 0,
+            Self::Round { surface, loops } => (0..RULINGS)
+                .filter(|ruling| rulings_at(surface, loops, *ruling).iter().any(passes))
+                .count(),
+            Self::Wall(wall) => wall
+                .rulings(RULINGS)
+                .iter()
+                .filter(|ends| passes(ends))
+                .count(),
         };
-        (0..RULINGS).filter(passes).count() > FEW_RULINGS
+        count > FEW_RULINGS
     }
 
-    /// Points all over a plane face; none of a round one.
+    /// Points all over a plane face; none of others.
     pub fn points(&self) -> Vec<Vector3<f64>> {
         let Self::Plane { frame, polygons } = self else {
             return Vec::new();
@@ -120,18 +131,7 @@ impl Region {
         match self {
             Self::Plane { frame, .. } => (frame.normal.dot(point) - frame.offset).abs(),
             Self::Round { surface, .. } => surface.distance(point),
-        }
-    }
-
-    /// Where a chain of points near the face lies on it, in lengths.
-    pub fn unrolled(&self, points: impl Iterator<Item = Vector3<f64>>) -> Vec<Vector2<f64>> {
-        match self {
-            Self::Plane { frame, .. } => points.map(|point| frame.coordinates(&point)).collect(),
-            Self::Round { surface, .. } => {
-                let mut chain = surface.chain(&points.collect::<Vec<_>>());
-                (chain.iter_mut()).for_each(|place| place.x *= surface.radius_at(place.y));
-                chain
-            }
+            Self::Wall(wall) => wall.distance(point),
         }
     }
 
@@ -140,8 +140,23 @@ impl Region {
         let toward = match self {
             Self::Plane { frame, .. } => frame.normal,
             Self::Round { surface, .. } => surface.outward(surface.place(point).x),
+            Self::Wall(wall) => return wall.is_near(point, distance),
         };
         let hits = self.hits(point, &toward);
-        hits.iter().flatten().any(|t| t.abs() <= distance)
+        hits.iter().any(|t| t.abs() <= distance)
     }
+}
+
+/// Pieces of one of so many rulings that are on a round face.
+fn rulings_at(surface: &Unrolled, loops: &[Chain], ruling: usize) -> Vec<[Vector3<f64>; 2]> {
+    let angles = || loops.iter().flatten().map(|place| place.x);
+    let from = angles().fold(f64::MAX, f64::min);
+    let sweep = (angles().fold(f64::MIN, f64::max) - from).min(TAU);
+    let angle = from + sweep * (ruling as f64 + 0.5) / RULINGS as f64;
+    let point = |height: f64| surface.point(&Vector2::new(angle, height));
+    let heights = unrolled::crossings(loops, angle);
+    let pieces = heights.chunks_exact(2);
+    pieces
+        .map(|ends| [point(ends[0]), point(ends[1])])
+        .collect()
 }

@@ -1,4 +1,4 @@
-//! Cylinders with notches and holes.
+//! Faces that are no planes: cylinders with notches and holes, walls between splines.
 
 use super::tests::{Model, UNIT, WHOLE, assert_solid, of_triangles};
 use crate::dimensions::Dimensions;
@@ -103,5 +103,87 @@ fn the_dimension_of_a_notched_wall_is_its_area() {
     );
     for (area, dimension) in areas.iter().zip(&measured) {
         assert!((area - dimension.value).abs() < 1e-9);
+    }
+}
+
+/// Splines around an ellipse with half axes of .3 and .2, at two heights; the second one begins
+/// elsewhere and runs the other way round.
+fn pin(controls: usize) -> Model {
+    let oval = |height: f64, first: f64, sign: f64| {
+        let at = |share: f64| {
+            let (sine, cosine) = (TAU * (first + sign * share)).sin_cos();
+            Vector3::new(0.3 * cosine, 0.2 * sine, height)
+        };
+        Spline::nearest_to(at, controls, true).unwrap()
+    };
+    Model {
+        splines: vec![oval(0.0, 0.0, 1.0), oval(0.7, 0.3, -1.0)],
+        ..Model::default()
+    }
+}
+
+#[test]
+fn a_profile_leaves_a_wall_behind() {
+    let exact = PI * 0.06 * 0.7;
+    let (faces, volume) = pin(16).turned().solid();
+    assert_eq!(faces, 3);
+    assert!((volume / UNIT / exact - 1.0).abs() < 1e-4, "{volume}");
+    let (cut, watertight) = of_triangles(&pin(16).turned());
+    assert!(
+        watertight && (cut / UNIT / exact - 1.0).abs() < 5e-3,
+        "{cut}"
+    );
+    // Through a block: a hole.
+    let mut block = Model::default().prism(
+        &[[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]],
+        [0.0, 0.7],
+    );
+    block.splines = pin(16).splines;
+    let (faces, volume) = block.clone().turned().solid();
+    assert_eq!(faces, 7);
+    assert!((volume / UNIT - 2.8 + exact).abs() < 1e-4, "{volume}");
+    let (cut, watertight) = of_triangles(&block.turned());
+    assert!(
+        watertight && (cut / UNIT - 2.8 + exact).abs() < 2e-3,
+        "{cut}"
+    );
+}
+
+#[test]
+fn a_wall_may_end_at_edges_and_be_cut_askew() {
+    // Half the pin, and its upper end not across it.
+    let half = |height: f64, slope: f64| {
+        let at = |share: f64| {
+            let (sine, cosine) = (PI * share).sin_cos();
+            Vector3::new(0.3 * cosine, 0.2 * sine, height + slope * 0.3 * cosine)
+        };
+        Spline::nearest_to(at, 10, false).unwrap()
+    };
+    let mut model = Model {
+        splines: vec![half(0.0, 0.0), half(0.7, 0.4)],
+        ..Model::default()
+    };
+    let ends = model
+        .splines
+        .iter()
+        .flat_map(|spline| [spline.controls[0], spline.controls[9]]);
+    model.wireframe.junctions = ends.collect();
+    model.wireframe.edges = vec![[0, 1], [2, 3], [0, 2], [1, 3]];
+    let (faces, volume) = model.clone().turned().solid();
+    assert_eq!(faces, 4);
+    let exact = 0.5 * PI * 0.06 * 0.7;
+    assert!((volume / UNIT / exact - 1.0).abs() < 1e-3, "{volume}");
+    let model = model.turned();
+    let shells = model.shells();
+    let geometry = model.geometry(&shells[0]);
+    let document = WireframeDocument {
+        splines: model.splines.clone(),
+        shells: shells.clone(),
+        ..WireframeDocument::from(&model.wireframe)
+    };
+    let measured = Dimensions::new(&document, None).unwrap().areas();
+    for (face, dimension) in shells[0].faces.iter().zip(&measured) {
+        let area = geometry.area(face);
+        assert!((area / dimension.value - 1.0).abs() < 1e-3, "{area}");
     }
 }

@@ -13,6 +13,7 @@ use super::face::{CurveIndex, Face, Step};
 use super::groups::groups;
 use super::region::Region;
 use super::surface::Surface;
+use super::walls::inward_of_wall;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -118,6 +119,9 @@ fn crossing(regions: &[Option<Region>], possible: &[usize]) -> Vec<[usize; 2]> {
 /// Into which direction a face goes from the start of a curve of its boundary.
 fn inward(curves: &Curves, face: &Face, step: &Step) -> Option<Vector3<f64>> {
     let points = curves.find(step.curve)?.points_along(step);
+    if let Surface::Extruded { direction } = face.surface {
+        return inward_of_wall(curves, face, step, &direction);
+    }
     let along = (points[1] - points[0]).normalize();
     let normal = face.surface.normal_at(&(0.5 * (points[0] + points[1])));
     Some(normal.cross(&along))

@@ -9,7 +9,7 @@ use super::groups::groups;
 use super::region::Region;
 use super::surface::Surface;
 use crate::ViewObservation;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Points of each curve that are asked whether they lie within a solid or on it.
@@ -180,7 +180,7 @@ fn leave_out_where_curves_are(
             .iter()
             .flatten()
             .flat_map(|region| region.hits(point, &ray));
-        hits.flatten().filter(|t| *t > 0.0).count() % 2 == 1
+        hits.filter(|t| *t > 0.0).count() % 2 == 1
     };
     shell.closed = !samples.iter().any(|of_curve| most(of_curve, &within));
     let mut regions = regions.iter();
@@ -195,7 +195,7 @@ fn leave_out_where_curves_are(
             .map(|(other, _)| *other)
             .collect();
         shell.closed &= on_face.is_empty();
-        enclosed(region, &on_face) <= LITTLE * geometry.area(face).abs()
+        enclosed(&on_face) <= LITTLE * geometry.area(face).abs()
     });
     shell.faces.len() < count
 }
@@ -205,7 +205,7 @@ type Other<'a> = (Option<[usize; 2]>, &'a Vec<Vector3<f64>>);
 
 /// The area that curves on a face may enclose: a square around each of those that hang together, as
 /// one line alone does not say how wide that is of which it is a rim.
-fn enclosed(region: &Region, on_face: &[Other]) -> f64 {
+fn enclosed(on_face: &[Other]) -> f64 {
     let mut joined: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (place, (ends, _)) in on_face.iter().enumerate() {
         for end in ends.iter().flatten() {
@@ -216,10 +216,7 @@ fn enclosed(region: &Region, on_face: &[Other]) -> f64 {
     joined.extend((0..on_face.len()).map(|place| vec![place]));
     let square_around = |group: &Vec<usize>| {
         let points = group.iter().flat_map(|place| on_face[*place].1);
-        let places = region.unrolled(points.copied());
-        let low = (places.iter()).fold(Vector2::repeat(f64::MAX), |low, place| low.inf(place));
-        let high = (places.iter()).fold(Vector2::repeat(f64::MIN), |high, place| high.sup(place));
-        (high - low).max().powi(2)
+        Bounds::of(points).extent().powi(2)
     };
     groups(&joined).iter().map(square_around).sum()
 }

@@ -37,10 +37,16 @@ pub enum Surface {
         /// As of a cylinder.
         convex: bool,
     },
+    /// Straight lines in one direction through two splines, between which the face is: where it
+    /// lies, and to which side its normal points, they say alone.
+    Extruded {
+        /// Of length 1.
+        direction: Vector3<f64>,
+    },
 }
 
 impl Surface {
-    /// How far a point lies over the surface, away from the axis of a round one whichever side its
+    /// How far a point lies over the surface, always 0 for an extruded one; away from the axis of a round one whichever side its
     /// normal points to, and the direction in which that grows.
     pub fn height_of(&self, at: &Vector3<f64>) -> (f64, Vector3<f64>) {
         let around = |offset: Vector3<f64>, axis: &Vector3<f64>| {
@@ -51,6 +57,7 @@ impl Surface {
         };
         match self {
             Self::Plane { normal, offset } => (normal.dot(at) - offset, *normal),
+            Self::Extruded { .. } => (0.0, Vector3::zeros()),
             Self::Cylinder {
                 point,
                 axis,
@@ -76,35 +83,36 @@ impl Surface {
         }
     }
 
-    /// The normal near a point.
+    /// The normal near a point; 0 of an extruded one.
     pub(super) fn normal_at(&self, at: &Vector3<f64>) -> Vector3<f64> {
         let outward = self.height_of(at).1;
         match self {
             Self::Plane { .. }
+            | Self::Extruded { .. }
             | Self::Cylinder { convex: true, .. }
             | Self::Cone { convex: true, .. } => outward,
             Self::Cylinder { .. } | Self::Cone { .. } => -outward,
         }
     }
 
-    /// A point of the axis and its direction; `None` of a plane.
+    /// A point of the axis and its direction; `None` of what has none.
     pub(super) fn axis(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         match self {
-            Self::Plane { .. } => None,
+            Self::Plane { .. } | Self::Extruded { .. } => None,
             Self::Cylinder { point, axis, .. } => Some((*point, *axis)),
             Self::Cone { apex, axis, .. } => Some((*apex, *axis)),
         }
     }
 
     /// The radius of a round surface where its axis passes a point, and by how much it grows along
-    /// a direction of the axis; `None` of a plane.
+    /// a direction of the axis; `None` of what has no axis.
     pub(super) fn radius_at(
         &self,
         center: &Vector3<f64>,
         along: &Vector3<f64>,
     ) -> Option<[f64; 2]> {
         match self {
-            Self::Plane { .. } => None,
+            Self::Plane { .. } | Self::Extruded { .. } => None,
             Self::Cylinder { radius, .. } => Some([*radius, 0.0]),
             Self::Cone {
                 apex,
@@ -125,6 +133,7 @@ impl Surface {
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
         match self {
             Self::Plane { normal, offset } => unit(normal) && offset.is_finite(),
+            Self::Extruded { direction } => unit(direction),
             Self::Cylinder {
                 point,
                 axis,
@@ -177,6 +186,7 @@ impl Surface {
                 half_angle,
                 convex,
             },
+            Self::Extruded { .. } => *self,
         }
     }
 
@@ -186,6 +196,7 @@ impl Surface {
         match &mut turned {
             Self::Plane { normal, offset } => (*normal, *offset) = (-*normal, -*offset),
             Self::Cylinder { convex, .. } | Self::Cone { convex, .. } => *convex = !*convex,
+            Self::Extruded { .. } => {}
         }
         turned
     }

@@ -4,6 +4,7 @@ use super::face::{CurveIndex, Face, Shell, Step};
 use super::plane_fit::PlaneFrame;
 use super::round_triangulation::cut_round;
 use super::surface::Surface;
+use super::walls::{rims, strip};
 use earcut::Earcut;
 use nalgebra::{Vector2, Vector3};
 
@@ -43,6 +44,12 @@ pub(crate) fn triangles(
                 };
                 let loops: Vec<Vec<Corner>> = face.loops.iter().map(flat).collect();
                 cut(&loops, &mut triangles);
+            }
+            Surface::Extruded { direction } => {
+                if let Some(rims) = rims(face) {
+                    let [one, other] = rims.map(|step| indices_along(&step, edges, chains));
+                    strip([&one, &other], points, &direction, &mut triangles);
+                }
             }
             Surface::Cylinder { .. } | Surface::Cone { .. } => {
                 let loops: Vec<Vec<usize>> = face.loops.iter().map(around).collect();

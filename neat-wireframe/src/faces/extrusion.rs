@@ -1,0 +1,102 @@
+//! The exact geometry of walls between two splines: one is the other, moved along the wall.
+
+use super::face::{CurveIndex, Face, Step};
+use super::geometry::ShellCurve;
+use super::surface::Surface;
+use super::walls::{FLAT, rims};
+use nalgebra::Vector3;
+use neat_core::Spline;
+use std::collections::BTreeMap;
+
+/// Places and weights of Gauss and Legendre on [-1, 1].
+const GAUSS_5: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
+/// Moves the second spline of a wall to where the first one is, along the wall, in the plane of its
+/// other face; both begin beside each other then, and run alike or against each other as before.
+pub(super) fn extrude(
+    face: &Face,
+    curves: &mut BTreeMap<CurveIndex, ShellCurve>,
+    surfaces_of: &BTreeMap<CurveIndex, Vec<Surface>>,
+) {
+    let (Surface::Extruded { direction }, Some([one, other])) = (face.surface, rims(face)) else {
+        return;
+    };
+    let spline = |step: &Step| curves.get(&step.curve)?.spline.clone();
+    let (Some(from), Some(to)) = (spline(&one), spline(&other)) else {
+        return;
+    };
+    let plane = surfaces_of[&other.curve]
+        .iter()
+        .find_map(|surface| match surface {
+            Surface::Plane { normal, offset } if normal.dot(&direction).abs() > FLAT => {
+                Some((*normal, *offset))
+            }
+            _ => None,
+        });
+    let middle = |spline: &Spline| {
+        spline.controls.iter().sum::<Vector3<f64>>() / spline.controls.len() as f64
+    };
+    let apart = direction.dot(&(middle(&to) - middle(&from)));
+    let mut moved = from.map(|control| {
+        let by = plane.map_or(apart, |(normal, offset)| {
+            (offset - normal.dot(control)) / normal.dot(&direction)
+        });
+        control + direction * by
+    });
+    if one.reversed == other.reversed {
+        moved.controls.reverse();
+        if moved.closed {
+            // A piece begins near the second of its four control points.
+            moved.controls.rotate_right(3);
+        }
+    }
+    if let (false, [first, .., last]) = (to.closed, &mut moved.controls[..]) {
+        (*first, *last) = (to.controls[0], to.controls[to.controls.len() - 1]);
+    }
+    if let Some(curve) = curves.get_mut(&other.curve) {
+        curve.spline = Some(moved);
+    }
+}
+
+/// The area of a wall between two splines, each with whether the wall's loop runs backwards along it,
+/// and the flux of x from a point through it: integrals over heights along the profile, as of a
+/// cylinder over those along its rims.
+pub(crate) fn moments_of_wall(
+    rims: [(bool, &Spline); 2],
+    direction: &Vector3<f64>,
+    from: &Vector3<f64>,
+) -> [f64; 2] {
+    let of_rim = |(reversed, spline): (bool, &Spline)| {
+        let mut moments = [0.0, 0.0];
+        for piece in spline.beziers() {
+            for (node, weight) in GAUSS_5 {
+                let (point, along) = place_and_derivative(&piece, 0.5 * (1.0 + node));
+                let (offset, height) = (point - from, direction.dot(&(point - from)));
+                let across = direction.cross(&offset).dot(&along);
+                let beside = along - direction * direction.dot(&along);
+                moments[0] += 0.5 * weight * height * beside.norm();
+                moments[1] += 0.5 * weight * height * if reversed { across } else { -across };
+            }
+        }
+        moments
+    };
+    let [one, other] = rims.map(of_rim);
+    [(other[0] - one[0]).abs(), one[1] + other[1]]
+}
+
+/// Of a cubic by its four control points as a Bézier curve.
+pub(super) fn place_and_derivative(
+    [a, b, c, d]: &[Vector3<f64>; 4],
+    t: f64,
+) -> (Vector3<f64>, Vector3<f64>) {
+    let s = 1.0 - t;
+    let point = a * (s * s * s) + (b * s + c * t) * (3.0 * s * t) + d * (t * t * t);
+    let along = ((b - a) * (s * s) + (c - b) * (2.0 * s * t) + (d - c) * (t * t)) * 3.0;
+    (point, along)
+}
