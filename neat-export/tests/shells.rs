@@ -10,12 +10,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-fn document() -> WireframeDocument {
-    read_json(Path::new(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/tests/data/solid.json"
-    )))
-    .unwrap()
+fn document(name: &str) -> WireframeDocument {
+    let data = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data"));
+    read_json(&data.join(name)).unwrap()
 }
 
 fn exported(document: &WireframeDocument, format: Format, filter: EdgeFilter) -> String {
@@ -34,7 +31,7 @@ fn add_shells(document: &mut WireframeDocument) {
     let graph = MeasuredGraph {
         wireframe: &wireframe,
         arcs: &document.arcs,
-        splines: &[],
+        splines: &document.splines,
         covariances: &[],
     };
     document.shells = find_shells(&graph, &[], &[]);
@@ -46,7 +43,7 @@ fn count(text: &str, entity: &str) -> usize {
 
 #[test]
 fn a_closed_shell_is_a_solid_in_step() {
-    let step = exported(&document(), Format::Step, EdgeFilter::default());
+    let step = exported(&document("solid.json"), Format::Step, EdgeFilter::default());
     assert_eq!(count(&step, "MANIFOLD_SOLID_BREP"), 1);
     assert_eq!(count(&step, "CLOSED_SHELL"), 1);
     assert_eq!(count(&step, "SHELL_BASED_SURFACE_MODEL"), 1);
@@ -75,7 +72,7 @@ fn a_closed_shell_is_a_solid_in_step() {
 
 #[test]
 fn a_shell_without_an_edge_is_a_sheet() {
-    let mut document = document();
+    let mut document = document("solid.json");
     let mut probability = vec![1.0; document.edges.len()];
     probability[0] = 0.1;
     document.edge_fields.probability = Some(probability);
@@ -96,7 +93,7 @@ fn a_shell_without_an_edge_is_a_sheet() {
 
 #[test]
 fn triangles_of_a_solid_share_their_sides() {
-    let document = document();
+    let document = document("solid.json");
     let sides = |triangles: Vec<[usize; 3]>| -> Vec<[usize; 2]> {
         let sides = |[a, b, c]: [usize; 3]| [[a, b], [b, c], [c, a]];
         triangles.into_iter().flat_map(sides).collect()
@@ -131,7 +128,7 @@ fn what_has_no_faces_says_so() {
     for (format, remarks) in [(Format::Dxf, 1), (Format::Step, 0)] {
         let path = dir.path().join(format.name());
         let options = ExportOptions::default();
-        let written = export(&document(), &path, format, &options).unwrap();
+        let written = export(&document("solid.json"), &path, format, &options).unwrap();
         assert_eq!(written.remarks.len(), remarks, "{:?}", written.remarks);
         let said = |remark: &String| remark == "dxf has no faces: 8 left out";
         assert!(written.remarks.iter().all(said));
@@ -142,7 +139,7 @@ fn what_has_no_faces_says_so() {
 fn shells_read_back_and_broken_ones_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("w.json");
-    let document = document();
+    let document = document("solid.json");
     write_json(&path, &document).unwrap();
     assert_eq!(read_json(&path).unwrap(), document);
     let text = fs::read_to_string(&path).unwrap();
@@ -168,7 +165,7 @@ proptest! {
         convex: bool,
         half_angle in prop::option::of(0.01..1.5),
     ) {
-        let mut document = document();
+        let mut document = document("solid.json");
         for face in document.shells.iter_mut().flat_map(|shell| &mut shell.faces) {
             face.surface = match face.surface {
                 Surface::Plane { .. } => Surface::Plane { normal, offset },
@@ -252,6 +249,26 @@ fn rounded() -> WireframeDocument {
     };
     add_shells(&mut document);
     document
+}
+
+#[test]
+fn walls_are_extruded_and_cylinders_have_holes() {
+    // A pin between two ellipses, and a cylinder on which another one ends.
+    let document = document("curved.json");
+    let mut found = document.clone();
+    add_shells(&mut found);
+    assert_eq!(found.shells.len(), document.shells.len());
+    assert!(document.shells.len() == 2 && document.shells.iter().all(|shell| shell.closed));
+    let step = exported(&document, Format::Step, EdgeFilter::default());
+    assert_eq!(count(&step, "MANIFOLD_SOLID_BREP"), 2);
+    assert_eq!(count(&step, "SURFACE_OF_LINEAR_EXTRUSION"), 1);
+    assert_eq!(count(&step, "CYLINDRICAL_SURFACE"), 2);
+    // The wall is cut open along a line; the cylinder with the hole has its loops.
+    assert_eq!(count(&step, "LINE"), 1);
+    assert_eq!(count(&step, "FACE_BOUND"), 3);
+    let again: WireframeDocument =
+        serde_json::from_str(&exported(&document, Format::Json, EdgeFilter::default())).unwrap();
+    assert_eq!(again.shells, document.shells);
 }
 
 #[test]
