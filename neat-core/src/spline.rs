@@ -1,6 +1,6 @@
 //! Smooth curves in space.
 
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
@@ -8,6 +8,9 @@ use std::f64::consts::PI;
 const ORDER: usize = 4;
 /// Places of each piece at which a spline is fitted to another curve.
 const PLACES: usize = 4;
+/// Steps of conjugate gradients at most, and the part of the squared residual at which they end.
+const MOST_STEPS: usize = 200;
+const PRECISION: f64 = 1e-26;
 /// Straight pieces of one cubic piece at most, when it is drawn.
 const MOST_PIECES: f64 = 64.0;
 
@@ -51,35 +54,60 @@ impl Spline {
             closed,
         };
         let pieces = spline.pieces();
-        if !closed && pieces > 0 {
+        if pieces == 0 || controls < ORDER - 1 {
+            return None;
+        }
+        if !closed {
             spline.controls[0] = curve(0.0);
             spline.controls[controls - 1] = curve(1.0);
         }
-        // Ends of an open one are known.
-        let first = usize::from(!closed);
-        let count = controls.checked_sub(2 * first)?;
-        let mut normal = DMatrix::zeros(count, count);
-        let mut right = DMatrix::zeros(count, 3);
-        for place in (0..=PLACES * pieces).map(|k| k as f64 / PLACES as f64) {
-            let off = curve(place / pieces as f64) - spline.point_at(place);
-            let weights = spline.weights_at(place);
-            let free = || {
-                let of_free = |(k, w): &(usize, f64)| Some((k.checked_sub(first)?, *w));
-                let free = weights.iter().filter_map(of_free);
-                free.filter(|(k, _)| *k < count)
-            };
-            for (row, weight) in free() {
-                for (column, other) in free() {
-                    normal[(row, column)] += weight * other;
-                }
-                for axis in 0..3 {
-                    right[(row, axis)] += weight * off[axis];
-                }
+        let places = || (0..=PLACES * pieces).map(|k| k as f64 / PLACES as f64);
+        let weights: Vec<_> = places().map(|place| spline.weights_at(place)).collect();
+        let points: Vec<_> = places().map(|place| curve(place / pieces as f64)).collect();
+        // What control points lack, by what is lacking at each sample; ends of an open one lack
+        // nothing.
+        let gathered = |lacking: &dyn Fn(usize) -> Vector3<f64>| {
+            let mut sums = vec![Vector3::zeros(); controls];
+            for (k, weights) in weights.iter().enumerate() {
+                let lacking = lacking(k);
+                weights
+                    .iter()
+                    .for_each(|(control, weight)| sums[*control] += lacking * *weight);
             }
-        }
-        let solved = normal.cholesky()?.solve(&right);
-        for (k, row) in solved.row_iter().enumerate() {
-            spline.controls[first + k] = Vector3::new(row[0], row[1], row[2]);
+            if !closed {
+                (sums[0], sums[controls - 1]) = (Vector3::zeros(), Vector3::zeros());
+            }
+            sums
+        };
+        let point = |controls: &[Vector3<f64>], k: usize| -> Vector3<f64> {
+            let weighted = weights[k]
+                .iter()
+                .map(|(control, weight)| controls[*control] * *weight);
+            weighted.sum()
+        };
+        // Conjugate gradients: B-splines are nearly independent, so that few steps do for any
+        // number of them.
+        let total = |a: &[Vector3<f64>], b: &[Vector3<f64>]| -> f64 {
+            a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
+        };
+        let mut residual = gathered(&|k| points[k] - point(&spline.controls, k));
+        let mut along = residual.clone();
+        let first = total(&residual, &residual);
+        let mut left = first;
+        for _ in 0..MOST_STEPS {
+            if left <= first * PRECISION {
+                break;
+            }
+            let applied = gathered(&|k| point(&along, k));
+            let step = left / total(&along, &applied);
+            for control in 0..controls {
+                spline.controls[control] += along[control] * step;
+                residual[control] -= applied[control] * step;
+            }
+            let before = std::mem::replace(&mut left, total(&residual, &residual));
+            for (along, residual) in along.iter_mut().zip(&residual) {
+                *along = residual + *along * (left / before);
+            }
         }
         spline.is_valid().then_some(spline)
     }

@@ -150,9 +150,16 @@ impl Region {
 /// Pieces of one of so many rulings that are on a round face.
 fn rulings_at(surface: &Unrolled, loops: &[Chain], ruling: usize) -> Vec<[Vector3<f64>; 2]> {
     let angles = || loops.iter().flatten().map(|place| place.x);
-    let from = angles().fold(f64::MAX, f64::min);
-    let sweep = (angles().fold(f64::MIN, f64::max) - from).min(TAU);
-    let angle = from + sweep * (ruling as f64 + 0.5) / RULINGS as f64;
+    // Where a loop begins must not matter if it runs around the axis.
+    let [from, to] = if loops.iter().any(|chain| unrolled::turns(chain) != 0) {
+        [0.0, TAU]
+    } else {
+        [
+            angles().fold(f64::MAX, f64::min),
+            angles().fold(f64::MIN, f64::max),
+        ]
+    };
+    let angle = from + (to - from) * (ruling as f64 + 0.5) / RULINGS as f64;
     let point = |height: f64| surface.point(&Vector2::new(angle, height));
     let heights = unrolled::crossings(loops, angle);
     let pieces = heights.chunks_exact(2);

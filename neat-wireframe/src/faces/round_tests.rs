@@ -187,3 +187,43 @@ fn a_wall_may_end_at_edges_and_be_cut_askew() {
         assert!((area / dimension.value - 1.0).abs() < 1e-3, "{area}");
     }
 }
+
+#[test]
+fn pipes_of_one_radius_touch_where_they_meet() {
+    // In two halves of ellipses, at whose ends both surfaces are one.
+    let half = |sign: f64| {
+        let at = move |share: f64| {
+            let (sine, cosine) = (PI * share).sin_cos();
+            Vector3::new(0.5 * sine, 0.5 * cosine, 0.5 * sign * sine)
+        };
+        Spline::nearest_to(at, 12, false).unwrap()
+    };
+    let mut model = tee();
+    model.splines = vec![half(1.0), half(-1.0)];
+    model.arcs[2].radius = 0.5;
+    model.wireframe.junctions = [0.5, -0.5].map(|y| Vector3::new(0.0, y, 0.0)).to_vec();
+    let (faces, volume) = model.clone().turned().solid();
+    assert_eq!(faces, 5);
+    let exact = PI * 0.25 * 3.0 - 8.0 / 3.0 * 0.125;
+    assert!((volume / UNIT / exact - 1.0).abs() < 1e-4, "{volume}");
+    let (cut, watertight) = of_triangles(&model.turned());
+    assert!(
+        watertight && (cut / UNIT / exact - 1.0).abs() < 2e-3,
+        "{cut}"
+    );
+}
+
+#[test]
+fn a_round_face_ends_on_both_sides() {
+    let model = tee();
+    let shells = model.shells();
+    let is_valid =
+        |face: &super::Face| face.is_valid(&model.wireframe, &model.arcs, &model.splines);
+    let round = |face: &&super::Face| matches!(face.surface, super::Surface::Cylinder { .. });
+    for face in shells[0].faces.iter().filter(round) {
+        assert!(is_valid(face));
+        let mut open = face.clone();
+        open.loops.remove(1);
+        assert!(!is_valid(&open));
+    }
+}

@@ -110,11 +110,24 @@ fn cut_open([low, high]: [&Ring; 2], all: &[(Chain, Ring)]) -> Option<Ring> {
         let place = Vector2::new(from.place.x + turn(from.place.x, to.place.x), to.place.y);
         [from.place, place]
     };
-    let mut pairs: Vec<(f64, usize, usize)> = (0..low.len())
-        .flat_map(|i| (0..high.len()).map(move |j| (i, j)))
-        .map(|(i, j)| (turn(low[i].place.x, high[j].place.x).abs(), i, j))
+    // Of each corner below the one above that is nearest in angle.
+    let angle = |corner: &Corner| turn(0.0, corner.place.x);
+    let mut above: Vec<(f64, usize)> = (high.iter().enumerate())
+        .map(|(j, corner)| (angle(corner), j))
         .collect();
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    above.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let nearest = |(i, corner): (usize, &Corner)| {
+        let next = above.partition_point(|(other, _)| *other < angle(corner));
+        let beside = [next + above.len() - 1, next].map(|k| above[k % above.len()]);
+        let apart = beside.map(|(other, j)| (turn(angle(corner), other).abs(), i, j));
+        if apart[0].0 < apart[1].0 {
+            apart[0]
+        } else {
+            apart[1]
+        }
+    };
+    let mut pairs: Vec<(f64, usize, usize)> = low.iter().enumerate().map(nearest).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let is_free = |cut: &[Vector2<f64>; 2]| {
         let pieces = all.iter().flat_map(|(chain, _)| chain.windows(2));
         !pieces.into_iter().any(|ends| {

@@ -34,6 +34,8 @@ const ACUTE: f64 = 1.0;
 pub(super) const MOST_AGAINST: f64 = 3.0;
 /// Cosine of the angle of two faces that go on as one plane, or lie on each other: 3°.
 pub(super) const SAME_PLANE: f64 = 0.9986;
+/// Places of a curve at which the angle between two faces is asked.
+const PLACES: usize = 7;
 /// States that are looked at for one set of faces that exclude each other. What was best by then
 /// is taken.
 const MOST_STATES: usize = 20_000;
@@ -116,33 +118,39 @@ fn crossing(regions: &[Option<Region>], possible: &[usize]) -> Vec<[usize; 2]> {
     known.par_iter().flat_map_iter(of_face).collect()
 }
 
-/// Into which direction a face goes from the start of a curve of its boundary.
-fn inward(curves: &Curves, face: &Face, step: &Step) -> Option<Vector3<f64>> {
-    let points = curves.find(step.curve)?.points_along(step);
+/// Into which direction a face goes from a piece of a curve of its boundary, which starts at this
+/// point of it.
+fn inward(curves: &Curves, face: &Face, step: &Step, start: usize) -> Option<Vector3<f64>> {
     if let Surface::Extruded { direction } = face.surface {
         return inward_of_wall(curves, face, step, &direction);
     }
-    let along = (points[1] - points[0]).normalize();
-    let normal = face.surface.normal_at(&(0.5 * (points[0] + points[1])));
-    Some(normal.cross(&along))
+    let points = curves.find(step.curve)?.points_along(step);
+    let [from, to] = [points.get(start)?, points.get(start + 1)?];
+    let normal = face.surface.normal_at(&(0.5 * (from + to)));
+    Some(normal.cross(&(to - from).normalize()))
 }
 
 fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
-    let [one, other] = [0, 1].map(|k| {
-        // Both from the same end of the curve: a face to the left of its loop is to the
-        // right of the same loop backwards.
-        let forward = if steps[k].reversed {
-            faces[k].turned()
-        } else {
-            faces[k].clone()
-        };
-        let step = Step {
-            curve: steps[k].curve,
-            reversed: false,
-        };
-        inward(curves, &forward, &step)
+    // Both from the same end of the curve: a face to the left of its loop is to the right of the
+    // same loop backwards.
+    let forward = [0, 1].map(|k| {
+        let turned = steps[k].reversed.then(|| faces[k].turned());
+        turned.unwrap_or_else(|| faces[k].clone())
     });
-    let cosine = one.zip(other).map_or(0.0, |(one, other)| one.dot(&other));
+    let step = Step {
+        curve: steps[0].curve,
+        reversed: false,
+    };
+    let pieces = (curves.find(step.curve)).map_or(0, |curve| curve.points.len() - 1);
+    // Where cylinders of one radius meet they touch at two places: most of the curve counts.
+    let starts = (0..PLACES.min(pieces)).map(|k| (2 * k + 1) * pieces / (2 * PLACES.min(pieces)));
+    let cosine = |start: usize| {
+        let [one, other] = [0, 1].map(|k| inward(curves, &forward[k], &step, start));
+        one.zip(other).map_or(0.0, |(one, other)| one.dot(&other))
+    };
+    let mut cosines: Vec<f64> = starts.map(cosine).collect();
+    cosines.sort_by(f64::total_cmp);
+    let cosine = cosines.get(cosines.len() / 2).copied().unwrap_or(0.0);
     // A plane that touches a cylinder or a cone goes on as another surface: the end of a slot.
     let is_plane = |face: &Face| matches!(face.surface, Surface::Plane { .. });
     if is_plane(faces[0]) != is_plane(faces[1]) {
