@@ -41,8 +41,8 @@ pub struct Spline {
 }
 
 impl Spline {
-    /// The nearest one to a curve, given by its points at shares of its length from 0 to 1, by least
-    /// squares at the same shares. An open one ends where the curve does. `None` with too few control
+    /// The nearest one to a curve, given by its points at shares of its way from 0 to 1, by least
+    /// squares at the same shares of its own places. An open one ends where the curve does. `None` with too few control
     /// points, or where the curve has no coordinates.
     pub fn nearest_to(
         curve: impl Fn(f64) -> Vector3<f64>,

@@ -5,7 +5,7 @@ use neat_wireframe::export::WireframeDocument;
 use neat_wireframe::faces::{CurveIndex, Face, Shell, ShellGeometry, Surface};
 use std::collections::BTreeMap;
 
-/// A planar face, or a triangle of a round one.
+/// A planar face, or a triangle of another one.
 pub(super) struct Polygon {
     /// The outer ring first; the others are holes. Seen from outside, the polygon lies on the left
     /// of each. No ring comes back to its first point.
@@ -94,13 +94,23 @@ fn triangles(
     for (junction, point) in &geometry.vertices {
         exact.junctions[*junction] = *point;
     }
+    // Arcs that go around no axis are splines there.
+    let mut renamed = BTreeMap::new();
     for (index, curve) in &geometry.curves {
+        if let (CurveIndex::Arc(_), None, Some(spline)) = (index, curve.arc, &curve.spline) {
+            renamed.insert(*index, CurveIndex::Spline(exact.splines.len()));
+            exact.splines.push(spline.clone());
+        }
         if let (CurveIndex::Arc(index), Some(arc)) = (index, curve.arc) {
             exact.arcs[*index] = arc;
         }
         if let (CurveIndex::Spline(index), Some(spline)) = (index, &curve.spline) {
             exact.splines[*index] = spline.clone();
         }
+    }
+    let faces = exact.shells.iter_mut().flat_map(|shell| &mut shell.faces);
+    for step in faces.flat_map(|face| &mut face.loops).flatten() {
+        step.curve = *renamed.get(&step.curve).unwrap_or(&step.curve);
     }
     let points = exact.drawn().junctions;
     let rings = |triangle: &[usize; 3]| vec![triangle.map(|corner| points[corner]).to_vec()];

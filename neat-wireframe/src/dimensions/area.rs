@@ -4,7 +4,7 @@
 //! A plane's is the integral of x × dx / 2 around it, along its normal; that the normal is off
 //! changes it in second order only. A cylinder's between two rims is the mean of their lengths times
 //! the distance between them, a cone's that times the way along it; other parts of these are the
-//! integral of the height over the angle around the axis.
+//! integral of the height over the angle around the axis, as walls' are along their profile.
 
 use super::Place;
 use crate::export::WireframeDocument;
@@ -94,8 +94,12 @@ pub(super) fn value(document: &WireframeDocument, face: &Face, points: &[Vector3
                 .sum();
             normal.dot(&sum).abs()
         }
-        Surface::Cylinder { axis, .. } if is_between_rims(face) => round(&axis, false, &pieces),
-        Surface::Cone { axis, .. } if is_between_rims(face) => round(&axis, true, &pieces),
+        Surface::Cylinder { axis, .. } if is_between_rims(face, &axis, &pieces) => {
+            round(&axis, false, &pieces)
+        }
+        Surface::Cone { axis, .. } if is_between_rims(face, &axis, &pieces) => {
+            round(&axis, true, &pieces)
+        }
         Surface::Cylinder { .. } | Surface::Cone { .. } => unrolled(face, &pieces),
         Surface::Extruded { direction } => extruded(&direction, &pieces),
     }
@@ -155,8 +159,17 @@ impl Piece {
     }
 }
 
-/// Whether a round face is between two arcs, as loops of their own or joined by straight lines.
-fn is_between_rims(face: &Face) -> bool {
+/// Whether a round face is between two arcs around its axis, as loops of their own or joined by
+/// straight lines.
+fn is_between_rims(face: &Face, axis: &Vector3<f64>, pieces: &[(bool, Piece)]) -> bool {
+    let is_askew = |(_, piece): &(bool, Piece)| match piece {
+        Piece::Arc { arc, .. } => !goes_around(arc, axis),
+        Piece::Edge(_) => false,
+        Piece::Spline(_) => true,
+    };
+    if pieces.iter().any(is_askew) {
+        return false;
+    }
     let is_arc = |step: &Step| matches!(step.curve, CurveIndex::Arc(_));
     let shape: Vec<Vec<bool>> = (face.loops.iter())
         .map(|steps| steps.iter().map(is_arc).collect())

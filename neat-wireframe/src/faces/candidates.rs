@@ -1,5 +1,5 @@
 //! All faces that the curves might bound: the cells of planes, and cylinders and cones between two
-//! rims.
+//! rims, cells of these, and walls.
 
 use super::cells::cells;
 use super::creases::missing_creases;

@@ -1,9 +1,9 @@
 //! The exact geometry of walls between two splines: one is the other, moved along the wall.
 
 use super::face::{CurveIndex, Face, Step};
-use super::geometry::ShellCurve;
+use super::geometry::{FINE, ShellCurve};
 use super::surface::Surface;
-use super::walls::{FLAT, rims};
+use super::walls::{FLAT, opposite, rims};
 use nalgebra::Vector3;
 use neat_core::Spline;
 use std::collections::BTreeMap;
@@ -17,8 +17,9 @@ const GAUSS_5: [(f64, f64); 5] = [
     (0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ];
 
-/// Moves the second spline of a wall to where the first one is, along the wall, in the plane of its
-/// other face; both begin beside each other then, and run alike or against each other as before.
+/// Moves one spline of a wall to where the other one is, along the wall, in the plane of its other
+/// face: the second one, if both or none lie in such a plane. Both begin beside each other then, and
+/// run alike or against each other as before.
 pub(super) fn extrude(
     face: &Face,
     curves: &mut BTreeMap<CurveIndex, ShellCurve>,
@@ -27,28 +28,38 @@ pub(super) fn extrude(
     let (Surface::Extruded { direction }, Some([one, other])) = (face.surface, rims(face)) else {
         return;
     };
-    let spline = |step: &Step| curves.get(&step.curve)?.spline.clone();
-    let (Some(from), Some(to)) = (spline(&one), spline(&other)) else {
-        return;
-    };
-    let plane = surfaces_of[&other.curve]
-        .iter()
-        .find_map(|surface| match surface {
-            Surface::Plane { normal, offset } if normal.dot(&direction).abs() > FLAT => {
-                Some((*normal, *offset))
-            }
+    let plane = |step: &Step| {
+        let planes = surfaces_of[&step.curve].iter();
+        let mut planes = planes.filter_map(|surface| match surface {
+            Surface::Plane { normal, offset } => Some((*normal, *offset)),
             _ => None,
         });
-    let middle = |spline: &Spline| {
-        spline.controls.iter().sum::<Vector3<f64>>() / spline.controls.len() as f64
+        planes.find(|(normal, _)| normal.dot(&direction).abs() > FLAT)
     };
-    let apart = direction.dot(&(middle(&to) - middle(&from)));
-    let mut moved = from.map(|control| {
-        let by = plane.map_or(apart, |(normal, offset)| {
-            (offset - normal.dot(control)) / normal.dot(&direction)
-        });
-        control + direction * by
-    });
+    let (still, moving, plane) = match (plane(&one), plane(&other)) {
+        (Some(plane), None) => (other, one, Some(plane)),
+        (_, plane) => (one, other, plane),
+    };
+    let spline = |step: &Step| curves.get(&step.curve)?.spline.clone();
+    let (Some(from), Some(to)) = (spline(&still), spline(&moving)) else {
+        return;
+    };
+    let moved = match plane {
+        Some((normal, offset)) => Some(from.map(|control| {
+            control + direction * ((offset - normal.dot(control)) / normal.dot(&direction))
+        })),
+        None => {
+            let rim = to.points(FINE);
+            let at = |share: f64| {
+                let start = from.point_at(share * from.pieces() as f64);
+                opposite(&start, &rim, &direction)
+            };
+            Spline::nearest_to(at, from.controls.len(), from.closed)
+        }
+    };
+    let Some(mut moved) = moved else {
+        return;
+    };
     if one.reversed == other.reversed {
         moved.controls.reverse();
         if moved.closed {
@@ -59,7 +70,7 @@ pub(super) fn extrude(
     if let (false, [first, .., last]) = (to.closed, &mut moved.controls[..]) {
         (*first, *last) = (to.controls[0], to.controls[to.controls.len() - 1]);
     }
-    if let Some(curve) = curves.get_mut(&other.curve) {
+    if let Some(curve) = curves.get_mut(&moving.curve) {
         curve.spline = Some(moved);
     }
 }

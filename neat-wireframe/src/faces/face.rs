@@ -1,8 +1,7 @@
 //! Faces and shells: what a boundary representation is made of.
 
-use super::curves::{TURN, ends_of_arc, ends_of_spline, nearest_junctions};
+use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 use super::surface::Surface;
-use super::unrolled::{Unrolled, turns};
 use super::walls::rims;
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Spline, Wireframe3d};
@@ -110,9 +109,8 @@ impl Shell {
 }
 
 impl Face {
-    /// Whether its surface is one, and its loops are closed chains of curves that exist: around a
-    /// round one as many to the left as to the right; of an extruded one two splines, as loops of
-    /// their own or joined by two edges or inferred lines.
+    /// Whether its surface is one, and its loops are closed chains of curves that exist; of an
+    /// extruded one two splines, as loops of their own or joined by two edges or inferred lines.
     pub(crate) fn is_valid(
         &self,
         wireframe: &Wireframe3d,
@@ -135,37 +133,6 @@ impl Face {
             && has_shape
             && self.steps().all(exists)
             && (self.loops.iter()).all(|steps| is_closed(steps, wireframe, (arcs, splines)))
-            && self.ends_along_axis(wireframe, (arcs, splines))
-    }
-
-    /// Whether as many loops run around an axis to the left as to the right.
-    fn ends_along_axis(
-        &self,
-        wireframe: &Wireframe3d,
-        (arcs, splines): (&[CircularArc], &[Spline]),
-    ) -> bool {
-        let Some(surface) = Unrolled::new(&self.surface) else {
-            return true;
-        };
-        let points = |step: &Step| {
-            let mut points = match step.curve {
-                CurveIndex::Edge(edge) => wireframe.edges[edge]
-                    .map(|j| wireframe.junctions[j])
-                    .to_vec(),
-                CurveIndex::Smooth(ends) => ends.map(|j| wireframe.junctions[j]).to_vec(),
-                CurveIndex::Arc(arc) => arcs[arc].points(TURN),
-                CurveIndex::Spline(spline) => splines[spline].points(TURN),
-            };
-            if step.reversed {
-                points.reverse();
-            }
-            points
-        };
-        let around = |steps: &Vec<Step>| {
-            let points: Vec<_> = steps.iter().flat_map(points).collect();
-            turns(&surface.chain(points.iter().chain(points.first())))
-        };
-        self.loops.iter().map(around).sum::<i32>() == 0
     }
 
     /// The steps of all loops.

@@ -94,8 +94,9 @@ impl ShellGeometry {
             .collect();
         for (index, curve) in &mut curves {
             let surfaces = &surfaces_of[index];
-            if let Some(arc) = curve.arc.filter(|arc| !is_rim(arc, surfaces)) {
-                (curve.arc, curve.spline) = (None, as_spline(&arc));
+            let askew = curve.arc.filter(|arc| !is_rim(arc, surfaces));
+            if let Some(spline) = askew.and_then(|arc| as_spline(&arc)) {
+                (curve.arc, curve.spline) = (None, Some(spline));
             }
             if let Some(spline) = &mut curve.spline {
                 let ends = curve.ends.map(|ends| ends.map(|end| vertices[&end]));
@@ -279,6 +280,10 @@ fn on_surfaces(start: Vector3<f64>, surfaces: &[Surface]) -> Vector3<f64> {
         let rows: Vec<(f64, Vector3<f64>)> = rows.collect();
         let normals = DMatrix::from_fn(rows.len(), 3, |i, k| rows[i].1[k]);
         let heights = DVector::from_fn(rows.len(), |i, _| -rows[i].0);
+        // The decomposition would not end.
+        if !normals.iter().chain(&heights).all(|x| x.is_finite()) {
+            break;
+        }
         let Ok(step) = normals.svd(true, true).solve(&heights, MIN_SINGULAR) else {
             break;
         };

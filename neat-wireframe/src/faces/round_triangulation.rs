@@ -13,6 +13,9 @@ use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 use std::f64::consts::TAU;
 
+/// Corners are at one angle within so many radians: what rounding leaves.
+const SAME_ANGLE: f64 = 1e-9;
+
 /// A corner of a loop: the index of its point, and where that lies in the unrolled face.
 #[derive(Clone, Copy)]
 struct Corner {
@@ -110,35 +113,46 @@ fn cut_open([low, high]: [&Ring; 2], all: &[(Chain, Ring)]) -> Option<Ring> {
         let place = Vector2::new(from.place.x + turn(from.place.x, to.place.x), to.place.y);
         [from.place, place]
     };
-    // Of each corner below the one above that is nearest in angle.
+    // Of each corner below the one above that is nearest in angle, and of several in height: the
+    // lower one of the two at the side of a notch.
     let angle = |corner: &Corner| turn(0.0, corner.place.x);
     let mut above: Vec<(f64, usize)> = (high.iter().enumerate())
         .map(|(j, corner)| (angle(corner), j))
         .collect();
     above.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let nearest = |(i, corner): (usize, &Corner)| {
+        let apart = |k: usize| {
+            let (other, j) = above[k % above.len()];
+            let height = (high[j].place.y - corner.place.y).abs();
+            (turn(angle(corner), other).abs(), height, j)
+        };
         let next = above.partition_point(|(other, _)| *other < angle(corner));
-        let beside = [next + above.len() - 1, next].map(|k| above[k % above.len()]);
-        let apart = beside.map(|(other, j)| (turn(angle(corner), other).abs(), i, j));
-        if apart[0].0 < apart[1].0 {
-            apart[0]
-        } else {
-            apart[1]
-        }
+        let last = next + above.len() - 1;
+        let least = apart(next).0.min(apart(last).0);
+        let is_one = |(turned, ..): &(f64, f64, usize)| *turned <= least + SAME_ANGLE;
+        let after = (next..next + above.len()).map(apart).take_while(is_one);
+        let before = (next..=last).rev().map(apart).take_while(is_one);
+        let nearest = after.chain(before).min_by(|a, b| a.1.total_cmp(&b.1));
+        nearest.map(|(_, height, j)| ((least / SAME_ANGLE).round(), height, i, j))
     };
-    let mut pairs: Vec<(f64, usize, usize)> = low.iter().enumerate().map(nearest).collect();
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut pairs: Vec<(f64, f64, usize, usize)> =
+        low.iter().enumerate().filter_map(nearest).collect();
+    pairs.sort_by(|a, b| {
+        let by_height = a.1.total_cmp(&b.1).then((a.2, a.3).cmp(&(b.2, b.3)));
+        a.0.total_cmp(&b.0).then(by_height)
+    });
     let is_free = |cut: &[Vector2<f64>; 2]| {
         let pieces = all.iter().flat_map(|(chain, _)| chain.windows(2));
         !pieces.into_iter().any(|ends| {
             let by = TAU * ((cut[0].x - ends[0].x) / TAU).round();
             [by - TAU, by, by + TAU].into_iter().any(|by| {
                 let piece = [ends[0], ends[1]].map(|end| end + Vector2::x() * by);
-                segments_cross(cut, &piece)
+                segments_cross(cut, &piece) || touches(cut, &piece[0])
             })
         })
     };
-    let (_, i, j) = (pairs.into_iter()).find(|(_, i, j)| is_free(&beside(&low[*i], &high[*j])))?;
+    let (.., i, j) =
+        (pairs.into_iter()).find(|(.., i, j)| is_free(&beside(&low[*i], &high[*j])))?;
     let [start, end] = beside(&low[i], &high[j]).map(|place| place.x);
     let from = |ring: &Ring, first: usize, mut x: f64| -> Ring {
         let corners = (0..=ring.len()).map(|k| ring[(first + k) % ring.len()]);
@@ -153,6 +167,14 @@ fn cut_open([low, high]: [&Ring; 2], all: &[(Chain, Ring)]) -> Option<Ring> {
     let mut ring = from(low, i, start);
     ring.extend(from(high, j, end + TAU));
     Some(ring)
+}
+
+/// Whether a corner lies on a cut, between its ends.
+fn touches([from, to]: &[Vector2<f64>; 2], corner: &Vector2<f64>) -> bool {
+    let (along, offset) = (to - from, corner - from);
+    let share = along.dot(&offset) / along.norm_squared();
+    let beside = along.perp(&offset).abs() / along.norm();
+    (SAME_ANGLE..1.0 - SAME_ANGLE).contains(&share) && beside <= SAME_ANGLE
 }
 
 /// The triangles between rings, counterclockwise; `None` if a corner has no coordinates.

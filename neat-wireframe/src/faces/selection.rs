@@ -5,7 +5,7 @@
 //! ([`super::visibility`]). A curve that lacks a face costs [`MISSING_FACE`], twice if it has none;
 //! a curve between two faces of one plane is no crease and costs [`FLAT`]. An inferred line that has
 //! no face is none, and costs nothing. A cone costs [`CONE`], an acute angle up to [`ACUTE`]. No
-//! curve has three faces, no two faces lie on each other, and no cylinder or cone passes through
+//! curve has three faces, no two faces lie on each other, and none but a plane passes through
 //! another face. The minimum is found by branch and bound.
 
 use super::curves::Curves;
@@ -105,7 +105,7 @@ pub(super) fn select(
     chosen
 }
 
-/// Pairs of faces of which a round one passes through the other.
+/// Pairs of faces of which one that is no plane passes through the other.
 fn crossing(regions: &[Option<Region>], possible: &[usize]) -> Vec<[usize; 2]> {
     let known: Vec<(usize, &Region)> = (possible.iter())
         .filter_map(|face| Some((*face, regions[*face].as_ref()?)))

@@ -67,9 +67,10 @@ impl Unrolled {
 
     /// The distance of a point from the surface.
     pub fn distance(&self, point: &Vector3<f64>) -> f64 {
-        let place = self.place(point);
-        let from_axis = self.outward(place.x).dot(&(point - self.origin));
-        (from_axis - self.radius_at(place.y)).abs() / self.slant()
+        let offset = point - self.origin;
+        let height = self.axis.dot(&offset);
+        let from_axis = (offset - self.axis * height).norm();
+        (from_axis - self.radius_at(height)).abs() / self.slant()
     }
 
     /// The angle of a direction that leads on along the surface from a point: 0 to the right.
@@ -92,7 +93,7 @@ impl Unrolled {
         places.collect()
     }
 
-    /// Where a ray meets the surface, by its parameter, with the places there; ascending.
+    /// Where a ray meets the surface, by its parameter, with the places there.
     pub fn hits(
         &self,
         origin: &Vector3<f64>,
@@ -108,8 +109,7 @@ impl Unrolled {
         let b = from.dot(&along) - radius * widens;
         let c = from.norm_squared() - radius * radius;
         let root = (b * b - a * c).sqrt().copysign(b);
-        let mut hits = [-(b + root) / a, -c / (b + root)];
-        hits.sort_by(f64::total_cmp);
+        let hits = [-(b + root) / a, -c / (b + root)];
         hits.map(|t| {
             let place = self.place(&(origin + direction * t));
             let on_surface = t.is_finite() && self.radius_at(place.y) > 0.0;
@@ -151,7 +151,7 @@ pub(super) fn turns(chain: &Chain) -> i32 {
     }
 }
 
-/// Whether loops have the place within them: as often as not they pass over it.
+/// Whether loops have the place within them: an odd number of times they pass over it.
 pub(super) fn contains(loops: &[Chain], place: &Vector2<f64>) -> bool {
     let above = |height: &&f64| **height > place.y;
     crossings(loops, place.x).iter().filter(above).count() % 2 == 1

@@ -80,6 +80,14 @@ fn loops_between(
 /// The two splines of a wall: the one along which it is to the left, and the one back.
 pub(super) fn rims(face: &Face) -> Option<[Step; 2]> {
     let is_spline = |step: &&Step| matches!(step.curve, CurveIndex::Spline(_));
+    let is_straight =
+        |step: &Step| matches!(step.curve, CurveIndex::Edge(_) | CurveIndex::Smooth(_));
+    if !face
+        .steps()
+        .all(|step| is_spline(&step) || is_straight(step))
+    {
+        return None;
+    }
     let shape: Vec<Vec<bool>> = (face.loops.iter())
         .map(|steps| steps.iter().map(|step| is_spline(&step)).collect())
         .collect();
@@ -143,10 +151,9 @@ pub(super) fn strip(
     }
     let (mut i, mut j) = (0, 0);
     while i + 1 < one.len() || j + 1 < back.len() {
-        let next = |rim: &[usize], k: usize, beside: usize| {
-            (rim.get(k + 1)).map_or(f64::INFINITY, |corner| apart(*corner, beside))
-        };
-        if next(one, i, back[j]) <= next(&back, j, one[i]) {
+        let at_end = [i + 1 == one.len(), j + 1 == back.len()];
+        let first = || apart(one[i + 1], back[j]) <= apart(back[j + 1], one[i]);
+        if at_end[1] || (!at_end[0] && first()) {
             triangles.push([one[i], one[i + 1], back[j]]);
             i += 1;
         } else {
@@ -209,24 +216,9 @@ impl Wall {
     pub fn rulings(&self, count: usize) -> Vec<[Vector3<f64>; 2]> {
         let shares = (0..count).map(|k| (k as f64 + 0.5) / count as f64);
         let starts = shares.map(|share| point_along(&self.rims[0], share));
-        starts.map(|start| [start, self.opposite(&start)]).collect()
-    }
-
-    /// The point of the other rim that is opposite to one of the first.
-    fn opposite(&self, start: &Vector3<f64>) -> Vector3<f64> {
-        let beside = |offset: Vector3<f64>| offset - self.direction * self.direction.dot(&offset);
-        let of_piece = |ends: &[Vector3<f64>]| {
-            let (along, offset) = (beside(ends[1] - ends[0]), beside(start - ends[0]));
-            let share = (along.dot(&offset) / along.norm_squared()).clamp(0.0, 1.0);
-            let at = ends[0] + (ends[1] - ends[0]) * share;
-            (
-                beside(start - at).norm_squared(),
-                self.direction.dot(&(at - start)),
-            )
-        };
-        let places = self.rims[1].windows(2).map(of_piece);
-        let nearest = places.min_by(|a, b| a.0.total_cmp(&b.0));
-        start + self.direction * nearest.map_or(0.0, |(_, up)| up)
+        starts
+            .map(|start| [start, opposite(&start, &self.rims[1], &self.direction)])
+            .collect()
     }
 
     /// Distance from the surface, which goes on beyond its rims.
@@ -249,6 +241,27 @@ impl Wall {
         );
         (low..=high).contains(&self.direction.dot(point)) && self.distance(point) <= distance
     }
+}
+
+/// The point of a rim in this direction from a point of the other one.
+pub(super) fn opposite(
+    start: &Vector3<f64>,
+    rim: &[Vector3<f64>],
+    direction: &Vector3<f64>,
+) -> Vector3<f64> {
+    let beside = |offset: Vector3<f64>| offset - direction * direction.dot(&offset);
+    let of_piece = |ends: &[Vector3<f64>]| {
+        let (along, offset) = (beside(ends[1] - ends[0]), beside(start - ends[0]));
+        let share = (along.dot(&offset) / along.norm_squared()).clamp(0.0, 1.0);
+        let at = ends[0] + (ends[1] - ends[0]) * share;
+        (
+            beside(start - at).norm_squared(),
+            direction.dot(&(at - start)),
+        )
+    };
+    let places = rim.windows(2).map(of_piece);
+    let nearest = places.min_by(|a, b| a.0.total_cmp(&b.0));
+    start + direction * nearest.map_or(0.0, |(_, up)| up)
 }
 
 /// Of the area that a flat chain encloses with the line between its ends: however it is cut askew
