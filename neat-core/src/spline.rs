@@ -8,7 +8,8 @@ use std::f64::consts::PI;
 const ORDER: usize = 4;
 /// Places of each piece at which a spline is fitted to another curve.
 const PLACES: usize = 4;
-/// Steps of conjugate gradients at most, and the part of the squared residual at which they end.
+/// Steps of conjugate gradients at most, and the part of the squared residual at which they end: what
+/// rounding leaves.
 const MOST_STEPS: usize = 200;
 const PRECISION: f64 = 1e-26;
 /// Straight pieces of one cubic piece at most, when it is drawn.
@@ -42,8 +43,8 @@ pub struct Spline {
 
 impl Spline {
     /// The nearest one to a curve, given by its points at shares of its way from 0 to 1, by least
-    /// squares at the same shares of its own places. An open one ends where the curve does. `None` with too few control
-    /// points, or where the curve has no coordinates.
+    /// squares at the same shares of its own places. An open one ends where the curve does. `None`
+    /// with too few control points, or where the curve has no coordinates.
     pub fn nearest_to(
         curve: impl Fn(f64) -> Vector3<f64>,
         controls: usize,

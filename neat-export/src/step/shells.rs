@@ -193,9 +193,7 @@ impl<'a> ShellWriter<'a> {
 
     /// The surface through the first spline of a wall: its normal is on the left of the wall there.
     fn extruded(&mut self, face: &Face, direction: &Vector3<f64>) -> (String, bool) {
-        let is_spline = |step: &&Step| matches!(step.curve, CurveIndex::Spline(_));
-        let mut rims = face.steps().filter(is_spline);
-        let (Some(one), Some(other)) = (rims.next(), rims.next()) else {
+        let Some([one, other]) = face.rims() else {
             unreachable!("a wall is between two splines");
         };
         let spline = |step: &Step| self.geometry.curves[&step.curve].spline.as_ref();
@@ -203,8 +201,8 @@ impl<'a> ShellWriter<'a> {
             let heights = spline.controls.iter().map(|control| direction.dot(control));
             heights.sum::<f64>() / spline.controls.len() as f64
         };
-        let up = spline(other).map(height) > spline(one).map(height);
-        let curve = spline(one)
+        let up = spline(&other).map(height) > spline(&one).map(height);
+        let curve = spline(&one)
             .map(|spline| self.step.spline(spline))
             .unwrap_or_default();
         let along = if up { *direction } else { -direction };

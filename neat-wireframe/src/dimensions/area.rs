@@ -167,16 +167,8 @@ fn is_between_rims(face: &Face, axis: &Vector3<f64>, pieces: &[(bool, Piece)]) -
         Piece::Edge(_) => false,
         Piece::Spline(_) => true,
     };
-    if pieces.iter().any(is_askew) {
-        return false;
-    }
-    let is_arc = |step: &Step| matches!(step.curve, CurveIndex::Arc(_));
-    let shape: Vec<Vec<bool>> = (face.loops.iter())
-        .map(|steps| steps.iter().map(is_arc).collect())
-        .collect();
-    shape == [[true], [true]]
-        || shape == [[true, false, true, false]]
-        || shape == [[false, true, false, true]]
+    let rims = face.rims_among(|step| matches!(step.curve, CurveIndex::Arc(_)));
+    rims.is_some() && !pieces.iter().any(is_askew)
 }
 
 /// The area of any part of a round surface. A cylinder is as wide as the arcs around its axis say; a

@@ -2,20 +2,12 @@
 
 use super::face::{CurveIndex, Face, Step};
 use super::geometry::{FINE, ShellCurve};
+use super::quadrature::{GAUSS, place_and_derivative};
 use super::surface::Surface;
-use super::walls::{FLAT, opposite, rims};
+use super::walls::{FLAT, opposite};
 use nalgebra::Vector3;
 use neat_core::Spline;
 use std::collections::BTreeMap;
-
-/// Places and weights of Gauss and Legendre on [-1, 1].
-const GAUSS_5: [(f64, f64); 5] = [
-    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
-    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.0, 0.568_888_888_888_888_9),
-    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
-    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
-];
 
 /// Moves one spline of a wall to where the other one is, along the wall, in the plane of its other
 /// face: the second one, if both or none lie in such a plane. Both begin beside each other then, and
@@ -25,7 +17,7 @@ pub(super) fn extrude(
     curves: &mut BTreeMap<CurveIndex, ShellCurve>,
     surfaces_of: &BTreeMap<CurveIndex, Vec<Surface>>,
 ) {
-    let (Surface::Extruded { direction }, Some([one, other])) = (face.surface, rims(face)) else {
+    let (Surface::Extruded { direction }, Some([one, other])) = (face.surface, face.rims()) else {
         return;
     };
     let plane = |step: &Step| {
@@ -86,28 +78,17 @@ pub(crate) fn moments_of_wall(
     let of_rim = |(reversed, spline): (bool, &Spline)| {
         let mut moments = [0.0, 0.0];
         for piece in spline.beziers() {
-            for (node, weight) in GAUSS_5 {
-                let (point, along) = place_and_derivative(&piece, 0.5 * (1.0 + node));
+            for (share, weight) in GAUSS {
+                let (point, along) = place_and_derivative(&piece, share);
                 let (offset, height) = (point - from, direction.dot(&(point - from)));
                 let across = direction.cross(&offset).dot(&along);
                 let beside = along - direction * direction.dot(&along);
-                moments[0] += 0.5 * weight * height * beside.norm();
-                moments[1] += 0.5 * weight * height * if reversed { across } else { -across };
+                moments[0] += weight * height * beside.norm();
+                moments[1] += weight * height * if reversed { across } else { -across };
             }
         }
         moments
     };
     let [one, other] = rims.map(of_rim);
     [(other[0] - one[0]).abs(), one[1] + other[1]]
-}
-
-/// Of a cubic by its four control points as a Bézier curve.
-pub(super) fn place_and_derivative(
-    [a, b, c, d]: &[Vector3<f64>; 4],
-    t: f64,
-) -> (Vector3<f64>, Vector3<f64>) {
-    let s = 1.0 - t;
-    let point = a * (s * s * s) + (b * s + c * t) * (3.0 * s * t) + d * (t * t * t);
-    let along = ((b - a) * (s * s) + (c - b) * (2.0 * s * t) + (d - c) * (t * t)) * 3.0;
-    (point, along)
 }

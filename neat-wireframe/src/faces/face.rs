@@ -2,7 +2,6 @@
 
 use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 use super::surface::Surface;
-use super::walls::rims;
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Spline, Wireframe3d};
 use serde::{Deserialize, Serialize};
@@ -124,7 +123,7 @@ impl Face {
             CurveIndex::Smooth([a, b]) => a < b && b < wireframe.junctions.len(),
         };
         let has_shape = match self.surface {
-            Surface::Extruded { .. } => rims(self).is_some(),
+            Surface::Extruded { .. } => self.rims().is_some(),
             Surface::Plane { .. } | Surface::Cylinder { .. } | Surface::Cone { .. } => {
                 !self.loops.is_empty()
             }
@@ -138,6 +137,29 @@ impl Face {
     /// The steps of all loops.
     pub fn steps(&self) -> impl Iterator<Item = &Step> + Clone {
         self.loops.iter().flatten()
+    }
+
+    /// The two splines of a wall: the one along which it is to the left, and the one back. `None` if
+    /// it is bounded otherwise.
+    pub fn rims(&self) -> Option<[Step; 2]> {
+        self.rims_among(|step| matches!(step.curve, CurveIndex::Spline(_)))
+    }
+
+    /// The two curves of this kind between which it is, as loops of their own or joined by two
+    /// straight ones; `None` if it is bounded otherwise.
+    pub(crate) fn rims_among(&self, is_rim: impl Fn(&Step) -> bool) -> Option<[Step; 2]> {
+        let is_straight =
+            |step: &Step| matches!(step.curve, CurveIndex::Edge(_) | CurveIndex::Smooth(_));
+        let rims: Vec<Step> = self.steps().filter(|step| is_rim(step)).copied().collect();
+        let in_turn = match &self.loops[..] {
+            [one, other] => one.len() == 1 && other.len() == 1,
+            [steps] => {
+                let rulings = steps.iter().filter(|step| is_straight(step)).count();
+                steps.len() == 4 && rulings == 2 && is_rim(&steps[0]) == is_rim(&steps[2])
+            }
+            _ => false,
+        };
+        rims.try_into().ok().filter(|_| in_turn)
     }
 
     fn map(&self, f: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {

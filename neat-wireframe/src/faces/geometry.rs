@@ -6,12 +6,12 @@
 //! there.
 
 use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
-use super::extrusion::{extrude, moments_of_wall, place_and_derivative};
+use super::extrusion::{extrude, moments_of_wall};
 use super::face::{CurveIndex, Face, Shell, Step};
 use super::plane_fit::across;
+use super::quadrature::{GAUSS, place_and_derivative};
 use super::surface::Surface;
 use super::unrolled::{Chain, Unrolled, turn};
-use super::walls::rims;
 use nalgebra::{DMatrix, DVector, Vector3};
 use neat_core::{CircularArc, Spline, Wireframe3d};
 use std::collections::BTreeMap;
@@ -25,7 +25,7 @@ const MIN_SINGULAR: f64 = 0.05;
 /// Boundaries of round faces are followed in pieces that turn by so much, in radians.
 pub(crate) const FINE: f64 = 0.02;
 /// Arcs that go around no axis become splines whose pieces turn by so much: these differ from the
-/// arc by less than a hundred thousandth of its radius.
+/// arc by less than a ten thousandth of its radius (a test of `Spline::nearest_to`).
 const TURN_OF_PIECES: f64 = 0.4;
 /// They go around one that is turned against theirs by less than this sine: 10°.
 const TILTED: f64 = 0.174;
@@ -214,7 +214,7 @@ impl ShellGeometry {
 
     /// Likewise of a wall between two splines.
     fn moments_of_wall(&self, face: &Face, direction: Vector3<f64>) -> [f64; 2] {
-        let Some([one, other]) = rims(face) else {
+        let Some([one, other]) = face.rims() else {
             return [0.0, 0.0];
         };
         let spline = |step: &Step| self.curves[&step.curve].spline.as_ref();
@@ -256,18 +256,15 @@ fn as_measured(
     }
 }
 
-/// The integral of x × dx along a spline, with x from an origin: each piece is a cubic in its
-/// place, so that it is a polynomial of degree 5, which three points of Gauss and Legendre have
-/// exactly.
+/// The integral of x × dx along a spline, with x from an origin: a polynomial of degree 5 on each
+/// of its pieces.
 pub(crate) fn area_vector_of_spline(spline: &Spline, origin: &Vector3<f64>) -> Vector3<f64> {
-    let spread = 0.6_f64.sqrt();
-    let nodes = [(-spread, 5.0), (0.0, 8.0), (spread, 5.0)];
     let of_piece = |piece: &[Vector3<f64>; 4]| -> Vector3<f64> {
-        let of_node = |(node, weight): (f64, f64)| {
-            let (point, along) = place_and_derivative(piece, 0.5 * (1.0 + node));
-            (point - origin).cross(&along) * (weight / 18.0)
+        let of_place = |(share, weight): (f64, f64)| {
+            let (point, along) = place_and_derivative(piece, share);
+            (point - origin).cross(&along) * weight
         };
-        nodes.into_iter().map(of_node).sum()
+        GAUSS.into_iter().map(of_place).sum()
     };
     spline.beziers().iter().map(of_piece).sum()
 }

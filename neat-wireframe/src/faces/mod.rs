@@ -51,6 +51,7 @@ mod plane_mesh;
 mod planes;
 mod point_evidence;
 mod polygon;
+mod quadrature;
 mod region;
 mod round_cells;
 mod round_triangulation;

@@ -7,7 +7,7 @@ use super::plane_fit::PlaneFrame;
 use super::polygon::contains;
 use super::surface::Surface;
 use super::unrolled::{self, Chain, Unrolled};
-use super::walls::{Wall, rims};
+use super::walls::Wall;
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::TAU;
 
@@ -48,7 +48,7 @@ impl Region {
                 })
             }
             Surface::Extruded { direction } => {
-                let [one, other] = rims(face)?;
+                let [one, other] = face.rims()?;
                 let points = |step: Step| Some(curves.find(step.curve)?.points_along(&step));
                 Some(Self::Wall(Wall::new(
                     [points(one)?, points(other)?],

@@ -8,7 +8,7 @@
 //! curve has three faces, no two faces lie on each other, and none but a plane passes through
 //! another face. The minimum is found by branch and bound.
 
-use super::curves::Curves;
+use super::curves::{Curve, Curves};
 use super::face::{CurveIndex, Face, Step};
 use super::groups::groups;
 use super::region::Region;
@@ -118,14 +118,13 @@ fn crossing(regions: &[Option<Region>], possible: &[usize]) -> Vec<[usize; 2]> {
     known.par_iter().flat_map_iter(of_face).collect()
 }
 
-/// Into which direction a face goes from a piece of a curve of its boundary, which starts at this
-/// point of it.
-fn inward(curves: &Curves, face: &Face, step: &Step, start: usize) -> Option<Vector3<f64>> {
+/// Into which direction a face goes from a piece of a curve, which starts at this point of it and
+/// along which its boundary runs forward.
+fn inward(curves: &Curves, face: &Face, curve: &Curve, start: usize) -> Option<Vector3<f64>> {
     if let Surface::Extruded { direction } = face.surface {
-        return inward_of_wall(curves, face, step, &direction);
+        return inward_of_wall(curves, face, curve, &direction);
     }
-    let points = curves.find(step.curve)?.points_along(step);
-    let [from, to] = [points.get(start)?, points.get(start + 1)?];
+    let [from, to] = [curve.points[start], curve.points[start + 1]];
     let normal = face.surface.normal_at(&(0.5 * (from + to)));
     Some(normal.cross(&(to - from).normalize()))
 }
@@ -137,20 +136,20 @@ fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
         let turned = steps[k].reversed.then(|| faces[k].turned());
         turned.unwrap_or_else(|| faces[k].clone())
     });
-    let step = Step {
-        curve: steps[0].curve,
-        reversed: false,
-    };
-    let pieces = (curves.find(step.curve)).map_or(0, |curve| curve.points.len() - 1);
-    // Where cylinders of one radius meet they touch at two places: most of the curve counts.
-    let starts = (0..PLACES.min(pieces)).map(|k| (2 * k + 1) * pieces / (2 * PLACES.min(pieces)));
-    let cosine = |start: usize| {
-        let [one, other] = [0, 1].map(|k| inward(curves, &forward[k], &step, start));
-        one.zip(other).map_or(0.0, |(one, other)| one.dot(&other))
-    };
-    let mut cosines: Vec<f64> = starts.map(cosine).collect();
-    cosines.sort_by(f64::total_cmp);
-    let cosine = cosines.get(cosines.len() / 2).copied().unwrap_or(0.0);
+    let curve = curves.find(steps[0].curve);
+    let cosine = curve.map_or(0.0, |curve| {
+        let pieces = curve.points.len() - 1;
+        let count = PLACES.min(pieces);
+        let cosine = |k: usize| {
+            let start = (2 * k + 1) * pieces / (2 * count);
+            let [one, other] = [0, 1].map(|k| inward(curves, &forward[k], curve, start));
+            one.zip(other).map_or(0.0, |(one, other)| one.dot(&other))
+        };
+        // Where cylinders of one radius meet they touch at two places: most of the curve counts.
+        let mut cosines: Vec<f64> = (0..count).map(cosine).collect();
+        cosines.sort_by(f64::total_cmp);
+        cosines[count / 2]
+    });
     // A plane that touches a cylinder or a cone goes on as another surface: the end of a slot.
     let is_plane = |face: &Face| matches!(face.surface, Surface::Plane { .. });
     if is_plane(faces[0]) != is_plane(faces[1]) {

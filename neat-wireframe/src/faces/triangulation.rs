@@ -4,7 +4,7 @@ use super::face::{CurveIndex, Face, Shell, Step};
 use super::plane_fit::PlaneFrame;
 use super::round_triangulation::cut_round;
 use super::surface::Surface;
-use super::walls::{rims, strip};
+use super::walls::strip;
 use earcut::Earcut;
 use nalgebra::{Vector2, Vector3};
 
@@ -46,7 +46,7 @@ pub(crate) fn triangles(
                 cut(&loops, &mut triangles);
             }
             Surface::Extruded { direction } => {
-                if let Some(rims) = rims(face) {
+                if let Some(rims) = face.rims() {
                     let [one, other] = rims.map(|step| indices_along(&step, edges, chains));
                     strip([&one, &other], points, &direction, &mut triangles);
                 }

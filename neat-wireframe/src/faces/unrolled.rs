@@ -5,6 +5,7 @@
 //! and to the left above it.
 
 use super::plane_fit::across;
+use super::quadrature::GAUSS;
 use super::surface::Surface;
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::{PI, TAU};
@@ -15,6 +16,7 @@ pub(crate) type Chain = Vec<Vector2<f64>>;
 
 /// A round surface with an angle and a height for each point.
 pub(crate) struct Unrolled {
+    surface: Surface,
     origin: Vector3<f64>,
     axis: Vector3<f64>,
     across: [Vector3<f64>; 2],
@@ -29,6 +31,7 @@ impl Unrolled {
         let (origin, axis) = surface.axis()?;
         let [radius, slope] = surface.radius_at(&origin, &axis)?;
         Some(Self {
+            surface: *surface,
             origin,
             axis,
             across: across(&axis),
@@ -67,10 +70,7 @@ impl Unrolled {
 
     /// The distance of a point from the surface.
     pub fn distance(&self, point: &Vector3<f64>) -> f64 {
-        let offset = point - self.origin;
-        let height = self.axis.dot(&offset);
-        let from_axis = (offset - self.axis * height).norm();
-        (from_axis - self.radius_at(height)).abs() / self.slant()
+        self.surface.height_of(point).0.abs()
     }
 
     /// The angle of a direction that leads on along the surface from a point: 0 to the right.
@@ -124,12 +124,11 @@ impl Unrolled {
         let apex = self.radius - self.slope * self.axis.dot(&offset);
         // Over heights, of the radius.
         let below = |height: f64| height * (self.radius + 0.5 * self.slope * height);
-        let spread = 0.6_f64.sqrt();
         let mut moments = [0.0, 0.0];
         for [start, end] in loops.iter().flat_map(pieces) {
-            for (node, weight) in [(-spread, 5.0), (0.0, 8.0), (spread, 5.0)] {
-                let place = start + (end - start) * (0.5 * (1.0 + node));
-                let share = (start.x - end.x) * weight / 18.0 * below(place.y);
+            for (share, weight) in GAUSS {
+                let place = start + (end - start) * share;
+                let share = (start.x - end.x) * weight * below(place.y);
                 moments[0] += share * self.slant();
                 moments[1] += share * (apex + self.outward(place.x).dot(&offset));
             }
@@ -153,23 +152,25 @@ pub(super) fn turns(chain: &Chain) -> i32 {
 
 /// Whether loops have the place within them: an odd number of times they pass over it.
 pub(super) fn contains(loops: &[Chain], place: &Vector2<f64>) -> bool {
-    let above = |height: &&f64| **height > place.y;
-    crossings(loops, place.x).iter().filter(above).count() % 2 == 1
+    let above = heights_at(loops, place.x).filter(|height| *height > place.y);
+    above.count() % 2 == 1
 }
 
 /// The heights at which loops pass an angle, ascending.
 pub(super) fn crossings(loops: &[Chain], angle: f64) -> Vec<f64> {
-    let turned = |place: &Vector2<f64>| ((place.x - angle) / TAU).floor();
-    let mut heights: Vec<f64> = (loops.iter())
-        .flat_map(pieces)
-        .filter(|[a, b]| turned(a) != turned(b))
-        .map(|[a, b]| {
-            let at = angle + TAU * turned(&a).max(turned(&b));
-            a.y + (b.y - a.y) * (at - a.x) / (b.x - a.x)
-        })
-        .collect();
+    let mut heights: Vec<f64> = heights_at(loops, angle).collect();
     heights.sort_by(f64::total_cmp);
     heights
+}
+
+fn heights_at(loops: &[Chain], angle: f64) -> impl Iterator<Item = f64> + '_ {
+    let turned = move |place: &Vector2<f64>| ((place.x - angle) / TAU).floor();
+    let passing = loops.iter().flat_map(pieces);
+    passing.filter_map(move |[a, b]| {
+        let turns = [turned(&a), turned(&b)];
+        let at = angle + TAU * turns[0].max(turns[1]);
+        (turns[0] != turns[1]).then(|| a.y + (b.y - a.y) * (at - a.x) / (b.x - a.x))
+    })
 }
 
 fn pieces(chain: &Chain) -> impl Iterator<Item = [Vector2<f64>; 2]> + '_ {

@@ -33,29 +33,28 @@ pub(super) fn walls(curves: &Curves) -> Vec<Face> {
 
 /// The direction in which the second spline lies from the first, if along it both look the same.
 fn common_direction(curves: &Curves, rims: [&Curve; 2]) -> Option<Vector3<f64>> {
-    let places = rims.map(|rim| {
-        let shares = (0..PLACES).map(|k| (k as f64 + 0.5) / PLACES as f64);
-        let points: Vec<Vector3<f64>> = shares
-            .map(|share| point_along(&rim.points, share))
-            .collect();
-        points
-    });
     let [from, to] = rims.map(|rim| centroid(&rim.points));
     let tolerance = std::f64::consts::SQRT_2 * curves.arc_sigma();
     let direction = (to - from).try_normalize(tolerance)?;
-    let profiles = rims.map(|rim| profile(&rim.points, &direction));
-    let is_same = |k: usize| {
-        let along = profile(&places[k], &direction);
-        along
-            .iter()
-            .all(|point| distance_to_chain(&profiles[1 - k], point) <= tolerance)
-    };
     let is_upright = |rim: &Curve| {
         let area = area_vector(&rim.points);
         area.dot(&direction).abs() > FLAT * area.norm()
     };
-    let is_wall = is_same(0) && is_same(1) && rims.into_iter().all(is_upright);
-    is_wall.then_some(direction)
+    if !rims.into_iter().all(is_upright) {
+        return None;
+    }
+    let profiles = rims.map(|rim| profile(&rim.points, &direction));
+    let is_same = |k: usize| {
+        let shares = (0..PLACES).map(|k| (k as f64 + 0.5) / PLACES as f64);
+        let places: Vec<Vector3<f64>> = shares
+            .map(|share| point_along(&rims[k].points, share))
+            .collect();
+        let along = profile(&places, &direction);
+        along
+            .iter()
+            .all(|point| distance_to_chain(&profiles[1 - k], point) <= tolerance)
+    };
+    (is_same(0) && is_same(1)).then_some(direction)
 }
 
 /// Around the profile along the first rim, with the second one to the left, and back along that.
@@ -77,27 +76,6 @@ fn loops_between(
     joined([(first, low), (second, high)], edges)
 }
 
-/// The two splines of a wall: the one along which it is to the left, and the one back.
-pub(super) fn rims(face: &Face) -> Option<[Step; 2]> {
-    let is_spline = |step: &&Step| matches!(step.curve, CurveIndex::Spline(_));
-    let is_straight =
-        |step: &Step| matches!(step.curve, CurveIndex::Edge(_) | CurveIndex::Smooth(_));
-    if !face
-        .steps()
-        .all(|step| is_spline(&step) || is_straight(step))
-    {
-        return None;
-    }
-    let shape: Vec<Vec<bool>> = (face.loops.iter())
-        .map(|steps| steps.iter().map(|step| is_spline(&step)).collect())
-        .collect();
-    let is_wall = shape == [[true], [true]]
-        || shape == [[true, false, true, false]]
-        || shape == [[false, true, false, true]];
-    let mut splines = face.steps().filter(is_spline);
-    is_wall.then_some([*splines.next()?, *splines.next()?])
-}
-
 /// Points of a chain as seen along a direction.
 pub(super) fn profile(points: &[Vector3<f64>], direction: &Vector3<f64>) -> Vec<Vector3<f64>> {
     let flat = |point: &Vector3<f64>| point - direction * direction.dot(point);
@@ -109,23 +87,23 @@ pub(super) fn profile(points: &[Vector3<f64>], direction: &Vector3<f64>) -> Vec<
 pub(super) fn inward_of_wall(
     curves: &Curves,
     face: &Face,
-    step: &Step,
+    curve: &Curve,
     direction: &Vector3<f64>,
 ) -> Option<Vector3<f64>> {
     let points = |step: &Step| Some(&curves.find(step.curve)?.points);
-    let [one, other] = rims(face)?;
-    let opposite = match step.curve {
-        curve if curve == one.curve => other,
-        curve if curve == other.curve => one,
+    let [one, other] = face.rims()?;
+    let opposite = match curve.index {
+        index if index == one.curve => other,
+        index if index == other.curve => one,
         _ => {
-            let (rim, ends) = (points(&one)?, points(step)?);
+            let rim = points(&one)?;
             let last = rim.len() - 1;
-            let begins = ends.contains(&rim[0]);
+            let begins = curve.points.contains(&rim[0]);
             let [from, to] = if begins { [0, 1] } else { [last, last - 1] };
             return (rim[to] - rim[from]).try_normalize(0.0);
         }
     };
-    let toward = centroid(points(&opposite)?) - centroid(points(step)?);
+    let toward = centroid(points(&opposite)?) - centroid(&curve.points);
     Some(direction * direction.dot(&toward).signum())
 }
 
