@@ -20,12 +20,12 @@ use std::f64::consts::{PI, TAU};
 
 /// An end at which nothing else ends is as likely as an edge that no face is beside, 1 in 20: in
 /// nats.
-const OPEN_END: f64 = 3.0;
+pub(super) const OPEN_END: f64 = 3.0;
 /// An end within so many pixels of a junction is there, as for 2D segments.
 const AT_JUNCTION: f64 = 5.0;
 /// Arcs of a smaller radius, in pixels, stay as they are: any short edge beside them would be a
 /// chord.
-const MIN_RADIUS: f64 = SECTOR_IN_PIXELS;
+pub(super) const MIN_RADIUS: f64 = SECTOR_IN_PIXELS;
 /// A piece of a circle is there if images say this much for it, by length, of what they say for
 /// the piece that they show best. Of a circle with eight scallops (`knob`) those that are there say
 /// .5 of it and more, those across scallops .02 at most.

@@ -19,7 +19,7 @@ const SAMPLES: usize = 7;
 /// An arc of whose evidence no more than this share is its own is explained by what has the rest.
 /// Of `part-004` arcs that run along one rim here and along another one there keep 0 to .16, true
 /// ones, with other rims three pixels beside them, .43 and more.
-const OWN_SHARE: f64 = 0.2;
+pub(super) const OWN_SHARE: f64 = 0.2;
 
 impl Images<'_> {
     /// Whether images speak for an arc by edgels that are not `taken` by others, too.

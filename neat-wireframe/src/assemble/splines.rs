@@ -3,17 +3,18 @@
 //! Ellipses and free curves are found as arcs, each of which goes on as the next one. A chain of
 //! them is one curve: a spline with as few control points as images need, fitted to the edgels of
 //! all views. It has to explain them as well as the arcs do, with fewer numbers. Two arcs that
-//! touch are two arcs, as things are made of them.
+//! touch are two arcs, as things are made of them. An arc alone may be a curve too (`free_curves.rs`).
 
 use super::arc_joints::wrapped;
-use super::circle_fitting::{FoundArc, SECTOR_IN_PIXELS, equal_parts, sectors_along};
+use super::arc_pieces::OWN_SHARE;
+use super::circle_fitting::FoundArc;
 use super::corners::{MAX_GAP, WINDOW_IN_PIXELS};
-use super::curve_samples::{SPACING, distance_of_curve};
 use super::curves::BESIDE_IN_PIXELS;
 use super::edge_samples::Images;
-use super::line_evidence::LineEvidence;
-use super::line_fitting::loss_of_reach;
-use nalgebra::{DMatrix, DVector, Vector3};
+use super::spline_fitting::{
+    COST, NUMBERS_OF_ARC, NUMBERS_OF_CONTROL, Points, gain_by_length, parts_of, through_points,
+};
+use nalgebra::Vector3;
 use neat_core::Spline;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -31,20 +32,8 @@ const MOST_COMMON: f64 = 0.75;
 const MIN_ARCS: usize = 3;
 /// Pixels between the points of arcs that a spline is first fitted to.
 const STEP_IN_PIXELS: f64 = 4.0;
-/// An arc has six numbers and two ends, a control point three.
-const NUMBERS_OF_ARC: f64 = 8.0;
-const NUMBERS_OF_CONTROL: f64 = 3.0;
-/// What a number costs in nats: half the logarithm of the hundreds of places that tell of it.
-const COST: f64 = 3.0;
 /// Reaches of the fits to edgels.
 const FITTING_REACHES: [f64; 4] = [1.5, 1.5, 1.0, 1.0];
-/// What keeps control points along the curve, where edgels say nothing: as a share of what they
-/// say across it.
-const RIDGE: f64 = 1e-4;
-/// As much more keeps ends at junctions.
-const AT_JUNCTION: f64 = 1e8;
-/// Fewer edgels for each control point do not place it.
-const MIN_EDGELS: usize = 8;
 
 /// An end of an arc: its place in the list, and 0 for its start, 1 for its end.
 type End = (usize, usize);
@@ -55,33 +44,70 @@ struct Chain {
     closed: bool,
 }
 
-/// Takes the chains among the arcs that one spline explains as well; `junctions` are those of
-/// edges.
+/// A spline in place of arcs, by their places in the list.
+struct Found {
+    arcs: Vec<usize>,
+    pixel: f64,
+    gain: f64,
+    spline: Spline,
+}
+
+/// Takes the chains among the arcs that one spline explains as well, and arcs that a spline explains
+/// better: those first that images say most for, and none that is another one again. `junctions` are
+/// those of edges.
 pub(super) fn take_splines(
     images: &Images,
     junctions: &[Vector3<f64>],
     arcs: &mut Vec<FoundArc>,
 ) -> Vec<Spline> {
-    let found: Vec<(Chain, Spline)> = (chains(images, junctions, arcs).into_par_iter())
-        .filter_map(|chain| {
-            let spline = images.spline_of(&chain, junctions, arcs)?;
-            Some((chain, spline))
+    let of_chain = |chain: Chain| {
+        let spline = images.spline_of(&chain, junctions, arcs)?;
+        let pixel = chain.pixel(arcs);
+        let of_chain = chain.arcs.into_iter().map(|(arc, _)| arc);
+        Some((of_chain.collect(), pixel, spline))
+    };
+    let mut found: Vec<(Vec<usize>, f64, Spline)> = chains(images, junctions, arcs)
+        .into_par_iter()
+        .filter_map(of_chain)
+        .collect();
+    let taken: BTreeSet<usize> = found.iter().flat_map(|(arcs, ..)| arcs.clone()).collect();
+    let of_arc = |arc: usize| {
+        let spline = images.free_curve(&arcs[arc], junctions)?;
+        Some((vec![arc], arcs[arc].pixel, spline))
+    };
+    let others = (0..arcs.len()).into_par_iter();
+    let others = others.filter(|arc| !taken.contains(arc));
+    found.extend(others.filter_map(of_arc).collect::<Vec<_>>());
+    let mut found: Vec<Found> = (found.into_iter())
+        .map(|(arcs, pixel, spline)| Found {
+            arcs,
+            pixel,
+            gain: images.gain_of_spline(&spline, pixel, None),
+            spline,
         })
         .collect();
+    found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut edgels = images.nothing_taken();
-    for (chain, spline) in &found {
-        let parts = parts_of(spline, chain.pixel(arcs));
-        images.claim_curve(&parts, |place| Some(spline.point_at(place)), &mut edgels);
-    }
-    let taken: BTreeSet<usize> = (found.iter())
-        .flat_map(|(chain, _)| chain.arcs.iter().map(|(arc, _)| *arc))
-        .collect();
+    found.retain(|found| {
+        let own = images.gain_of_spline(&found.spline, found.pixel, Some(&edgels));
+        let is_own = own > OWN_SHARE * found.gain;
+        if is_own {
+            let parts = parts_of(&found.spline, found.pixel);
+            images.claim_curve(
+                &parts,
+                |place| Some(found.spline.point_at(place)),
+                &mut edgels,
+            );
+        }
+        is_own
+    });
+    let taken: BTreeSet<usize> = found.iter().flat_map(|found| found.arcs.clone()).collect();
     let mut index = 0..arcs.len();
     arcs.retain(|_| index.next().is_none_or(|index| !taken.contains(&index)));
     if !found.is_empty() {
         arcs.retain(|arc| images.has_own(arc, &edgels));
     }
-    found.into_iter().map(|(_, spline)| spline).collect()
+    found.into_iter().map(|found| found.spline).collect()
 }
 
 fn point_of(arcs: &[FoundArc], (arc, end): End) -> Vector3<f64> {
@@ -184,13 +210,6 @@ fn apart(arcs: &[FoundArc], ends: [End; 2]) -> Option<f64> {
     (either && apart <= most).then_some(apart)
 }
 
-/// Points along a chain, with the place of each: from 0 to 1 by affine arc length, the integral of
-/// the third root of the curvature, by which cubic pieces of an ellipse are all alike.
-struct Points {
-    points: Vec<Vector3<f64>>,
-    places: Vec<f64>,
-}
-
 impl Chain {
     /// Where it begins and ends, unless it is closed.
     fn outer_ends(&self) -> [Option<End>; 2] {
@@ -264,16 +283,6 @@ impl Chain {
     }
 }
 
-/// What the sectors of a curve say, by length: they are as long as whole ones can be.
-fn gain_by_length(gain: f64, length: f64, pixel: f64) -> f64 {
-    gain * length / (SECTOR_IN_PIXELS * pixel * sectors_along(length, pixel))
-}
-
-/// From where to where the parts of a spline run that are as long as sectors of arcs.
-fn parts_of(spline: &Spline, pixel: f64) -> Vec<[f64; 2]> {
-    equal_parts([0.0, spline.pieces() as f64], spline.length(), pixel)
-}
-
 impl Images<'_> {
     /// The spline that explains the images as well as a chain of arcs does, with fewer numbers.
     fn spline_of(
@@ -291,10 +300,8 @@ impl Images<'_> {
         let most = (numbers / NUMBERS_OF_CONTROL).ceil() as usize;
         let worth = |controls: usize| {
             let start = through_points(&points, controls, chain.closed, ends)?;
-            let spline = self.fitted(start, ends, pixel)?;
-            let parts = self.evidence_along(&spline, pixel);
-            let gain = parts.iter().map(|(_, evidence)| evidence.gain).sum();
-            let gain = gain_by_length(gain, spline.length(), pixel);
+            let spline = self.fitted(start, ends, pixel, &FITTING_REACHES)?;
+            let gain = self.gain_of_spline(&spline, pixel, None);
             Some((gain - COST * NUMBERS_OF_CONTROL * controls as f64, spline))
         };
         let splines = (4 + usize::from(chain.closed)..most).filter_map(worth);
@@ -303,6 +310,12 @@ impl Images<'_> {
         let (arcs, controls) = (chain.arcs.len(), best.controls.len());
         tracing::debug!(arcs, controls, worth, of_arcs, "arcs may be a spline");
         (worth >= of_arcs).then_some(best)
+    }
+
+    /// What they say about all of an arc.
+    pub(super) fn gain_by_angles(&self, FoundArc { arc, pixel, .. }: &FoundArc) -> f64 {
+        let gain = self.gain_along(arc, arc.angles, *pixel, None);
+        gain_by_length(gain, arc.length(), *pixel)
     }
 
     /// What the images say about the arcs of a chain.
@@ -315,195 +328,6 @@ impl Images<'_> {
         });
         gains.sum()
     }
-
-    /// What the images say about each part of a spline, about as long as a sector of an arc.
-    fn evidence_along(&self, spline: &Spline, pixel: f64) -> Vec<([f64; 2], LineEvidence)> {
-        let evidence = |places: [f64; 2]| {
-            let middle = spline.point_at(0.5 * (places[0] + places[1]));
-            let at = |place: f64| Some(spline.point_at(place));
-            let in_view = |view| self.samples_of_curve(view, places, SPACING, at);
-            let least = f64::NEG_INFINITY;
-            (
-                places,
-                self.evidence_of_samples(&middle, in_view, None, least, 1),
-            )
-        };
-        parts_of(spline, pixel)
-            .into_par_iter()
-            .map(evidence)
-            .collect()
-    }
-
-    /// A spline moved to the edgels of the views that show it.
-    fn fitted(
-        &self,
-        mut spline: Spline,
-        ends: [Option<Vector3<f64>>; 2],
-        pixel: f64,
-    ) -> Option<Spline> {
-        for reaches in FITTING_REACHES {
-            let reach = reaches * self.reach;
-            let rows: Vec<Row> = (self.evidence_along(&spline, pixel).into_par_iter())
-                .flat_map_iter(|(places, evidence)| {
-                    let views: Vec<usize> = evidence.views().collect();
-                    let of_view = |view| self.rows_of_spline(&spline, places, view, reach);
-                    views.into_iter().flat_map(of_view).collect::<Vec<Row>>()
-                })
-                .collect();
-            if rows.len() < MIN_EDGELS * spline.controls.len() {
-                return None;
-            }
-            let loss = loss_of_reach(reach);
-            let mut equations = Equations::new(&spline, ends);
-            for row in &rows {
-                let weight = loss.weight(row.distance * row.distance);
-                equations.add(row, weight);
-            }
-            spline = equations.solved(&spline)?;
-        }
-        let last = spline.controls.len() - 1;
-        for (control, end) in [0, last].into_iter().zip(ends) {
-            spline.controls[control] = end.unwrap_or(spline.controls[control]);
-        }
-        Some(spline)
-    }
-
-    /// What the edgels beside a part of a spline in a view say.
-    fn rows_of_spline(
-        &self,
-        spline: &Spline,
-        places: [f64; 2],
-        view: usize,
-        reach: f64,
-    ) -> Vec<Row> {
-        let at = |place: f64| Some(spline.point_at(place));
-        let samples = self.samples_of_curve(view, places, SPACING, at);
-        let half = 0.5 * (places[1] - places[0]);
-        let row = |place: f64, edgel: usize| {
-            let position = self.maps[view].get(edgel).position.cast();
-            let last = spline.pieces() as f64;
-            let [before, after] = [place - half, place + half].map(|end| end.clamp(0.0, last));
-            let tangent = spline.point_at(after) - spline.point_at(before);
-            let camera = &self.views[view].camera;
-            let point = spline.point_at(place);
-            let (distance, by_point) = distance_of_curve(camera, &point, &tangent, &position)?;
-            Some(Row {
-                weights: spline.weights_at(place),
-                by_point,
-                distance,
-            })
-        };
-        let rows = samples
-            .iter()
-            .flatten()
-            .filter_map(|sample| row(sample.place, self.edgel(view, sample, reach)?));
-        rows.collect()
-    }
-}
-
-/// How the distance of an edgel from a spline changes with the point beside it, and so with four
-/// control points.
-struct Row {
-    weights: [(usize, f64); 4],
-    by_point: Vector3<f64>,
-    distance: f64,
-}
-
-/// Normal equations for changes of the control points.
-struct Equations {
-    matrix: DMatrix<f64>,
-    right: DVector<f64>,
-    fixed: Vec<usize>,
-}
-
-impl Equations {
-    /// Control points at the `ends` stay.
-    fn new(spline: &Spline, ends: [Option<Vector3<f64>>; 2]) -> Self {
-        let count = spline.controls.len();
-        let of_end = [0, count - 1].into_iter().zip(ends);
-        Self {
-            matrix: DMatrix::zeros(3 * count, 3 * count),
-            right: DVector::zeros(3 * count),
-            fixed: of_end
-                .filter_map(|(control, end)| end.map(|_| control))
-                .collect(),
-        }
-    }
-
-    fn add(&mut self, row: &Row, weight: f64) {
-        let by = |k: usize| row.by_point[k % 3] * row.weights[k / 3].1;
-        let place = |k: usize| 3 * row.weights[k / 3].0 + k % 3;
-        for a in 0..12 {
-            self.right[place(a)] -= weight * by(a) * row.distance;
-            for b in 0..12 {
-                self.matrix[(place(a), place(b))] += weight * by(a) * by(b);
-            }
-        }
-    }
-
-    fn solved(mut self, spline: &Spline) -> Option<Spline> {
-        let count = spline.controls.len();
-        let ridge = RIDGE * self.matrix.trace() / (3 * count) as f64;
-        for control in 0..count {
-            let held = if self.fixed.contains(&control) {
-                AT_JUNCTION
-            } else {
-                1.0
-            };
-            for k in 3 * control..3 * control + 3 {
-                self.matrix[(k, k)] += held * ridge;
-            }
-        }
-        let change = self.matrix.cholesky()?.solve(&self.right);
-        let mut moved = spline.clone();
-        for (control, point) in moved.controls.iter_mut().enumerate() {
-            *point += change.fixed_rows::<3>(3 * control);
-        }
-        moved.is_valid().then_some(moved)
-    }
-}
-
-/// The spline with so many control points nearest to points at their places.
-fn through_points(
-    points: &Points,
-    controls: usize,
-    closed: bool,
-    ends: [Option<Vector3<f64>>; 2],
-) -> Option<Spline> {
-    let mut spline = Spline {
-        controls: vec![Vector3::zeros(); controls],
-        closed,
-    };
-    let pieces = spline.pieces() as f64;
-    let mut matrix = DMatrix::zeros(controls, controls);
-    let mut right = DMatrix::zeros(controls, 3);
-    let mut add = |weights: [(usize, f64); 4], point: &Vector3<f64>, held: f64| {
-        for (a, by_a) in weights {
-            for (b, by_b) in weights {
-                matrix[(a, b)] += held * by_a * by_b;
-            }
-            for k in 0..3 {
-                right[(a, k)] += held * by_a * point[k];
-            }
-        }
-    };
-    for (point, place) in points.points.iter().zip(&points.places) {
-        add(spline.weights_at(place * pieces), point, 1.0);
-    }
-    for (end, place) in ends.iter().zip([0.0, pieces]) {
-        if let Some(end) = end {
-            add(spline.weights_at(place), end, AT_JUNCTION);
-        }
-    }
-    let ridge = 1e-9 * points.points.len() as f64;
-    for k in 0..controls {
-        matrix[(k, k)] += ridge;
-    }
-    let solved = matrix.cholesky()?.solve(&right);
-    for (control, point) in spline.controls.iter_mut().enumerate() {
-        *point = Vector3::from_fn(|k, _| solved[(control, k)]);
-    }
-    spline.is_valid().then_some(spline)
 }
 
 #[cfg(test)]
@@ -585,6 +409,20 @@ mod tests {
         ends.sort_by(|a, b| b.x.total_cmp(&a.x));
         assert_eq!(ends, junctions);
         assert!(!found[0].closed && farthest_from(ellipse, &found[0]) < 0.003);
+    }
+
+    #[test]
+    fn one_arc_may_be_a_curve_that_ends_at_junctions_near_its_circle() {
+        // A third of an ellipse, and the arc along its middle.
+        let [start, end] = [0.6, 2.8];
+        let junctions = [ellipse(start), ellipse(end)];
+        let (left, found) = splines(ellipse, &[start, end], 0.0, &junctions);
+        assert_eq!((left, found.len()), (0, 1));
+        let controls = &found[0].controls;
+        let mut ends = [controls[0], controls[controls.len() - 1]];
+        ends.sort_by(|a, b| b.x.total_cmp(&a.x));
+        assert_eq!(ends, junctions);
+        assert!(farthest_from(ellipse, &found[0]) < 0.003);
     }
 
     #[test]

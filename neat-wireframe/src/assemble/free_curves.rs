@@ -1,0 +1,162 @@
+//! Curves of which an arc explains the middle alone.
+//!
+//! A free curve that bends little is found as one arc, which leaves it near its ends. So each open arc
+//! is asked whether a spline explains the images better: between ends of its own or junctions near its
+//! circle, with as few control points as images need. A spline that an arc follows within the reach of
+//! its edgels is that arc.
+
+use super::arc_ends::{MIN_RADIUS, OPEN_END};
+use super::arc_joints::wrapped;
+use super::circle_fitting::FoundArc;
+use super::corners::WINDOW_IN_PIXELS;
+use super::curves::BESIDE_IN_PIXELS;
+use super::edge_samples::Images;
+use super::spline_fitting::{
+    COST, NUMBERS_OF_ARC, NUMBERS_OF_CONTROL, Points, gain_by_length, through_points,
+};
+use nalgebra::Vector3;
+use neat_core::Spline;
+
+/// A curve leaves its arc by no more pixels at its ends than arcs of one edge lie beside each other.
+const DRIFT: f64 = 2.0 * BESIDE_IN_PIXELS;
+/// Parts of an arc of which each is asked how well images show it.
+const PARTS: usize = 16;
+/// An arc is the curve where images say this share of what they say where they say most, by length.
+const SHOWN: f64 = 0.5;
+/// Control points that are tried, and how many of them first.
+const TRIED: usize = 5;
+const CONTROLS: std::ops::Range<usize> = 4..8;
+/// Reaches of the fits to edgels: the arc is far from the curve at its ends.
+const FITTING_REACHES: [f64; 6] = [8.0, 4.0, 2.0, 1.0, 1.0, 1.0];
+/// Places of a spline at which it is compared with its arc.
+const PLACES: usize = 32;
+
+/// The end of a curve: its angle on the circle of the arc, and its junction.
+type End = (f64, Option<Vector3<f64>>);
+
+impl Images<'_> {
+    /// The spline that explains the images better than an arc; `junctions` are those of edges.
+    pub(super) fn free_curve(
+        &self,
+        found: &FoundArc,
+        junctions: &[Vector3<f64>],
+    ) -> Option<Spline> {
+        let FoundArc { arc, pixel, .. } = found;
+        if arc.is_closed() || arc.radius < MIN_RADIUS * pixel {
+            return None;
+        }
+        let of_arc = self.gain_by_angles(found) - COST * NUMBERS_OF_ARC;
+        let fitted = |ends: [End; 2], controls: usize, reaches: &[f64]| {
+            let pins = ends.map(|(_, junction)| junction);
+            let start = through_points(&points_between(found, ends), controls, false, pins)?;
+            self.fitted(start, pins, *pixel, reaches)
+        };
+        // Images show more of it than of the arc beside that, where edgels of one are none of the
+        // other.
+        let is_better = |spline: &Spline| {
+            let numbers = NUMBERS_OF_CONTROL * spline.controls.len() as f64;
+            let worth = self.gain_beside(spline, found) - COST * numbers;
+            let last = spline.pieces() as f64;
+            let mut places = (0..PLACES).map(|k| (k as f64 + 0.5) / PLACES as f64 * last);
+            let leaves = places.any(|place| {
+                let off = arc.distance_to_circle(&spline.point_at(place));
+                off > self.reach * pixel
+            });
+            tracing::debug!(worth, of_arc, leaves, "an arc may be a spline");
+            worth > of_arc && leaves
+        };
+        let free = arc.angles.map(|angle| (angle, None));
+        if !is_better(&fitted(free, TRIED, &FITTING_REACHES[2..])?) {
+            return None;
+        }
+        // Where it hardly is the curve another one may run on, and nothing speaks for an end without
+        // a junction.
+        let worth = |spline: &Spline, ends: &[End; 2]| {
+            let gains = self.evidence_along(spline, *pixel, None).into_iter();
+            let gains: Vec<f64> = gains.map(|(_, evidence)| evidence.gain).collect();
+            let least = SHOWN * gains.iter().copied().fold(0.0, f64::max);
+            let shown = gains.iter().filter(|gain| **gain >= least).sum();
+            let open = ends.iter().filter(|(_, junction)| junction.is_none());
+            let cost = COST * NUMBERS_OF_CONTROL * spline.controls.len() as f64;
+            gain_by_length(shown, spline.length(), *pixel) - cost - OPEN_END * open.count() as f64
+        };
+        let best = |tried: &mut dyn Iterator<Item = ([End; 2], usize)>| {
+            let splines = tried.filter_map(|(ends, controls)| {
+                let spline = fitted(ends, controls, &FITTING_REACHES)?;
+                Some((worth(&spline, &ends), ends, spline))
+            });
+            splines.max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let [starts, stops] = self.possible_ends(found, junctions);
+        let mut pairs = starts
+            .iter()
+            .flat_map(|from| stops.iter().map(move |to| ([*from, *to], TRIED)))
+            .filter(|([from, to], _)| to.0 > from.0);
+        let (_, ends, _) = best(&mut pairs)?;
+        let (.., spline) = best(&mut CONTROLS.map(|controls| (ends, controls)))?;
+        is_better(&spline).then_some(spline)
+    }
+
+    /// What images say about the part of a spline that an arc runs along.
+    fn gain_beside(&self, spline: &Spline, found: &FoundArc) -> f64 {
+        let arc = &found.arc;
+        let is_beside = |[from, to]: &[f64; 2]| {
+            let middle = spline.point_at(0.5 * (from + to));
+            arc.contains(arc.angle_of(&middle), 0.0)
+        };
+        let parts = self.evidence_along(spline, found.pixel, None);
+        let beside = parts.iter().filter(|(places, _)| is_beside(places));
+        let gain = beside.map(|(_, evidence)| evidence.gain).sum();
+        gain_by_length(gain, spline.length(), found.pixel)
+    }
+
+    /// Where the curve may start and end: at junctions near the circle, from the part of the arc that
+    /// is shown on to a window beyond its end, or where the arc ends.
+    fn possible_ends(&self, found: &FoundArc, junctions: &[Vector3<f64>]) -> [Vec<End>; 2] {
+        let arc = &found.arc;
+        let shown = self.well_shown(found);
+        let window = WINDOW_IN_PIXELS * found.pixel / arc.radius;
+        let near: Vec<(f64, Vector3<f64>)> = (junctions.iter())
+            .filter(|junction| arc.distance_to_circle(junction) <= DRIFT * found.pixel)
+            .map(|junction| (arc.angle_of(junction), *junction))
+            .collect();
+        [0, 1].map(|k| {
+            let sign = [-1.0, 1.0][k];
+            let beyond = (arc.angles[k] - shown[k]) * sign;
+            let at_junctions = near.iter().filter_map(|(angle, junction)| {
+                let by = wrapped(angle - shown[k]) * sign;
+                let is_there = (-window..=beyond + window).contains(&by);
+                is_there.then_some((shown[k] + by * sign, Some(*junction)))
+            });
+            at_junctions.chain([(arc.angles[k], None)]).collect()
+        })
+    }
+
+    /// From which angle to which an arc is shown well.
+    fn well_shown(&self, found: &FoundArc) -> [f64; 2] {
+        let arc = &found.arc;
+        let at = |k: usize| arc.angles[0] + arc.sweep() * k as f64 / PARTS as f64;
+        let gains: Vec<f64> = (0..PARTS)
+            .map(|k| self.gain_along(arc, [at(k), at(k + 1)], found.pixel, None))
+            .collect();
+        let most = gains.iter().copied().fold(0.0, f64::max);
+        let is_shown = |k: &usize| gains[*k] >= SHOWN * most;
+        let first = (0..PARTS).find(is_shown).unwrap_or(0);
+        let last = (0..PARTS).rev().find(is_shown).unwrap_or(PARTS - 1);
+        [at(first), at(last + 1)]
+    }
+}
+
+/// Points along the circle of an arc from one end to the other, at places by angle.
+fn points_between(found: &FoundArc, [from, to]: [End; 2]) -> Points {
+    let count = PLACES;
+    let share = |k: usize| k as f64 / count as f64;
+    let inner = (0..=count).map(|k| found.arc.point_at(from.0 + (to.0 - from.0) * share(k)));
+    let mut points: Vec<Vector3<f64>> = inner.collect();
+    points[0] = from.1.unwrap_or(points[0]);
+    points[count] = to.1.unwrap_or(points[count]);
+    Points {
+        points,
+        places: (0..=count).map(share).collect(),
+    }
+}
