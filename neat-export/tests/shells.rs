@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use neat_core::CircularArc;
 use neat_export::{EdgeFilter, ExportOptions, Format, export};
 use neat_wireframe::export::{WireframeDocument, read_json, write_json};
-use neat_wireframe::faces::{CurveIndex, MeasuredGraph, Surface, find_shells};
+use neat_wireframe::faces::{CurveIndex, MeasuredGraph, ShellGeometry, Surface, find_shells};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::fs;
@@ -272,6 +272,37 @@ fn walls_are_extruded_and_cylinders_have_holes() {
 }
 
 #[test]
+fn a_loft_with_a_hole_is_a_patch() {
+    let document = document("lofted.json");
+    let mut found = document.clone();
+    add_shells(&mut found);
+    let [shell] = &found.shells[..] else {
+        panic!("{} shells", found.shells.len());
+    };
+    assert!(shell.closed && shell.faces.len() == 10);
+    assert_eq!(found.shells, document.shells);
+    // By another program, from what the two arcs say.
+    let (arcs, splines) = (&document.arcs, &document.splines);
+    let geometry = ShellGeometry::new(shell, &document.wireframe(), arcs, splines);
+    assert!((geometry.volume(shell) / 1.982_808_58 - 1.0).abs() < 1e-4);
+    let step = exported(&document, Format::Step, EdgeFilter::default());
+    assert_eq!(count(&step, "MANIFOLD_SOLID_BREP"), 1);
+    assert_eq!(count(&step, "B_SPLINE_SURFACE_WITH_KNOTS"), 1);
+    assert_watertight(&document);
+}
+
+/// Every side has two triangles.
+fn assert_watertight(document: &WireframeDocument) {
+    let mut sides: BTreeMap<[usize; 2], usize> = BTreeMap::new();
+    for triangle in document.drawn_triangles() {
+        for [a, b] in [[0, 1], [1, 2], [2, 0]].map(|side| side.map(|k| triangle[k])) {
+            *sides.entry([a.min(b), a.max(b)]).or_default() += 1;
+        }
+    }
+    assert!(sides.values().all(|count| *count == 2));
+}
+
+#[test]
 fn inferred_lines_bound_faces_of_solids_and_are_no_edges() {
     let document = rounded();
     assert!(document.shells[0].closed);
@@ -287,14 +318,7 @@ fn inferred_lines_bound_faces_of_solids_and_are_no_edges() {
     assert_eq!(json.matches("\"smooth\"").count(), 4);
     let again: WireframeDocument = serde_json::from_str(&json).unwrap();
     assert_eq!(again.shells, document.shells);
-    // The triangles are watertight: every side has two.
-    let mut sides: BTreeMap<[usize; 2], usize> = BTreeMap::new();
-    for triangle in document.drawn_triangles() {
-        for [a, b] in [[0, 1], [1, 2], [2, 0]].map(|side| side.map(|k| triangle[k])) {
-            *sides.entry([a.min(b), a.max(b)]).or_default() += 1;
-        }
-    }
-    assert!(sides.values().all(|count| *count == 2));
+    assert_watertight(&document);
 }
 
 #[test]

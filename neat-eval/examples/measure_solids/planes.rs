@@ -28,7 +28,7 @@ fn kind(normal: &Vector3<f64>) -> &'static str {
 pub fn flattened(face: &FoundFace) -> FoundFace {
     let onto = |point: Vector3<f64>| match face.surface {
         Surface::Plane { normal, offset } => point - normal * (normal.dot(&point) - offset),
-        Surface::Cylinder { .. } | Surface::Cone { .. } | Surface::Extruded { .. } => point,
+        _ => point,
     };
     FoundFace {
         triangles: (face.triangles.iter())

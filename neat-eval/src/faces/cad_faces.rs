@@ -124,7 +124,7 @@ impl CadFaces {
                 Some(Surface::Plane { .. }) => &mut scores.planes,
                 Some(Surface::Cylinder { .. }) => &mut scores.cylinders,
                 Some(Surface::Cone { .. }) => &mut scores.cones,
-                Some(Surface::Extruded { .. }) | None => &mut scores.others,
+                Some(Surface::Extruded { .. } | Surface::Patch { .. }) | None => &mut scores.others,
             };
             share.all.add(face.area);
             if partner.is_some() {
@@ -165,21 +165,24 @@ impl CadFaces {
 
     /// How far the middles of two faces are apart that are the same; `None` of others.
     fn shift(&self, found: &FoundFace, truth: &TrueFace) -> Option<f64> {
-        let corners = || found.triangles.iter().flatten();
+        let alike = self.is_same_kind(&found.surface, truth.surface.as_ref())
+            && (found.area / truth.area - 1.0).abs() <= self.max_area_error;
+        if !alike {
+            return None;
+        }
+        let boundary = found.boundary();
         let is_near = |corner: &Vector3<f64>| match &truth.surface {
             Some(surface) => surface.height_of(corner).0.abs() <= self.max_distance,
-            // The corners of a wall are on its rims.
             None => {
                 (truth.boundary.iter()).any(|point| (point - corner).norm() <= self.max_distance)
             }
         };
-        let same = self.is_same_kind(&found.surface, truth.surface.as_ref())
-            && (found.area / truth.area - 1.0).abs() <= self.max_area_error
-            && corners().all(is_near);
-        let shift = match (same, truth.boundary.is_empty()) {
-            (false, _) => return None,
-            (true, true) => 0.0,
-            (true, false) => (middle(corners())? - middle(truth.boundary.iter())?).norm(),
+        if !boundary.iter().all(is_near) {
+            return None;
+        }
+        let shift = match truth.boundary.is_empty() {
+            true => 0.0,
+            false => (middle(boundary.iter())? - middle(truth.boundary.iter())?).norm(),
         };
         (shift <= self.max_shift).then_some(shift)
     }
@@ -187,7 +190,7 @@ impl CadFaces {
     fn is_same_kind(&self, found: &Surface, truth: Option<&Surface>) -> bool {
         match truth {
             Some(surface) => self.same_direction(found, surface),
-            None => matches!(found, Surface::Extruded { .. }),
+            None => matches!(found, Surface::Extruded { .. } | Surface::Patch { .. }),
         }
     }
 

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use neat_core::SceneError;
 use neat_wireframe::export::{ExportError, WireframeDocument, parse_json};
 use neat_wireframe::faces::{ShellGeometry, Surface};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A face of a result.
@@ -39,6 +40,22 @@ impl FoundFace {
             }));
         }
         found
+    }
+
+    /// The corners of triangles along its boundary: those of sides that one triangle has alone.
+    pub fn boundary(&self) -> Vec<Vector3<f64>> {
+        type Side = [[u64; 3]; 2];
+        let bits = |point: &Vector3<f64>| -> [u64; 3] { [0, 1, 2].map(|k| point[k].to_bits()) };
+        let mut count: BTreeMap<Side, (usize, Vector3<f64>)> = BTreeMap::new();
+        for [a, b, c] in &self.triangles {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                let mut side = [bits(from), bits(to)];
+                side.sort_unstable();
+                count.entry(side).or_insert((0, *from)).0 += 1;
+            }
+        }
+        let alone = count.into_values().filter(|(count, _)| *count == 1);
+        alone.map(|(_, from)| from).collect()
     }
 
     /// Reads those of a `wireframe.json`, which may have none.
@@ -98,6 +115,8 @@ mod tests {
         for face in &faces {
             let covered: f64 = face.triangles.iter().map(area).sum();
             assert!((face.area - 1.0).abs() < 1e-9 && (covered - 1.0).abs() < 1e-9);
+            // The diagonal between its triangles is within.
+            assert_eq!(face.boundary().len(), 4);
         }
         std::fs::write(&path, "{}").unwrap();
         let message = FoundFace::read(&path).unwrap_err().to_string();

@@ -95,16 +95,31 @@ impl Entities {
     pub fn spline(&mut self, spline: &Spline) -> String {
         let controls = clamped_controls(spline);
         let controls: Vec<String> = controls.iter().map(|point| self.point(point)).collect();
-        let pieces = spline.pieces();
-        let knots: Vec<String> = (0..=pieces).map(|knot| real(knot as f64)).collect();
-        let mut multiplicities = vec!["1"; pieces + 1];
-        (multiplicities[0], multiplicities[pieces]) = ("4", "4");
+        let [multiplicities, knots] = clamped_knots(spline.pieces());
         let closed = if spline.closed { ".T." } else { ".F." };
         self.add(&format!(
-            "B_SPLINE_CURVE_WITH_KNOTS('',3,({}),.UNSPECIFIED.,{closed},.F.,({}),({}),.UNSPECIFIED.)",
+            "B_SPLINE_CURVE_WITH_KNOTS('',3,({}),.UNSPECIFIED.,{closed},.F.,({multiplicities}),({knots}),.UNSPECIFIED.)",
             controls.join(","),
-            multiplicities.join(","),
-            knots.join(",")
+        ))
+    }
+
+    /// A bicubic B-spline with uniform knots that are repeated at the ends, by its rows of control
+    /// points.
+    pub fn spline_surface(&mut self, rows: &[Vec<Vector3<f64>>]) -> String {
+        let counts = [rows.len(), rows.first().map_or(0, Vec::len)];
+        let [of_rows, of_columns] = counts.map(|count| clamped_knots(count.saturating_sub(3)));
+        let row = |row: &Vec<Vector3<f64>>| {
+            let points: Vec<String> = row.iter().map(|point| self.point(point)).collect();
+            format!("({})", points.join(","))
+        };
+        let rows: Vec<String> = rows.iter().map(row).collect();
+        self.add(&format!(
+            "B_SPLINE_SURFACE_WITH_KNOTS('',3,3,({}),.UNSPECIFIED.,.F.,.F.,.F.,({}),({}),({}),({}),.UNSPECIFIED.)",
+            rows.join(","),
+            of_rows[0],
+            of_columns[0],
+            of_rows[1],
+            of_columns[1],
         ))
     }
 
@@ -178,6 +193,21 @@ pub(super) fn clamped_controls(spline: &Spline) -> Vec<Vector3<f64>> {
         }
         _ => spline.controls.clone(),
     }
+}
+
+/// The multiplicities of uniform knots for so many cubic pieces that are repeated at the ends, and the
+/// knots.
+fn clamped_knots(pieces: usize) -> [String; 2] {
+    let multiplicity = |knot: usize| {
+        if knot == 0 || knot == pieces {
+            "4"
+        } else {
+            "1"
+        }
+    };
+    let multiplicities: Vec<&str> = (0..=pieces).map(multiplicity).collect();
+    let knots: Vec<String> = (0..=pieces).map(|knot| real(knot as f64)).collect();
+    [multiplicities.join(","), knots.join(",")]
 }
 
 fn triple(point: &Vector3<f64>) -> String {

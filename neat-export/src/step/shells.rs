@@ -188,6 +188,10 @@ impl<'a> ShellWriter<'a> {
                 (surface, *convex)
             }
             Surface::Extruded { direction } => self.extruded(face, direction),
+            Surface::Patch { .. } => {
+                let rows = self.geometry.controls_of_patch(face).unwrap_or_default();
+                (self.step.spline_surface(&rows), true)
+            }
         }
     }
 

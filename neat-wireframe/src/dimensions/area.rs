@@ -9,8 +9,8 @@
 use super::Place;
 use crate::export::WireframeDocument;
 use crate::faces::{
-    Chain, CurveIndex, FINE, Face, Step, Surface, Unrolled, area_vector_of_spline, ends_of_arc,
-    goes_around, moments_of_wall, nearest_junctions,
+    Chain, CurveIndex, FINE, Face, PatchFace, Step, Surface, Unrolled, area_vector_of_spline,
+    ends_of_arc, goes_around, moments_of_wall, nearest_junctions,
 };
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Spline};
@@ -102,6 +102,7 @@ pub(super) fn value(document: &WireframeDocument, face: &Face, points: &[Vector3
         }
         Surface::Cylinder { .. } | Surface::Cone { .. } => unrolled(face, &pieces),
         Surface::Extruded { direction } => extruded(&direction, &pieces),
+        Surface::Patch { .. } => patch(face, &pieces),
     }
 }
 
@@ -217,6 +218,23 @@ fn extruded(direction: &Vector3<f64>, pieces: &[(bool, Piece)]) -> f64 {
         moments_of_wall(*rims, direction, &start)[0]
     };
     rims.first_chunk().map_or(0.0, area)
+}
+
+/// The area of a patch.
+fn patch(face: &Face, pieces: &[(bool, Piece)]) -> f64 {
+    let along: Vec<Vec<Vector3<f64>>> = (pieces.iter())
+        .map(|(reversed, piece)| {
+            let mut points = piece.points();
+            if *reversed {
+                points.reverse();
+            }
+            points
+        })
+        .collect();
+    let place = |step: &Step| face.steps().position(|other| other == step);
+    let points = |step: &Step| place(step).map(|k| along[k].clone()).unwrap_or_default();
+    let patch = PatchFace::new(face, points);
+    patch.map_or(0.0, |patch| patch.moments(&Vector3::zeros())[0])
 }
 
 fn round(axis: &Vector3<f64>, widens: bool, pieces: &[(bool, Piece)]) -> f64 {

@@ -2,7 +2,9 @@
 
 use super::{EdgeFields, ExportError, JunctionFields, check};
 use crate::Wireframe3d;
-use crate::faces::{Face, Shell, ends_of_arc, ends_of_spline, nearest_junctions, triangles};
+use crate::faces::{
+    Face, Shell, ends_of_arc, ends_of_spline, nearest_junctions, points_within, triangles,
+};
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Spline, file};
 use serde::{Deserialize, Serialize};
@@ -98,8 +100,20 @@ impl WireframeDocument {
 
     /// The graph with arcs and splines as chains of straight pieces, for what knows none: behind
     /// the junctions the points of one arc after the other and then of the splines, behind the
-    /// edges their pieces. They share no points; the ends of a closed one are one.
+    /// edges their pieces. They share no points; the ends of a closed one are one. Last come points
+    /// within patches, for [`Self::drawn_triangles`].
     pub fn drawn(&self) -> Wireframe3d {
+        let mut drawn = self.with_curves();
+        let chains = self.chains_between_junctions();
+        let (arcs, splines) = chains.split_at(self.arcs.len());
+        let chains = [arcs, splines];
+        let within = points_within(&self.shells, &self.edges, chains, &drawn.junctions);
+        drawn.junctions.extend(within);
+        drawn
+    }
+
+    /// [`Self::drawn`] without points within faces.
+    fn with_curves(&self) -> Wireframe3d {
         let mut drawn = self.wireframe();
         for (mut points, chain) in self.drawn_curves().zip(self.chains()) {
             if points.first() == points.last() {

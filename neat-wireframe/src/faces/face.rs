@@ -124,6 +124,7 @@ impl Face {
         };
         let has_shape = match self.surface {
             Surface::Extruded { .. } => self.rims().is_some(),
+            Surface::Patch { .. } => self.sides().is_some(),
             Surface::Plane { .. } | Surface::Cylinder { .. } | Surface::Cone { .. } => {
                 !self.loops.is_empty()
             }
@@ -132,6 +133,19 @@ impl Face {
             && has_shape
             && self.steps().all(exists)
             && (self.loops.iter()).all(|steps| is_closed(steps, wireframe, (arcs, splines)))
+    }
+
+    /// The four sides of a patch, of which some have no step; `None` of what has no such sides.
+    pub(crate) fn sides(&self) -> Option<[&[Step]; 4]> {
+        let (Surface::Patch { sides }, Some(steps)) = (self.surface, self.loops.first()) else {
+            return None;
+        };
+        let mut left = &steps[..];
+        let mut of_sides = [&steps[..0]; 4];
+        for (count, side) in sides.into_iter().zip(&mut of_sides) {
+            (*side, left) = left.split_at_checked(count)?;
+        }
+        left.is_empty().then_some(of_sides)
     }
 
     /// The steps of all loops.

@@ -8,6 +8,7 @@
 use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 use super::extrusion::{extrude, moments_of_wall};
 use super::face::{CurveIndex, Face, Shell, Step};
+use super::patch::PatchFace;
 use super::plane_fit::across;
 use super::quadrature::{GAUSS, place_and_derivative};
 use super::surface::Surface;
@@ -154,6 +155,7 @@ impl ShellGeometry {
             Surface::Plane { normal, .. } => normal.dot(&self.area_vector(face)),
             Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face)[0],
             Surface::Extruded { direction } => self.moments_of_wall(face, direction)[0],
+            Surface::Patch { .. } => self.moments_of_patch(face)[0],
         }
     }
 
@@ -166,6 +168,7 @@ impl ShellGeometry {
             }
             Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face)[1],
             Surface::Extruded { direction } => self.moments_of_wall(face, direction)[1],
+            Surface::Patch { .. } => self.moments_of_patch(face)[1],
         };
         shell.faces.iter().map(flux).sum::<f64>() / 3.0
     }
@@ -210,6 +213,23 @@ impl ShellGeometry {
         let loops: Vec<Chain> = face.loops.iter().map(chain).collect();
         let [area, flux] = surface.moments(&loops, &self.origin);
         [area.abs(), flux]
+    }
+
+    /// The bicubic B-spline of a patch, with uniform knots that are repeated at the ends: a row of control
+    /// points for each place along the first side. `None` of other faces.
+    pub fn controls_of_patch(&self, face: &Face) -> Option<Vec<Vec<Vector3<f64>>>> {
+        Some(self.patch(face)?.patch.rows())
+    }
+
+    /// The patch of a face, if it is one.
+    fn patch(&self, face: &Face) -> Option<PatchFace> {
+        PatchFace::new(face, |step| self.points(step, FINE))
+    }
+
+    /// Likewise of a patch.
+    fn moments_of_patch(&self, face: &Face) -> [f64; 2] {
+        let patch = self.patch(face);
+        patch.map_or([0.0, 0.0], |patch| patch.moments(&self.origin))
     }
 
     /// Likewise of a wall between two splines.
@@ -337,7 +357,7 @@ fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> C
     let (mut center, mut radius) = (arc.center, arc.radius);
     let plane = surfaces.iter().find_map(|surface| match surface {
         Surface::Plane { normal, offset } => Some((*normal, *offset)),
-        Surface::Cylinder { .. } | Surface::Cone { .. } | Surface::Extruded { .. } => None,
+        _ => None,
     });
     let axis = surfaces
         .iter()

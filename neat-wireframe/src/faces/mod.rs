@@ -43,9 +43,12 @@ mod curves;
 mod explained_planes;
 mod extrusion;
 mod face;
+mod free_faces;
 mod geometry;
 mod groups;
 mod min_cut;
+mod patch;
+mod patch_triangulation;
 mod plane_fit;
 mod plane_mesh;
 mod planes;
@@ -76,19 +79,22 @@ mod tests;
 pub use curves::MeasuredGraph;
 pub(crate) use curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 pub use face::{CurveIndex, Face, Shell, Step};
-pub(crate) use triangulation::triangles;
+pub(crate) use triangulation::{points_within, triangles};
 
 pub(crate) use extrusion::moments_of_wall;
 pub(crate) use geometry::{FINE, area_vector_of_spline, goes_around};
 pub use geometry::{ShellCurve, ShellGeometry};
+pub(crate) use patch::PatchFace;
 pub use surface::Surface;
 pub use surface_points::{SurfacePoint, surface_points};
 pub(crate) use unrolled::{Chain, Unrolled};
 
 use crate::ViewObservation;
 use curves::Curves;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use region::Region;
+use std::collections::BTreeSet;
 use visibility::Sightings;
 
 /// The shells of a wireframe, closed ones first.
@@ -114,16 +120,17 @@ pub fn find_shells(
     let sightings = Sightings::new(&curves, views);
     let (regions, against): (Vec<Option<Region>>, Vec<f64>) = (faces.par_iter())
         .map(|face| {
-            let of_steps = face.steps().filter_map(|step| curves.find(step.curve));
-            let outline: Vec<_> = of_steps.flat_map(|curve| curve.points.clone()).collect();
             let region = Region::new(&curves, face);
-            let against =
-                (region.as_ref()).map_or(f64::MAX, |region| sightings.against(region, &outline));
+            let against = (region.as_ref()).map_or(f64::MAX, |region| {
+                sightings.against(region, &outline(&curves, face))
+            });
             (region, against)
         })
         .unzip();
     let chosen = selection::select(&curves, &faces, &regions, &against);
-    let chosen = chosen.into_iter().map(|face| faces[face].clone()).collect();
+    let patches = patches(&curves, &faces, &regions, &chosen, &sightings);
+    let mut chosen: Vec<Face> = chosen.into_iter().map(|face| faces[face].clone()).collect();
+    chosen.extend(patches);
     let shells = shells::shells(graph, &curves, chosen, views);
     if points.is_empty() || views.is_empty() {
         return shells;
@@ -148,4 +155,42 @@ pub fn find_shells(
         ..shell
     }));
     shells
+}
+
+/// The patches between chosen faces that images do not speak against, that pass through none of these
+/// and on which hardly any other curve lies.
+fn patches(
+    curves: &Curves,
+    faces: &[Face],
+    regions: &[Option<Region>],
+    chosen: &[usize],
+    sightings: &Sightings,
+) -> Vec<Face> {
+    let beside: Vec<&Region> = (chosen.iter())
+        .filter_map(|face| regions[*face].as_ref())
+        .collect();
+    let chosen: Vec<&Face> = chosen.iter().map(|face| &faces[*face]).collect();
+    let found = free_faces::free_faces(curves, &chosen);
+    let of_faces = chosen.into_iter().chain(&found).flat_map(Face::steps);
+    let own: BTreeSet<CurveIndex> = of_faces.map(|step| step.curve).collect();
+    let is_possible = |face: &&Face| {
+        let Some(region) = Region::new(curves, face) else {
+            return false;
+        };
+        let Region::Patch { face: patch, .. } = &region else {
+            return false;
+        };
+        let area = patch.moments(&Vector3::zeros())[0];
+        sightings.against(&region, &outline(curves, face)) <= selection::MOST_AGAINST
+            && shells::is_mostly_free(curves, own.clone(), (&region, area))
+            && !(beside.iter())
+                .any(|other| region.passes_through(other) || other.passes_through(&region))
+    };
+    found.iter().filter(is_possible).cloned().collect()
+}
+
+/// The points along the boundary of a face.
+fn outline(curves: &Curves, face: &Face) -> Vec<Vector3<f64>> {
+    let of_steps = face.steps().filter_map(|step| curves.find(step.curve));
+    of_steps.flat_map(|curve| curve.points.clone()).collect()
 }

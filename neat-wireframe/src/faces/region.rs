@@ -3,11 +3,12 @@
 use super::cells::{closed_points, polygon_of};
 use super::curves::Curves;
 use super::face::{Face, Step};
+use super::patch::PatchFace;
 use super::plane_fit::PlaneFrame;
 use super::polygon::contains;
 use super::surface::Surface;
 use super::unrolled::{self, Chain, Unrolled};
-use super::walls::Wall;
+use super::walls::{Wall, hit};
 use nalgebra::{Vector2, Vector3};
 use std::f64::consts::TAU;
 
@@ -33,6 +34,11 @@ pub(super) enum Region {
     },
     /// Between two splines.
     Wall(Wall),
+    /// Through its boundary, with the triangles of a grid.
+    Patch {
+        face: PatchFace,
+        grid: Vec<[(Vector2<f64>, Vector3<f64>); 3]>,
+    },
 }
 
 impl Region {
@@ -54,6 +60,17 @@ impl Region {
                     [points(one)?, points(other)?],
                     direction,
                 )))
+            }
+            Surface::Patch { .. } => {
+                let points = |step: &Step| {
+                    let curve = curves.find(step.curve);
+                    curve
+                        .map(|curve| curve.points_along(step))
+                        .unwrap_or_default()
+                };
+                let face = PatchFace::new(face, points)?;
+                let grid = face.patch.grid();
+                Some(Self::Patch { face, grid })
             }
             round => {
                 let surface = Unrolled::new(&round)?;
@@ -80,6 +97,14 @@ impl Region {
                 on_face.map(|(t, _)| t).collect()
             }
             Self::Wall(wall) => wall.hits(origin, direction),
+            Self::Patch { face, grid } => {
+                let hit = |corners: &[(Vector2<f64>, Vector3<f64>); 3]| {
+                    let [a, b, c] = corners.map(|(place, _)| place);
+                    let (t, [x, y]) = hit(&corners.map(|(_, point)| point), origin, direction)?;
+                    face.contains(&(a + (b - a) * x + (c - a) * y)).then_some(t)
+                };
+                grid.iter().filter_map(hit).collect()
+            }
         }
     }
 
@@ -105,6 +130,10 @@ impl Region {
                 .iter()
                 .filter(|ends| passes(ends))
                 .count(),
+            Self::Patch { face, .. } => {
+                let on_line = |line: &usize| (lines_at(face, *line).iter()).any(passes);
+                (0..RULINGS).filter(on_line).count()
+            }
         };
         count > FEW_RULINGS
     }
@@ -132,6 +161,7 @@ impl Region {
             Self::Plane { frame, .. } => (frame.normal.dot(point) - frame.offset).abs(),
             Self::Round { surface, .. } => surface.distance(point),
             Self::Wall(wall) => wall.distance(point),
+            Self::Patch { face, .. } => (face.patch.point(&face.patch.place(point)) - point).norm(),
         }
     }
 
@@ -141,10 +171,28 @@ impl Region {
             Self::Plane { frame, .. } => frame.normal,
             Self::Round { surface, .. } => surface.outward(surface.place(point).x),
             Self::Wall(wall) => return wall.is_near(point, distance),
+            Self::Patch { face, .. } => {
+                let [u, v] = face.patch.tangents(&face.patch.place(point));
+                u.cross(&v).normalize()
+            }
         };
         let hits = self.hits(point, &toward);
         hits.iter().any(|t| t.abs() <= distance)
     }
+}
+
+/// Pieces of a line across a patch, all but its ends.
+fn lines_at(face: &PatchFace, line: usize) -> Vec<[Vector3<f64>; 2]> {
+    let across = (line as f64 + 0.5) / RULINGS as f64;
+    let places: Vec<Vector2<f64>> = (0..=RULINGS)
+        .map(|k| AT_END + (1.0 - 2.0 * AT_END) * k as f64 / RULINGS as f64)
+        .map(|along| Vector2::new(across, along))
+        .collect();
+    let pieces = places.windows(2).map(|ends| [ends[0], ends[1]]);
+    let on_face = pieces.filter(|ends| ends.iter().all(|place| face.contains(place)));
+    on_face
+        .map(|ends| ends.map(|place| face.patch.point(&place)))
+        .collect()
 }
 
 /// Pieces of one of so many rulings that are on a round face.

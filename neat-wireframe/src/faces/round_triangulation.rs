@@ -18,9 +18,9 @@ const SAME_ANGLE: f64 = 1e-9;
 
 /// A corner of a loop: the index of its point, and where that lies in the unrolled face.
 #[derive(Clone, Copy)]
-struct Corner {
-    index: usize,
-    place: Vector2<f64>,
+pub(super) struct Corner {
+    pub index: usize,
+    pub place: Vector2<f64>,
 }
 
 impl HasPosition for Corner {
@@ -32,7 +32,7 @@ impl HasPosition for Corner {
 }
 
 /// A closed chain of corners, each once.
-type Ring = Vec<Corner>;
+pub(super) type Ring = Vec<Corner>;
 
 /// Appends the triangles of a round face with these loops of points, each of them once. None, if
 /// they do not bound a part of the surface.
@@ -57,7 +57,7 @@ pub(super) fn cut_round(
     for corner in rings.iter_mut().flatten() {
         corner.place.y = TURN * (corner.place.y - low) / (high - low);
     }
-    for corners in between(&rings).unwrap_or_default() {
+    for corners in between(&rings, &[]).unwrap_or_default() {
         let [a, b, c] = corners;
         triangles.push(if convex { [a, b, c] } else { [a, c, b] });
     }
@@ -177,8 +177,9 @@ fn touches([from, to]: &[Vector2<f64>; 2], corner: &Vector2<f64>) -> bool {
     (SAME_ANGLE..1.0 - SAME_ANGLE).contains(&share) && beside <= SAME_ANGLE
 }
 
-/// The triangles between rings, counterclockwise; `None` if a corner has no coordinates.
-fn between(rings: &[Ring]) -> Option<Vec<[usize; 3]>> {
+/// The triangles between rings, counterclockwise, with more corners within; `None` if a corner has no
+/// coordinates.
+pub(super) fn between(rings: &[Ring], inner: &[Corner]) -> Option<Vec<[usize; 3]>> {
     let mut mesh: ConstrainedDelaunayTriangulation<Corner> =
         ConstrainedDelaunayTriangulation::new();
     for ring in rings {
@@ -191,6 +192,9 @@ fn between(rings: &[Ring]) -> Option<Vec<[usize; 3]>> {
                 mesh.add_constraint(*corner, next);
             }
         }
+    }
+    for corner in inner {
+        mesh.insert(*corner).ok()?;
     }
     // Whether a triangle is inside, by the sides of rings on the way to it: corners of a rim are all
     // but on a line.

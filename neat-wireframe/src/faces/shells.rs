@@ -144,32 +144,7 @@ fn leave_out_where_curves_are(
     curves: &Curves,
     geometry: &ShellGeometry,
 ) -> bool {
-    let own: BTreeSet<CurveIndex> = shell.curves().collect();
-    let bounding: Vec<&Curve> = (curves.all.iter())
-        .filter(|curve| own.contains(&curve.index))
-        .collect();
-    let bounds = Bounds::of(bounding.iter().flat_map(|curve| &curve.points));
-    let margin = MARGIN * bounds.extent();
-    let around = bounds.widened(margin);
-    let others: Vec<Other> = (curves.observed())
-        .filter(|curve| !own.contains(&curve.index))
-        .map(|curve| (curve.ends, &curve.points))
-        .chain(curves.loose.iter().map(|points| (None, points)))
-        .filter(|(_, points)| Bounds::of(*points).meets(&around))
-        .collect();
-    // Beside an edge of the shell another one may be that edge once more.
-    let apart = |point: &Vector3<f64>| {
-        (bounding.iter()).all(|curve| distance_to_chain(&curve.points, point) > margin)
-    };
-    let samples = |points: &[Vector3<f64>]| -> Vec<Vector3<f64>> {
-        let places = (0..POINTS).map(|k| (k as f64 + 0.5) / POINTS as f64);
-        let along = places.map(|place| point_along(points, place));
-        along.filter(apart).collect()
-    };
-    let samples: Vec<Vec<Vector3<f64>>> = others.iter().map(|(_, p)| samples(p)).collect();
-    let most = |of_curve: &Vec<Vector3<f64>>, holds: &dyn Fn(&Vector3<f64>) -> bool| {
-        2 * of_curve.iter().filter(|point| holds(point)).count() > POINTS
-    };
+    let others = OtherCurves::beside(curves, shell.curves().collect());
     let regions: Vec<Option<Region>> = (shell.faces.iter())
         .map(|face| Region::new(curves, face))
         .collect();
@@ -182,41 +157,95 @@ fn leave_out_where_curves_are(
             .flat_map(|region| region.hits(point, &ray));
         hits.filter(|t| *t > 0.0).count() % 2 == 1
     };
-    shell.closed = !samples.iter().any(|of_curve| most(of_curve, &within));
+    shell.closed = others.mostly(&within).next().is_none();
     let mut regions = regions.iter();
     let count = shell.faces.len();
     shell.faces.retain(|face| {
         let Some(Some(region)) = regions.next() else {
             return true;
         };
-        let on_face = |point: &Vector3<f64>| region.is_near(point, margin);
-        let on_face: Vec<Other> = (others.iter().zip(&samples))
-            .filter(|(_, samples)| most(samples, &on_face))
-            .map(|(other, _)| *other)
-            .collect();
-        shell.closed &= on_face.is_empty();
-        enclosed(&on_face) <= LITTLE * geometry.area(face).abs()
+        let on_face = others.enclosed_on(region);
+        shell.closed &= on_face.is_none();
+        on_face.is_none_or(|enclosed| enclosed <= LITTLE * geometry.area(face).abs())
     });
     shell.faces.len() < count
+}
+
+/// Whether other curves than those of some faces take no more than a little of a face of this area.
+pub(super) fn is_mostly_free(
+    curves: &Curves,
+    own: BTreeSet<CurveIndex>,
+    (region, area): (&Region, f64),
+) -> bool {
+    let enclosed = OtherCurves::beside(curves, own).enclosed_on(region);
+    enclosed.is_none_or(|enclosed| enclosed <= LITTLE * area)
 }
 
 /// A curve with the junctions at its ends, and points along it.
 type Other<'a> = (Option<[usize; 2]>, &'a Vec<Vector3<f64>>);
 
-/// The area that curves on a face may enclose: a square around each of those that hang together, as
-/// one line alone does not say how wide that is of which it is a rim.
-fn enclosed(on_face: &[Other]) -> f64 {
-    let mut joined: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (place, (ends, _)) in on_face.iter().enumerate() {
-        for end in ends.iter().flatten() {
-            joined.entry(*end).or_default().push(place);
+/// Curves that bound none of some faces, near these.
+struct OtherCurves<'a> {
+    /// Each with samples of it that are not beside curves of the faces: there it may be one of them
+    /// once more.
+    curves: Vec<(Other<'a>, Vec<Vector3<f64>>)>,
+    margin: f64,
+}
+
+impl<'a> OtherCurves<'a> {
+    /// `own`: the curves of the faces.
+    fn beside(curves: &'a Curves, own: BTreeSet<CurveIndex>) -> Self {
+        let bounding: Vec<&Curve> = (curves.all.iter())
+            .filter(|curve| own.contains(&curve.index))
+            .collect();
+        let bounds = Bounds::of(bounding.iter().flat_map(|curve| &curve.points));
+        let margin = MARGIN * bounds.extent();
+        let around = bounds.widened(margin);
+        let others = (curves.observed())
+            .filter(|curve| !own.contains(&curve.index))
+            .map(|curve| (curve.ends, &curve.points))
+            .chain(curves.loose.iter().map(|points| (None, points)))
+            .filter(|(_, points)| Bounds::of(*points).meets(&around));
+        let apart = |point: &Vector3<f64>| {
+            (bounding.iter()).all(|curve| distance_to_chain(&curve.points, point) > margin)
+        };
+        let samples = |points: &[Vector3<f64>]| -> Vec<Vector3<f64>> {
+            let places = (0..POINTS).map(|k| (k as f64 + 0.5) / POINTS as f64);
+            let along = places.map(|place| point_along(points, place));
+            along.filter(apart).collect()
+        };
+        Self {
+            curves: others.map(|other| (other, samples(other.1))).collect(),
+            margin,
         }
     }
-    let mut joined: Vec<Vec<usize>> = joined.into_values().collect();
-    joined.extend((0..on_face.len()).map(|place| vec![place]));
-    let square_around = |group: &Vec<usize>| {
-        let points = group.iter().flat_map(|place| on_face[*place].1);
-        Bounds::of(points).extent().powi(2)
-    };
-    groups(&joined).iter().map(square_around).sum()
+
+    /// Those of which most samples are such.
+    fn mostly(&self, holds: &dyn Fn(&Vector3<f64>) -> bool) -> impl Iterator<Item = Other<'a>> {
+        let most = |(_, samples): &&(Other, Vec<Vector3<f64>>)| {
+            2 * samples.iter().filter(|point| holds(point)).count() > POINTS
+        };
+        self.curves.iter().filter(most).map(|(other, _)| *other)
+    }
+
+    /// The area that those on a face may enclose: a square around each of those that hang together, as
+    /// one line alone does not say how wide that is of which it is a rim. `None` without any.
+    fn enclosed_on(&self, region: &Region) -> Option<f64> {
+        let is_near = |point: &Vector3<f64>| region.is_near(point, self.margin);
+        let on_face: Vec<Other> = self.mostly(&is_near).collect();
+        let mut joined: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (place, (ends, _)) in on_face.iter().enumerate() {
+            for end in ends.iter().flatten() {
+                joined.entry(*end).or_default().push(place);
+            }
+        }
+        let mut joined: Vec<Vec<usize>> = joined.into_values().collect();
+        joined.extend((0..on_face.len()).map(|place| vec![place]));
+        let square_around = |group: &Vec<usize>| {
+            let points = group.iter().flat_map(|place| on_face[*place].1);
+            Bounds::of(points).extent().powi(2)
+        };
+        let enclosed = groups(&joined).iter().map(square_around).sum();
+        (!on_face.is_empty()).then_some(enclosed)
+    }
 }

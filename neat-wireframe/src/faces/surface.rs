@@ -43,11 +43,19 @@ pub enum Surface {
         /// Of length 1.
         direction: Vector3<f64>,
     },
+    /// A smooth surface through its boundary, where nothing simpler is: the bilinearly blended Coons
+    /// patch between the four sides of the first loop, bent so that it holds the others.
+    Patch {
+        /// How many steps of the first loop each side has, from the first one on. One that has none
+        /// is a point.
+        sides: [usize; 4],
+    },
 }
 
 impl Surface {
-    /// How far a point lies over the surface, always 0 for an extruded one; away from the axis of a round one whichever side its
-    /// normal points to, and the direction in which that grows.
+    /// How far a point lies over the surface, always 0 for one that its boundary says alone; away from
+    /// the axis of a round one whichever side its normal points to, and the direction in which that
+    /// grows.
     pub fn height_of(&self, at: &Vector3<f64>) -> (f64, Vector3<f64>) {
         let around = |offset: Vector3<f64>, axis: &Vector3<f64>| {
             let along = axis.dot(&offset);
@@ -57,7 +65,7 @@ impl Surface {
         };
         match self {
             Self::Plane { normal, offset } => (normal.dot(at) - offset, *normal),
-            Self::Extruded { .. } => (0.0, Vector3::zeros()),
+            Self::Extruded { .. } | Self::Patch { .. } => (0.0, Vector3::zeros()),
             Self::Cylinder {
                 point,
                 axis,
@@ -83,12 +91,13 @@ impl Surface {
         }
     }
 
-    /// The normal near a point; 0 of an extruded one.
+    /// The normal near a point; 0 where its boundary says it alone.
     pub(super) fn normal_at(&self, at: &Vector3<f64>) -> Vector3<f64> {
         let outward = self.height_of(at).1;
         match self {
             Self::Plane { .. }
             | Self::Extruded { .. }
+            | Self::Patch { .. }
             | Self::Cylinder { convex: true, .. }
             | Self::Cone { convex: true, .. } => outward,
             Self::Cylinder { .. } | Self::Cone { .. } => -outward,
@@ -98,7 +107,7 @@ impl Surface {
     /// A point of the axis and its direction; `None` of what has none.
     pub(super) fn axis(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         match self {
-            Self::Plane { .. } | Self::Extruded { .. } => None,
+            Self::Plane { .. } | Self::Extruded { .. } | Self::Patch { .. } => None,
             Self::Cylinder { point, axis, .. } => Some((*point, *axis)),
             Self::Cone { apex, axis, .. } => Some((*apex, *axis)),
         }
@@ -112,7 +121,7 @@ impl Surface {
         along: &Vector3<f64>,
     ) -> Option<[f64; 2]> {
         match self {
-            Self::Plane { .. } | Self::Extruded { .. } => None,
+            Self::Plane { .. } | Self::Extruded { .. } | Self::Patch { .. } => None,
             Self::Cylinder { radius, .. } => Some([*radius, 0.0]),
             Self::Cone {
                 apex,
@@ -134,6 +143,7 @@ impl Surface {
         match self {
             Self::Plane { normal, offset } => unit(normal) && offset.is_finite(),
             Self::Extruded { direction } => unit(direction),
+            Self::Patch { sides } => sides.iter().filter(|steps| **steps > 0).count() > 1,
             Self::Cylinder {
                 point,
                 axis,
@@ -187,6 +197,9 @@ impl Surface {
                 convex,
             },
             Self::Extruded { .. } => *self,
+            // In the mirror, its loop runs the other way around.
+            Self::Patch { .. } if scale < 0.0 => self.turned(),
+            Self::Patch { .. } => *self,
         }
     }
 
@@ -196,6 +209,8 @@ impl Surface {
         match &mut turned {
             Self::Plane { normal, offset } => (*normal, *offset) = (-*normal, -*offset),
             Self::Cylinder { convex, .. } | Self::Cone { convex, .. } => *convex = !*convex,
+            // Its loop runs the other way around.
+            Self::Patch { sides } => sides.reverse(),
             Self::Extruded { .. } => {}
         }
         turned

@@ -1,6 +1,8 @@
 //! Triangles of faces, for what knows no surfaces.
 
 use super::face::{CurveIndex, Face, Shell, Step};
+use super::patch::PatchFace;
+use super::patch_triangulation::{cut_patch, inner_places};
 use super::plane_fit::PlaneFrame;
 use super::round_triangulation::cut_round;
 use super::surface::Surface;
@@ -18,7 +20,7 @@ type Corner = (usize, Vector2<f64>);
 /// - `edges`: the junctions that each edge joins.
 /// - `chains`: for each arc, and for each spline, the points along it from the junction at its
 ///   start to that at its end; of a closed one the first comes once more.
-/// - `points`: what all are indices of.
+/// - `points`: what all are indices of, with [`points_within`] at their end.
 pub(crate) fn triangles(
     shells: &[Shell],
     edges: &[[usize; 2]],
@@ -33,6 +35,7 @@ pub(crate) fn triangles(
         }
         indices
     };
+    let mut first = points.len() - points_within(shells, edges, chains, points).len();
     let of_face = |face: &Face| {
         let mut triangles = Vec::new();
         match face.surface {
@@ -51,6 +54,10 @@ pub(crate) fn triangles(
                     strip([&one, &other], points, &direction, &mut triangles);
                 }
             }
+            Surface::Patch { .. } => {
+                let along = |step: &Step| indices_along(step, edges, chains);
+                first += cut_patch(face, along, points, first, &mut triangles);
+            }
             Surface::Cylinder { .. } | Surface::Cone { .. } => {
                 let loops: Vec<Vec<usize>> = face.loops.iter().map(around).collect();
                 cut_round(&face.surface, &loops, points, &mut triangles);
@@ -60,6 +67,24 @@ pub(crate) fn triangles(
     };
     let faces = shells.iter().flat_map(|shell| &shell.faces);
     faces.map(of_face).collect()
+}
+
+/// The points within patches, one patch after the other, by those along curves: what the triangles of
+/// faces need beside these.
+pub(crate) fn points_within(
+    shells: &[Shell],
+    edges: &[[usize; 2]],
+    chains: [&[Vec<usize>]; 2],
+    points: &[Vector3<f64>],
+) -> Vec<Vector3<f64>> {
+    let faces = shells.iter().flat_map(|shell| &shell.faces);
+    let along = |step: &Step| {
+        let indices = indices_along(step, edges, chains).into_iter();
+        indices.map(|index| points[index]).collect()
+    };
+    let patches = faces.filter_map(|face| PatchFace::new(face, along));
+    let places = patches.flat_map(|patch| inner_places(&patch));
+    places.map(|(_, point)| point).collect()
 }
 
 /// The points along a step of a loop, both ends among them.

@@ -178,16 +178,10 @@ impl Wall {
         }
     }
 
-    /// Where a ray hits it, by its parameter (Möller and Trumbore).
+    /// Where a ray hits it, by its parameter.
     pub fn hits(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> Vec<f64> {
-        let hit = |[a, b, c]: &[Vector3<f64>; 3]| {
-            let (u, v, offset) = (b - a, c - a, origin - a);
-            let (across, along) = (direction.cross(&v), offset.cross(&u));
-            let scale = 1.0 / u.dot(&across);
-            let [x, y] = [offset.dot(&across) * scale, direction.dot(&along) * scale];
-            (x >= 0.0 && y >= 0.0 && x + y <= 1.0).then(|| v.dot(&along) * scale)
-        };
-        self.triangles.iter().filter_map(hit).collect()
+        let hits = (self.triangles.iter()).filter_map(|corners| hit(corners, origin, direction));
+        hits.map(|(t, _)| t).collect()
     }
 
     /// So many straight lines from one rim to the other.
@@ -219,6 +213,20 @@ impl Wall {
         );
         (low..=high).contains(&self.direction.dot(point)) && self.distance(point) <= distance
     }
+}
+
+/// Where a ray hits a triangle, by its parameter, and how far along the sides from the first corner
+/// to the others that is (Möller and Trumbore).
+pub(super) fn hit(
+    [a, b, c]: &[Vector3<f64>; 3],
+    origin: &Vector3<f64>,
+    direction: &Vector3<f64>,
+) -> Option<(f64, [f64; 2])> {
+    let (u, v, offset) = (b - a, c - a, origin - a);
+    let (across, along) = (direction.cross(&v), offset.cross(&u));
+    let scale = 1.0 / u.dot(&across);
+    let [x, y] = [offset.dot(&across) * scale, direction.dot(&along) * scale];
+    (x >= 0.0 && y >= 0.0 && x + y <= 1.0).then(|| (v.dot(&along) * scale, [x, y]))
 }
 
 /// The point of a rim in this direction from a point of the other one.

@@ -1,0 +1,308 @@
+//! Faces that are no part of a plane, a cylinder or a cone: what is open between the others.
+//!
+//! Every curve of a solid has two faces. Where the curves that have one hang together in a loop, there
+//! is the boundary of a face, or of a hole in one: which of both, the smooth surface through the
+//! larger loop tells. A loop of straight edges alone is none: such faces are planes of which a part is
+//! missing.
+
+use super::cells::closed_points;
+use super::chain::point_along;
+use super::curves::{Curve, Curves};
+use super::face::{CurveIndex, Face, Step};
+use super::groups::groups;
+use super::patch::PatchFace;
+use super::plane_fit::PlaneFit;
+use super::polygon::signed_area;
+use super::surface::Surface;
+use nalgebra::Vector3;
+use std::collections::BTreeMap;
+
+/// Sides of a patch meet where its boundary turns by more than this: cosine of 10°.
+const CORNER: f64 = 0.985;
+/// A hole of a patch lies within so many standard deviations of an arc of the surface through its
+/// boundary, which knows less of its middle.
+const WITHIN: f64 = 3.0;
+/// Points of a loop that are asked whether they lie on a patch.
+const POINTS: usize = 32;
+
+/// The patches between faces.
+pub(super) fn free_faces(curves: &Curves, faces: &[&Face]) -> Vec<Face> {
+    let mut count: BTreeMap<CurveIndex, usize> = BTreeMap::new();
+    for step in faces.iter().flat_map(|face| face.steps()) {
+        *count.entry(step.curve).or_default() += 1;
+    }
+    let is_open = |curve: &&Curve| count.get(&curve.index) == Some(&1);
+    let (closed, open): (Vec<&Curve>, Vec<&Curve>) =
+        (curves.observed().filter(is_open)).partition(|curve| curve.ends.is_none());
+    let mut loops: Vec<Vec<Step>> = cycles(&open);
+    loops.extend(closed.iter().map(|curve| {
+        let (curve, reversed) = (curve.index, false);
+        vec![Step { curve, reversed }]
+    }));
+    let mut found: Vec<(usize, Face, PatchFace)> = (loops.iter().enumerate())
+        .filter_map(|(place, steps)| {
+            let face = patch_within(curves, steps)?;
+            let patch = patch_of(curves, &face)?;
+            Some((place, face, patch))
+        })
+        .collect();
+    // The largest first: what is a hole in it is no face.
+    found.sort_by(|a, b| {
+        let area = |patch: &PatchFace| patch.moments(&Vector3::zeros())[0];
+        area(&b.2).total_cmp(&area(&a.2)).then(a.0.cmp(&b.0))
+    });
+    let mut host: BTreeMap<usize, (f64, usize)> = BTreeMap::new();
+    for (place, _, patch) in &found {
+        if host.contains_key(place) {
+            continue;
+        }
+        for (other, steps) in loops.iter().enumerate().filter(|(other, _)| other != place) {
+            if let Some(off) = off_patch(curves, patch, steps)
+                && host.get(&other).is_none_or(|(least, _)| off < *least)
+            {
+                host.insert(other, (off, *place));
+            }
+        }
+    }
+    let with_holes = |(place, mut face, patch): (usize, Face, PatchFace)| {
+        for (hole, (_, of)) in &host {
+            if *of == place {
+                face.loops.push(clockwise(curves, &patch, &loops[*hole]));
+            }
+        }
+        face
+    };
+    let faces = found
+        .into_iter()
+        .filter(|(place, ..)| !host.contains_key(place));
+    faces.map(with_holes).collect()
+}
+
+/// Those curves in closed chains, at whose junctions no others are.
+fn cycles(open: &[&Curve]) -> Vec<Vec<Step>> {
+    let mut at: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (place, curve) in open.iter().enumerate() {
+        for end in curve.ends.iter().flatten() {
+            at.entry(*end).or_default().push(place);
+        }
+    }
+    let joined: Vec<Vec<usize>> = at.values().cloned().collect();
+    let is_cycle = |group: &Vec<usize>| {
+        let mut ends = group.iter().filter_map(|place| open[*place].ends).flatten();
+        group.len() > 1 && ends.all(|end| at[&end].len() == 2)
+    };
+    let around = |group: Vec<usize>| -> Vec<Step> {
+        let mut place = group[0];
+        let mut from = open[place].ends.map_or(0, |ends| ends[0]);
+        let mut steps = Vec::with_capacity(group.len());
+        for _ in &group {
+            let [start, end] = open[place].ends.unwrap_or_default();
+            let reversed = start != from;
+            steps.push(Step {
+                curve: open[place].index,
+                reversed,
+            });
+            from = if reversed { start } else { end };
+            place = at[&from]
+                .iter()
+                .copied()
+                .find(|other| *other != place)
+                .unwrap_or(place);
+        }
+        steps
+    };
+    groups(&joined)
+        .into_iter()
+        .filter(is_cycle)
+        .map(around)
+        .collect()
+}
+
+/// The patch whose boundary a loop is: with two to four corners, neither straight all around nor
+/// flat.
+fn patch_within(curves: &Curves, steps: &[Step]) -> Option<Face> {
+    let of_loop = || steps.iter().filter_map(|step| curves.find(step.curve));
+    if of_loop().all(Curve::is_straight) {
+        return None;
+    }
+    let measured = of_loop().flat_map(|curve| &curve.measured);
+    let fit = PlaneFit::through(measured.clone(), curves.extent)?;
+    let (normal, offset) = fit.solved()?.plane();
+    let off_plane = |point: &Vector3<f64>| (normal.dot(point) - offset).abs();
+    if measured
+        .map(|(point, _)| off_plane(point))
+        .fold(0.0, f64::max)
+        <= curves.arc_sigma()
+    {
+        return None;
+    }
+    let chains: Vec<Vec<Vector3<f64>>> = (steps.iter())
+        .map(|step| {
+            curves
+                .find(step.curve)
+                .map(|curve| curve.points_along(step))
+        })
+        .collect::<Option<_>>()?;
+    let turns = |place: &usize| {
+        let before = &chains[(place + steps.len() - 1) % steps.len()];
+        let (last, after) = (before.len() - 1, &chains[*place]);
+        let [along, onward] = [before[last] - before[last - 1], after[1] - after[0]];
+        along.normalize().dot(&onward.normalize()) < CORNER
+    };
+    let corners: Vec<usize> = (0..steps.len()).filter(turns).collect();
+    let first = *corners.first()?;
+    if !(2..=4).contains(&corners.len()) {
+        return None;
+    }
+    let mut steps = steps.to_vec();
+    steps.rotate_left(first);
+    let mut lengths = (corners.iter().zip(corners.iter().skip(1))).map(|(one, next)| next - one);
+    let mut sides = [0; 4];
+    // Two sides alone face each other.
+    let places: &[usize] = if corners.len() == 2 {
+        &[0, 2]
+    } else {
+        &[0, 1, 2, 3]
+    };
+    let last = corners.len() - 1;
+    for (k, place) in places.iter().take(corners.len()).enumerate() {
+        sides[*place] = match k == last {
+            true => steps.len() - (corners[last] - first),
+            false => lengths.next()?,
+        };
+    }
+    Some(Face {
+        surface: Surface::Patch { sides },
+        loops: vec![steps],
+    })
+}
+
+fn patch_of(curves: &Curves, face: &Face) -> Option<PatchFace> {
+    let points = |step: &Step| {
+        let curve = curves.find(step.curve);
+        curve
+            .map(|curve| curve.points_along(step))
+            .unwrap_or_default()
+    };
+    PatchFace::new(face, points)
+}
+
+/// How far a loop is off a patch, if it lies on it and within its boundary.
+fn off_patch(curves: &Curves, patch: &PatchFace, steps: &[Step]) -> Option<f64> {
+    let chain = closed_points(curves, steps);
+    let most = WITHIN * curves.arc_sigma();
+    let mut largest: f64 = 0.0;
+    for k in 0..POINTS {
+        let point = point_along(&chain, (k as f64 + 0.5) / POINTS as f64);
+        let place = patch.patch.place(&point);
+        largest = largest.max((patch.patch.point(&place) - point).norm());
+        let is_inside = place.iter().all(|share| *share > 0.0 && *share < 1.0);
+        if !is_inside || largest > most {
+            return None;
+        }
+    }
+    Some(largest)
+}
+
+/// A loop so that it has the rest of the patch on its left.
+fn clockwise(curves: &Curves, patch: &PatchFace, steps: &[Step]) -> Vec<Step> {
+    let places: Vec<_> = (closed_points(curves, steps).iter())
+        .map(|point| patch.patch.place(point))
+        .collect();
+    if signed_area(&places) < 0.0 {
+        return steps.to_vec();
+    }
+    steps.iter().rev().map(Step::turned).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::faces::{MeasuredGraph, Shell, ShellGeometry, find_shells};
+    use neat_core::{CircularArc, Wireframe3d};
+    use std::f64::consts::FRAC_PI_2;
+
+    /// From x = 2 to x = 0 in the plane at y, through the height of 1 + `rise` in between.
+    fn arc(rise: f64, y: f64) -> CircularArc {
+        let radius = (1.0 + rise * rise) / (2.0 * rise);
+        let half = (1.0 / radius).asin();
+        CircularArc {
+            center: Vector3::new(1.0, y, 1.0 + rise - radius),
+            axes: [Vector3::x(), Vector3::z()],
+            radius,
+            angles: [FRAC_PI_2 - half, FRAC_PI_2 + half],
+        }
+    }
+
+    /// A block of 2 by 1 by 1 whose top has these two arcs, or straight edges in place of them, with
+    /// one corner lifted.
+    fn block(arcs: &[CircularArc], lift: f64) -> (Wireframe3d, Vec<Shell>) {
+        let corner = |k: usize| {
+            let [x, y] = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]][k % 4];
+            Vector3::new(x, y, (k / 4) as f64)
+        };
+        let around = |first: usize| (0..4).map(move |k| [first + k, first + (k + 1) % 4]);
+        let mut edges: Vec<[usize; 2]> = around(0).chain((0..4).map(|k| [k, k + 4])).collect();
+        // The arcs are in place of the first and the third side.
+        let is_straight = |k: &usize| arcs.is_empty() || k % 2 == 1;
+        edges.extend(
+            around(4)
+                .enumerate()
+                .filter(|(k, _)| is_straight(k))
+                .map(|(_, e)| e),
+        );
+        let mut junctions: Vec<Vector3<f64>> = (0..8).map(corner).collect();
+        junctions[6].z += lift;
+        let wireframe = Wireframe3d { junctions, edges };
+        let graph = MeasuredGraph {
+            wireframe: &wireframe,
+            arcs,
+            splines: &[],
+            covariances: &[],
+        };
+        let shells = find_shells(&graph, &[], &[]);
+        (wireframe, shells)
+    }
+
+    fn patches(shells: &[Shell]) -> usize {
+        let faces = shells.iter().flat_map(|shell| &shell.faces);
+        let is_patch = |face: &&Face| matches!(face.surface, Surface::Patch { .. });
+        faces.filter(is_patch).count()
+    }
+
+    #[test]
+    fn a_loft_between_two_arcs_closes_a_block() {
+        let arcs = [arc(0.3, 0.0), arc(0.1, 1.0)];
+        let (wireframe, shells) = block(&arcs, 0.0);
+        let [shell] = &shells[..] else {
+            panic!("{} shells", shells.len());
+        };
+        assert!(shell.closed && shell.faces.len() == 6);
+        assert_eq!(patches(&shells), 1);
+        // Below straight lines from one arc to the other, at the same share of both.
+        let at = |u: f64, v: f64| {
+            let points = arcs.map(|arc| arc.point_at(arc.angles[1] - arc.sweep() * u));
+            points[0] * (1.0 - v) + points[1] * v
+        };
+        let count = 400;
+        let share = |k: usize| k as f64 / count as f64;
+        let below = |v: f64| -> f64 {
+            let ends = (0..count).map(|k| [at(share(k), v), at(share(k + 1), v)]);
+            ends.map(|[a, b]| 0.5 * (a.z + b.z) * (b.x - a.x)).sum()
+        };
+        let truth: f64 = (0..count)
+            .map(|k| below(share(k) + 0.5 / count as f64))
+            .sum::<f64>();
+        let geometry = ShellGeometry::new(shell, &wireframe, &arcs, &[]);
+        let volume = geometry.volume(shell) * count as f64;
+        assert!((volume / truth - 1.0).abs() < 1e-4, "{volume} {truth}");
+    }
+
+    #[test]
+    fn nothing_is_between_straight_edges_or_where_a_cylinder_is() {
+        let (_, shells) = block(&[], 0.3);
+        assert_eq!(patches(&shells), 0);
+        let (_, shells) = block(&[arc(0.3, 0.0), arc(0.3, 1.0)], 0.0);
+        assert!(patches(&shells) == 0 && shells[0].closed);
+    }
+}

@@ -1,0 +1,111 @@
+//! Triangles of patches: the Delaunay triangulation of their places, with those of a grid among them.
+
+use super::face::{Face, Step};
+use super::patch::PatchFace;
+use super::round_triangulation::{Corner, Ring, between};
+use nalgebra::{Vector2, Vector3};
+
+/// Cells along each side of the grid: as many as halves of the pieces of curves that turn by half a
+/// turn.
+const GRID: usize = 16;
+/// Places of the grid nearer to a hole than this share of a cell make slivers.
+const BESIDE: f64 = 0.3;
+
+/// The places of the grid within a patch, with the points there.
+pub(super) fn inner_places(face: &PatchFace) -> Vec<(Vector2<f64>, Vector3<f64>)> {
+    let places = (1..GRID).flat_map(|i| (1..GRID).map(move |j| [i, j]));
+    let places = places.map(|place| Vector2::from(place.map(|k| k as f64 / GRID as f64)));
+    let near = BESIDE / GRID as f64;
+    let is_free = |place: &Vector2<f64>| {
+        let sides = face.holes.iter().flat_map(|hole| hole.windows(2));
+        let mut distances = sides.map(|ends| {
+            let (along, offset) = (ends[1] - ends[0], place - ends[0]);
+            let share = (along.dot(&offset) / along.norm_squared()).clamp(0.0, 1.0);
+            (offset - along * share).norm()
+        });
+        face.contains(place) && distances.all(|distance| distance > near)
+    };
+    let free = places.filter(is_free);
+    free.map(|place| (place, face.patch.point(&place)))
+        .collect()
+}
+
+/// Appends the triangles of a patch; returns how many places it has within.
+///
+/// - `along`: the indices of the points along a step, both ends among them.
+/// - `first`: the index of the first of [`inner_places`].
+pub(super) fn cut_patch(
+    face: &Face,
+    along: impl Fn(&Step) -> Vec<usize>,
+    points: &[Vector3<f64>],
+    first: usize,
+    triangles: &mut Vec<[usize; 3]>,
+) -> usize {
+    let positions = |step: &Step| along(step).iter().map(|index| points[*index]).collect();
+    let (Some(patch), Some(sides)) = (PatchFace::new(face, positions), face.sides()) else {
+        return 0;
+    };
+    let chain = |steps: &[Step]| {
+        let mut indices: Vec<usize> = steps.iter().flat_map(&along).collect();
+        indices.dedup();
+        indices
+    };
+    let mut outer: Ring = Vec::new();
+    let mut end = sides
+        .iter()
+        .rev()
+        .find_map(|side| chain(side).last().copied());
+    for (side, steps) in sides.into_iter().enumerate() {
+        let mut indices = chain(steps);
+        match indices.pop() {
+            Some(last) => end = Some(last),
+            None => indices.extend(end),
+        }
+        let ends = [indices.clone(), Vec::from_iter(end)].concat();
+        let mut shares = vec![0.0];
+        for pair in ends.windows(2) {
+            let length = (points[pair[1]] - points[pair[0]]).norm();
+            shares.push(shares[shares.len() - 1] + length);
+        }
+        let whole = shares[shares.len() - 1];
+        let corners = indices.iter().zip(&shares).map(|(index, length)| {
+            let share = if whole > 0.0 { length / whole } else { 0.0 };
+            let place = match side {
+                0 => [share, 0.0],
+                1 => [1.0, share],
+                2 => [1.0 - share, 1.0],
+                _ => [0.0, 1.0 - share],
+            };
+            Corner {
+                index: *index,
+                place: Vector2::from(place),
+            }
+        });
+        outer.extend(corners);
+    }
+    let mut rings = vec![outer];
+    for (steps, places) in face.loops[1..].iter().zip(&patch.holes) {
+        let corners = chain(steps).into_iter().zip(places);
+        let corner = |(index, place): (usize, &Vector2<f64>)| Corner {
+            index,
+            place: *place,
+        };
+        let mut ring: Ring = corners.map(corner).collect();
+        if ring.len() > 1 && ring[0].index == ring[ring.len() - 1].index {
+            ring.pop();
+        }
+        rings.push(ring);
+    }
+    let inner = inner_places(&patch).into_iter().enumerate();
+    let inner: Vec<Corner> = inner
+        .map(|(k, (place, _))| Corner {
+            index: first + k,
+            place,
+        })
+        .collect();
+    let cut = between(&rings, &inner).unwrap_or_default().into_iter();
+    // At a side that is a point.
+    let is_flat = |[a, b, c]: &[usize; 3]| a == b || b == c || a == c;
+    triangles.extend(cut.filter(|corners| !is_flat(corners)));
+    inner.len()
+}
