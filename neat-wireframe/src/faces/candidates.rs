@@ -63,9 +63,7 @@ pub(super) fn candidates(curves: Curves) -> (Curves, Vec<Face>) {
     let round = rims(&curves).into_iter().chain(round_cells(&curves));
     let all = planar.into_iter().chain(round).chain(walls(&curves));
     for face in all.filter(is_seen) {
-        let mut boundary: Vec<CurveIndex> = face.steps().map(|step| step.curve).collect();
-        boundary.sort_unstable();
-        if known.insert(boundary) {
+        if known.insert(face.boundary()) {
             faces.push(face);
         }
     }

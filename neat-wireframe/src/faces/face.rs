@@ -153,6 +153,13 @@ impl Face {
         self.loops.iter().flatten()
     }
 
+    /// The curves of all loops, ascending: no two candidates have the same.
+    pub(super) fn boundary(&self) -> Vec<CurveIndex> {
+        let mut boundary: Vec<CurveIndex> = self.steps().map(|step| step.curve).collect();
+        boundary.sort_unstable();
+        boundary
+    }
+
     /// The two splines of a wall: the one along which it is to the left, and the one back. `None` if
     /// it is bounded otherwise.
     pub fn rims(&self) -> Option<[Step; 2]> {

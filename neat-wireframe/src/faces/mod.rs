@@ -7,8 +7,9 @@
 //! inferred (`rulings.rs`), and so is an edge that is missing where two planes meet
 //! (`creases.rs`). Images speak against a face through which they show what lies behind it
 //! (`visibility.rs`); among the others those are chosen that give the most edges two faces
-//! (`selection.rs`). What hangs together is a shell; it bounds a solid if each of its curves has a
-//! face on both sides (`shells.rs`).
+//! (`selection.rs`), and what is open between them may be a smooth patch (`free_faces.rs`). What hangs
+//! together is a shell; it bounds a solid if each of its curves has a face on both sides
+//! (`shells.rs`), and if images show the outlines of its round faces (`outlines.rs`).
 //!
 //! Where there are points of surfaces, planes are found that explain edges and points together
 //! (`explained_planes.rs`), and the parts of them that points say are surface (`sheets.rs`), also
@@ -47,6 +48,7 @@ mod free_faces;
 mod geometry;
 mod groups;
 mod min_cut;
+mod outlines;
 mod patch;
 mod patch_triangulation;
 mod plane_fit;
@@ -92,6 +94,7 @@ pub(crate) use unrolled::{Chain, Unrolled};
 use crate::ViewObservation;
 use curves::Curves;
 use nalgebra::Vector3;
+use outlines::Outlines;
 use rayon::prelude::*;
 use region::Region;
 use std::collections::BTreeSet;
@@ -118,7 +121,7 @@ pub fn find_shells(
     let (curves, faces) = candidates::candidates(observed.with_inferred(inferred));
     let _span = tracing::debug_span!("find_shells", faces = faces.len()).entered();
     let sightings = Sightings::new(&curves, views);
-    let (regions, against): (Vec<Option<Region>>, Vec<f64>) = (faces.par_iter())
+    let (regions, mut against): (Vec<Option<Region>>, Vec<f64>) = (faces.par_iter())
         .map(|face| {
             let region = Region::new(&curves, face);
             let against = (region.as_ref()).map_or(f64::MAX, |region| {
@@ -127,11 +130,24 @@ pub fn find_shells(
             (region, against)
         })
         .unzip();
-    let chosen = selection::select(&curves, &faces, &regions, &against);
-    let patches = patches(&curves, &faces, &regions, &chosen, &sightings);
-    let mut chosen: Vec<Face> = chosen.into_iter().map(|face| faces[face].clone()).collect();
-    chosen.extend(patches);
-    let shells = shells::shells(graph, &curves, chosen, views);
+    let outlines = Outlines::new(views);
+    let shells = loop {
+        let chosen = selection::select(&curves, &faces, &regions, &against);
+        let patches = patches(&curves, &faces, &regions, &chosen, &sightings);
+        let mut chosen: Vec<Face> = chosen.into_iter().map(|face| faces[face].clone()).collect();
+        chosen.extend(patches);
+        let shells = shells::shells(graph, &curves, chosen, views);
+        let unseen = outlines.unseen(&curves, &shells);
+        if unseen.is_empty() {
+            break shells;
+        }
+        // Each of them was chosen, and will not be again.
+        for (face, against) in faces.iter().zip(&mut against) {
+            if unseen.contains(&face.boundary()) {
+                *against = f64::MAX;
+            }
+        }
+    };
     if points.is_empty() || views.is_empty() {
         return shells;
     }

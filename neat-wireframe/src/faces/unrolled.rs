@@ -117,6 +117,15 @@ impl Unrolled {
         })
     }
 
+    /// The angles at which the surface turns away from a point; `None` where all or nothing of it is seen
+    /// from there.
+    pub fn outline_angles(&self, from: &Vector3<f64>) -> Option<[f64; 2]> {
+        let place = self.place(from);
+        let flat = (from - self.origin) - self.axis * place.y;
+        let half = (self.radius_at(place.y) / flat.norm()).acos();
+        half.is_finite().then_some([place.x - half, place.x + half])
+    }
+
     /// Area of a face within loops, which end where they begin, and the flux through it of x from a
     /// point, away from the axis: by Gauss' theorem as integrals over the angle around it.
     pub fn moments(&self, loops: &[Chain], from: &Vector3<f64>) -> [f64; 2] {

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 /// Probability that 2D segments lie along a hidden curve nevertheless. At 0.02 and 0.1 the same
 /// shells close.
-const BY_CHANCE: f64 = 0.05;
+pub(super) const BY_CHANCE: f64 = 0.05;
 /// A segment shows a point of a curve if it passes so near, in pixels …
 const NEAR: f64 = 2.0;
 /// … in a direction that differs by a smaller sine.
@@ -28,7 +28,7 @@ const APART: f64 = 6.0;
 /// Points on each curve that are asked for.
 const SAMPLES: usize = 24;
 /// Their direction is that to a point so much farther on, by the length of the curve.
-const STEP: f64 = 0.01;
+pub(super) const STEP: f64 = 0.01;
 /// A curve is asked for in a view if so many of its points lie behind the face, alone.
 const MIN_SAMPLES: usize = 4;
 /// A curve lies behind a face if it is so far from its surface, by the extent of the wireframe.
@@ -196,7 +196,7 @@ fn samples(chains: &[&[Vector3<f64>]], view: &ViewObservation) -> Vec<Vec<Sample
 }
 
 /// Whether a segment passes a point of the image in this direction.
-fn is_shown(
+pub(super) fn is_shown(
     grid: &SegmentGrid,
     segments: &[LineSegment2],
     pixel: &Vector2<f64>,
