@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use neat_core::CircularArc;
 use neat_export::{EdgeFilter, ExportOptions, Format, export};
+use neat_wireframe::dimensions::Dimensions;
 use neat_wireframe::export::{WireframeDocument, read_json, write_json};
 use neat_wireframe::faces::{CurveIndex, MeasuredGraph, ShellGeometry, Surface, find_shells};
 use proptest::prelude::*;
@@ -155,6 +156,48 @@ fn shells_read_back_and_broken_ones_are_refused() {
     }
 }
 
+#[test]
+fn patches_with_odd_sides_are_refused_or_written_as_numbers() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("w.json");
+    let document = document("lofted.json");
+    write_json(&path, &document).unwrap();
+    assert_eq!(read_json(&path).unwrap(), document);
+    let text = fs::read_to_string(&path).unwrap();
+    let sound = "\"sides\":[1,1,1,1]";
+    assert!(text.contains(sound));
+    for broken in [
+        "[4,0,0,0]",
+        "[1,1,1,2]",
+        "[1,1,1,0]",
+        "[1,1,1]",
+        "[18446744073709551615,1,1,3]",
+    ] {
+        fs::write(&path, text.replace(sound, &format!("\"sides\":{broken}"))).unwrap();
+        assert!(read_json(&path).is_err(), "{broken}");
+    }
+    for odd in [
+        "[2,2,0,0]",
+        "[2,0,2,0]",
+        "[0,1,3,0]",
+        "[1,2,1,0]",
+        "[0,0,1,3]",
+    ] {
+        fs::write(&path, text.replace(sound, &format!("\"sides\":{odd}"))).unwrap();
+        let document = read_json(&path).unwrap();
+        let step = exported(&document, Format::Step, EdgeFilter::default());
+        assert!(!step.contains("NaN") && !step.contains("inf"), "{odd}");
+        let points = document.drawn().junctions;
+        assert!(points.iter().flatten().all(|x| x.is_finite()), "{odd}");
+        assert!(!document.drawn_triangles().is_empty());
+        assert!(
+            (Dimensions::new(&document, None).unwrap().areas().iter())
+                .all(|area| area.value.is_finite()),
+            "{odd}"
+        );
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     /// Surfaces of another program may have nothing to do with their curves.
@@ -289,6 +332,12 @@ fn a_loft_with_a_hole_is_a_patch() {
     assert_eq!(count(&step, "MANIFOLD_SOLID_BREP"), 1);
     assert_eq!(count(&step, "B_SPLINE_SURFACE_WITH_KNOTS"), 1);
     assert_watertight(&document);
+    // All of its faces have an area, the patch too.
+    let areas = Dimensions::new(&document, None).unwrap().areas();
+    assert_eq!(areas.len(), 10);
+    for (face, area) in shell.faces.iter().zip(&areas) {
+        assert!((area.value / geometry.area(face) - 1.0).abs() < 1e-4);
+    }
 }
 
 /// Every side has two triangles.

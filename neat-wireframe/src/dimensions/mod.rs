@@ -396,7 +396,14 @@ impl<'a> Dimensions<'a> {
         {
             return Err(DimensionError::Twice { what, index });
         }
-        for pair in self.places_of(quantity).chunks_exact(2) {
+        // Of what an area hangs on places do not come in pairs.
+        let is_area = matches!(quantity, Quantity::Area { .. });
+        let places = if is_area {
+            Vec::new()
+        } else {
+            self.places_of(quantity)
+        };
+        for pair in places.chunks_exact(2) {
             let [Place::Junction(a), Place::Junction(b)] = [pair[0], pair[1]] else {
                 continue;
             };
