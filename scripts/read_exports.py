@@ -177,7 +177,9 @@ def flux_of_patch(face, wireframe):
     steps, sides, count = list(first), [], 400
     for length in face["patch"]["sides"]:
         own, steps = steps[:length], steps[length:]
-        points = np.concatenate([points_of_step(step, wireframe) for step in own])
+        chains = [points_of_step(step, wireframe) for step in own]
+        # A side without steps is the point where the one before it ends.
+        points = np.concatenate(chains) if chains else np.repeat(sides[-1][-1:], 2, axis=0)
         lengths = np.cumsum(np.r_[0.0, np.linalg.norm(np.diff(points, axis=0), axis=1)])
         at = np.linspace(0.0, lengths[-1], count + 1)
         sides.append(np.stack([np.interp(at, lengths, points[:, k]) for k in range(3)], 1))

@@ -332,6 +332,10 @@ fn a_loft_with_a_hole_is_a_patch() {
     assert_eq!(count(&step, "MANIFOLD_SOLID_BREP"), 1);
     assert_eq!(count(&step, "B_SPLINE_SURFACE_WITH_KNOTS"), 1);
     assert_watertight(&document);
+    let points = document.drawn().junctions;
+    let flux = |[a, b, c]: [usize; 3]| points[a].dot(&points[b].cross(&points[c])) / 6.0;
+    let volume: f64 = document.drawn_triangles().into_iter().map(flux).sum();
+    assert!((volume / 1.982_808_58 - 1.0).abs() < 2e-3, "{volume}");
     // All of its faces have an area, the patch too.
     let areas = Dimensions::new(&document, None).unwrap().areas();
     assert_eq!(areas.len(), 10);

@@ -189,7 +189,9 @@ impl<'a> ShellWriter<'a> {
             }
             Surface::Extruded { direction } => self.extruded(face, direction),
             Surface::Patch { .. } => {
-                let rows = self.geometry.controls_of_patch(face).unwrap_or_default();
+                // Of one that has no numbers a point.
+                let rows = self.geometry.controls_of_patch(face);
+                let rows = rows.unwrap_or_else(|| vec![vec![points[0]; 4]; 4]);
                 (self.step.spline_surface(&rows), true)
             }
         }

@@ -16,6 +16,7 @@ use super::spline_fitting::{
 };
 use nalgebra::Vector3;
 use neat_core::Spline;
+use std::f64::consts::TAU;
 
 /// A curve leaves its arc by no more pixels at its ends than arcs of one edge lie beside each other.
 const DRIFT: f64 = 2.0 * BESIDE_IN_PIXELS;
@@ -23,7 +24,9 @@ const DRIFT: f64 = 2.0 * BESIDE_IN_PIXELS;
 const PARTS: usize = 16;
 /// An arc is the curve where images say this share of what they say where they say most, by length.
 const SHOWN: f64 = 0.5;
-/// Control points that are tried, and how many of them first.
+/// Junctions that are tried as each end, those nearest to that of the arc.
+const MOST_JUNCTIONS: usize = 4;
+/// Control points that are tried first, and then.
 const TRIED: usize = 5;
 const CONTROLS: std::ops::Range<usize> = 4..8;
 /// Reaches of the fits to edgels: the arc is far from the curve at its ends.
@@ -91,7 +94,10 @@ impl Images<'_> {
         let mut pairs = starts
             .iter()
             .flat_map(|from| stops.iter().map(move |to| ([*from, *to], TRIED)))
-            .filter(|([from, to], _)| to.0 > from.0);
+            .filter(|([from, to], _)| {
+                let is_again = from.1.is_some() && from.1 == to.1;
+                (0.0..TAU).contains(&(to.0 - from.0)) && !is_again
+            });
         let (_, ends, _) = best(&mut pairs)?;
         let (.., spline) = best(&mut CONTROLS.map(|controls| (ends, controls)))?;
         is_better(&spline).then_some(spline)
@@ -128,7 +134,12 @@ impl Images<'_> {
                 let is_there = (-window..=beyond + window).contains(&by);
                 is_there.then_some((shown[k] + by * sign, Some(*junction)))
             });
-            at_junctions.chain([(arc.angles[k], None)]).collect()
+            let mut ends: Vec<End> = at_junctions.collect();
+            let off = |end: &End| (end.0 - arc.angles[k]).abs();
+            ends.sort_by(|a, b| off(a).total_cmp(&off(b)));
+            ends.truncate(MOST_JUNCTIONS);
+            ends.push((arc.angles[k], None));
+            ends
         })
     }
 

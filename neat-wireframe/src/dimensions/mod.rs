@@ -283,6 +283,10 @@ impl<'a> Dimensions<'a> {
         points: &[Vector3<f64>],
         of: &dyn Fn(&[Vector3<f64>]) -> Vector3<f64>,
     ) -> Option<f64> {
+        // Slopes cost more than it takes to see that they are of no use.
+        if places.iter().any(|place| self.covariance(*place).is_none()) {
+            return None;
+        }
         let step = STEP * self.extent;
         let mut sum = Matrix3::zeros();
         let mut slopes_of_centers = BTreeMap::new();

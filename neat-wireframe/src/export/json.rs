@@ -3,7 +3,7 @@
 use super::{EdgeFields, ExportError, JunctionFields, check};
 use crate::Wireframe3d;
 use crate::faces::{
-    Face, Shell, ends_of_arc, ends_of_spline, nearest_junctions, points_within, triangles,
+    Face, Shell, Surface, ends_of_arc, ends_of_spline, nearest_junctions, points_within, triangles,
 };
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Spline, file};
@@ -104,12 +104,20 @@ impl WireframeDocument {
     /// within patches, for [`Self::drawn_triangles`].
     pub fn drawn(&self) -> Wireframe3d {
         let mut drawn = self.with_curves();
+        if !self.has_patches() {
+            return drawn;
+        }
         let chains = self.chains_between_junctions();
         let (arcs, splines) = chains.split_at(self.arcs.len());
         let chains = [arcs, splines];
         let within = points_within(&self.shells, &self.edges, chains, &drawn.junctions);
         drawn.junctions.extend(within);
         drawn
+    }
+
+    fn has_patches(&self) -> bool {
+        let mut faces = self.shells.iter().flat_map(|shell| &shell.faces);
+        faces.any(|face| matches!(face.surface, Surface::Patch { .. }))
     }
 
     /// [`Self::drawn`] without points within faces.

@@ -40,6 +40,26 @@ impl Bounds {
     pub fn meets(&self, other: &Self) -> bool {
         self.low <= other.high && self.high >= other.low
     }
+
+    pub fn contain(&self, point: &Vector3<f64>) -> bool {
+        self.low <= *point && *point <= self.high
+    }
+
+    /// Whether a line through a point in a direction passes through the box.
+    pub fn are_hit(&self, origin: &Vector3<f64>, direction: &Vector3<f64>) -> bool {
+        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+        for k in 0..3 {
+            let (low, high) = (self.low[k] - origin[k], self.high[k] - origin[k]);
+            if direction[k] != 0.0 {
+                let ends = [low / direction[k], high / direction[k]];
+                from = from.max(ends[0].min(ends[1]));
+                to = to.min(ends[0].max(ends[1]));
+            } else if low > 0.0 || high < 0.0 {
+                return false;
+            }
+        }
+        from <= to
+    }
 }
 
 #[cfg(test)]
@@ -55,5 +75,14 @@ mod tests {
         assert!(line.meets(&unit) && unit.meets(&line) && !line.lies_in(&unit));
         assert!(unit.lies_in(&unit) && unit.lies_in(&unit.widened(0.1)));
         assert!((line.extent() - 4.0).abs() < 1e-12);
+        assert!(unit.contain(&Vector3::repeat(0.5)) && !unit.contain(&Vector3::new(0.5, 0.5, 2.0)));
+        let from = Vector3::new(-1.0, 0.5, 0.5);
+        assert!(
+            unit.are_hit(&from, &Vector3::x()) && unit.are_hit(&from, &Vector3::new(3.0, 1.0, 0.0))
+        );
+        assert!(
+            !unit.are_hit(&from, &Vector3::y())
+                && !unit.are_hit(&from, &Vector3::new(1.0, 1.0, 0.0))
+        );
     }
 }

@@ -99,12 +99,7 @@ pub(super) fn closed_points(curves: &Curves, steps: &[Step]) -> Vec<Vector3<f64>
     let mut points: Vec<Vector3<f64>> = Vec::new();
     for step in steps {
         points.pop();
-        points.extend(
-            curves
-                .find(step.curve)
-                .map(|curve| curve.points_along(step))
-                .unwrap_or_default(),
-        );
+        points.extend(curves.points_along(step));
     }
     if let [first, .., last] = &mut points[..] {
         *last = *first;

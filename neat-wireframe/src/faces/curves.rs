@@ -161,6 +161,12 @@ impl Curves {
         found.ok().map(|found| &self.all[found])
     }
 
+    /// The points along a step of a loop; none of a curve that is not among them.
+    pub fn points_along(&self, step: &Step) -> Vec<Vector3<f64>> {
+        let curve = self.find(step.curve);
+        curve.map_or_else(Vec::new, |curve| curve.points_along(step))
+    }
+
     /// What is added to the covariances of junctions.
     pub fn junction_floor(&self) -> Matrix3<f64> {
         Matrix3::identity() * self.junction_sigma().powi(2)

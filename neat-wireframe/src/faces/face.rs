@@ -22,8 +22,8 @@ pub struct Face {
     /// What it is a part of, with the side to which its normal points.
     #[serde(flatten)]
     pub surface: Surface,
-    /// Closed chains of curves, the outer one of a plane first; the others are holes. On what is
-    /// round one may be the outer one, or two run around the axis, and these come first. Seen from the
+    /// Closed chains of curves, the outer one of a plane or a patch first; the others are holes. On what
+    /// is round one may be the outer one, or two run around the axis, and these come first. Seen from the
     /// side to which the normal points, the face lies on the left of each.
     pub loops: Vec<Vec<Step>>,
 }

@@ -5,6 +5,7 @@
 //! larger loop tells. A loop of straight edges alone is none: such faces are planes of which a part is
 //! missing.
 
+use super::bounds::Bounds;
 use super::cells::closed_points;
 use super::chain::point_along;
 use super::curves::{Curve, Curves};
@@ -12,21 +13,39 @@ use super::face::{CurveIndex, Face, Step};
 use super::groups::groups;
 use super::patch::PatchFace;
 use super::plane_fit::PlaneFit;
-use super::polygon::signed_area;
+use super::polygon::{contains, signed_area};
+use super::region::Region;
 use super::surface::Surface;
-use nalgebra::Vector3;
-use std::collections::BTreeMap;
+use nalgebra::{Vector2, Vector3};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Sides of a patch meet where its boundary turns by more than this: cosine of 10°.
 const CORNER: f64 = 0.985;
+/// The direction of a curve at its end is that from so much of its length to there.
+const NEAR_END: f64 = 0.05;
 /// A hole of a patch lies within so many standard deviations of an arc of the surface through its
 /// boundary, which knows less of its middle.
 const WITHIN: f64 = 3.0;
 /// Points of a loop that are asked whether they lie on a patch.
 const POINTS: usize = 32;
 
-/// The patches between faces.
-pub(super) fn free_faces(curves: &Curves, faces: &[&Face]) -> Vec<Face> {
+/// A loop that may be the boundary of a patch.
+struct Candidate {
+    /// Its place among the loops.
+    place: usize,
+    face: Face,
+    area: f64,
+    /// The loops that lie on it, each with how far it is off and the places of its points.
+    on_it: BTreeMap<usize, (f64, Vec<Vector2<f64>>)>,
+}
+
+/// The patches between faces, the largest first, that are possible and pass through none before them.
+pub(super) fn free_faces(
+    curves: &Curves,
+    faces: &[&Face],
+    is_possible: impl Fn(&Face, &Region) -> bool,
+) -> Vec<Face> {
     let mut count: BTreeMap<CurveIndex, usize> = BTreeMap::new();
     for step in faces.iter().flat_map(|face| face.steps()) {
         *count.entry(step.curve).or_default() += 1;
@@ -39,43 +58,75 @@ pub(super) fn free_faces(curves: &Curves, faces: &[&Face]) -> Vec<Face> {
         let (curve, reversed) = (curve.index, false);
         vec![Step { curve, reversed }]
     }));
-    let mut found: Vec<(usize, Face, PatchFace)> = (loops.iter().enumerate())
-        .filter_map(|(place, steps)| {
-            let face = patch_within(curves, steps)?;
-            let patch = patch_of(curves, &face)?;
-            Some((place, face, patch))
-        })
-        .collect();
-    // The largest first: what is a hole in it is no face.
-    found.sort_by(|a, b| {
-        let area = |patch: &PatchFace| patch.moments(&Vector3::zeros())[0];
-        area(&b.2).total_cmp(&area(&a.2)).then(a.0.cmp(&b.0))
-    });
-    let mut host: BTreeMap<usize, (f64, usize)> = BTreeMap::new();
-    for (place, _, patch) in &found {
-        if host.contains_key(place) {
+    let mut left: Vec<Candidate> = candidates(curves, &loops);
+    // What is a hole in a larger one is no face.
+    left.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.place.cmp(&b.place)));
+    left.reverse();
+    let mut taken: BTreeSet<usize> = BTreeSet::new();
+    let mut accepted: Vec<(Face, Region)> = Vec::new();
+    while let Some(candidate) = left.pop() {
+        if taken.contains(&candidate.place) {
             continue;
         }
-        for (other, steps) in loops.iter().enumerate().filter(|(other, _)| other != place) {
-            if let Some(off) = off_patch(curves, patch, steps)
-                && host.get(&other).is_none_or(|(least, _)| off < *least)
-            {
-                host.insert(other, (off, *place));
-            }
+        let Candidate {
+            place, mut face, ..
+        } = candidate;
+        let is_nearest = |(hole, (off, _)): &(&usize, &(f64, Vec<Vector2<f64>>))| {
+            let mut others = left.iter().filter_map(|other| other.on_it.get(hole));
+            !taken.contains(*hole) && !others.any(|(other, _)| other < off)
+        };
+        let holes: Vec<(&usize, &(f64, Vec<Vector2<f64>>))> =
+            candidate.on_it.iter().filter(is_nearest).collect();
+        // Of loops in each other the outermost are its holes.
+        let is_inner = |(hole, (_, places)): &(&usize, &(f64, Vec<Vector2<f64>>))| {
+            let mut others = holes.iter().filter(|(other, _)| other != hole);
+            others.any(|(_, (_, around))| contains(around, &places[0]))
+        };
+        let outermost: Vec<_> = holes.iter().filter(|hole| !is_inner(hole)).collect();
+        for (hole, (_, places)) in &outermost {
+            face.loops.push(clockwise(&loops[**hole], places));
+        }
+        let Some(region) = Region::new(curves, &face) else {
+            continue;
+        };
+        let meets = |(_, other): &(Face, Region)| {
+            region.passes_through(other) || other.passes_through(&region)
+        };
+        if is_possible(&face, &region) && !accepted.iter().any(meets) {
+            taken.insert(place);
+            taken.extend(outermost.iter().map(|(hole, _)| **hole));
+            accepted.push((face, region));
         }
     }
-    let with_holes = |(place, mut face, patch): (usize, Face, PatchFace)| {
-        for (hole, (_, of)) in &host {
-            if *of == place {
-                face.loops.push(clockwise(curves, &patch, &loops[*hole]));
-            }
-        }
-        face
+    accepted.into_iter().map(|(face, _)| face).collect()
+}
+
+/// The patches within loops, with the loops on each.
+fn candidates(curves: &Curves, loops: &[Vec<Step>]) -> Vec<Candidate> {
+    let chains: Vec<Vec<Vector3<f64>>> = loops
+        .iter()
+        .map(|steps| closed_points(curves, steps))
+        .collect();
+    let most = WITHIN * curves.arc_sigma();
+    let of_loop = |(place, steps): (usize, &Vec<Step>)| {
+        let face = patch_within(curves, steps)?;
+        let patch = PatchFace::new(&face, |step| curves.points_along(step))?;
+        let around = Bounds::of(&chains[place]).widened(most);
+        let others = chains
+            .iter()
+            .enumerate()
+            .filter(|(other, chain)| *other != place && Bounds::of(*chain).meets(&around));
+        let on_it =
+            others.filter_map(|(other, chain)| Some((other, off_patch(&patch, chain, most)?)));
+        Some(Candidate {
+            place,
+            on_it: on_it.collect(),
+            area: patch.moments(&Vector3::zeros())[0],
+            face,
+        })
     };
-    let faces = found
-        .into_iter()
-        .filter(|(place, ..)| !host.contains_key(place));
-    faces.map(with_holes).collect()
+    let indexed: Vec<(usize, &Vec<Step>)> = loops.iter().enumerate().collect();
+    indexed.into_par_iter().filter_map(of_loop).collect()
 }
 
 /// Those curves in closed chains, at whose junctions no others are.
@@ -137,16 +188,14 @@ fn patch_within(curves: &Curves, steps: &[Step]) -> Option<Face> {
         return None;
     }
     let chains: Vec<Vec<Vector3<f64>>> = (steps.iter())
-        .map(|step| {
-            curves
-                .find(step.curve)
-                .map(|curve| curve.points_along(step))
-        })
-        .collect::<Option<_>>()?;
+        .map(|step| curves.points_along(step))
+        .collect();
+    // Ends are at junctions, a little beside the curve.
     let turns = |place: &usize| {
         let before = &chains[(place + steps.len() - 1) % steps.len()];
-        let (last, after) = (before.len() - 1, &chains[*place]);
-        let [along, onward] = [before[last] - before[last - 1], after[1] - after[0]];
+        let after = &chains[*place];
+        let along = before[before.len() - 1] - point_along(before, 1.0 - NEAR_END);
+        let onward = point_along(after, NEAR_END) - after[0];
         along.normalize().dot(&onward.normalize()) < CORNER
     };
     let corners: Vec<usize> = (0..steps.len()).filter(turns).collect();
@@ -177,39 +226,31 @@ fn patch_within(curves: &Curves, steps: &[Step]) -> Option<Face> {
     })
 }
 
-fn patch_of(curves: &Curves, face: &Face) -> Option<PatchFace> {
-    let points = |step: &Step| {
-        let curve = curves.find(step.curve);
-        curve
-            .map(|curve| curve.points_along(step))
-            .unwrap_or_default()
-    };
-    PatchFace::new(face, points)
-}
-
-/// How far a loop is off a patch, if it lies on it and within its boundary.
-fn off_patch(curves: &Curves, patch: &PatchFace, steps: &[Step]) -> Option<f64> {
-    let chain = closed_points(curves, steps);
-    let most = WITHIN * curves.arc_sigma();
+/// How far a loop is off a patch, and the places of its points, if it lies on it and within its
+/// boundary.
+fn off_patch(
+    patch: &PatchFace,
+    chain: &[Vector3<f64>],
+    most: f64,
+) -> Option<(f64, Vec<Vector2<f64>>)> {
     let mut largest: f64 = 0.0;
+    let mut places = Vec::with_capacity(POINTS);
     for k in 0..POINTS {
-        let point = point_along(&chain, (k as f64 + 0.5) / POINTS as f64);
+        let point = point_along(chain, (k as f64 + 0.5) / POINTS as f64);
         let place = patch.patch.place(&point);
         largest = largest.max((patch.patch.point(&place) - point).norm());
         let is_inside = place.iter().all(|share| *share > 0.0 && *share < 1.0);
         if !is_inside || largest > most {
             return None;
         }
+        places.push(place);
     }
-    Some(largest)
+    Some((largest, places))
 }
 
-/// A loop so that it has the rest of the patch on its left.
-fn clockwise(curves: &Curves, patch: &PatchFace, steps: &[Step]) -> Vec<Step> {
-    let places: Vec<_> = (closed_points(curves, steps).iter())
-        .map(|point| patch.patch.place(point))
-        .collect();
-    if signed_area(&places) < 0.0 {
+/// A loop so that it has the rest of the patch on its left; `places` are those along it.
+fn clockwise(steps: &[Step], places: &[Vector2<f64>]) -> Vec<Step> {
+    if signed_area(places) < 0.0 {
         return steps.to_vec();
     }
     steps.iter().rev().map(Step::turned).collect()
@@ -295,6 +336,13 @@ mod tests {
             .sum::<f64>();
         let geometry = ShellGeometry::new(shell, &wireframe, &arcs, &[]);
         let volume = geometry.volume(shell) * count as f64;
+        assert!((volume / truth - 1.0).abs() < 1e-4, "{volume} {truth}");
+        // In the mirror as well.
+        let mirrored = |point: &Vector3<f64>| -point;
+        let turned = arcs.map(|arc| arc.map(mirrored));
+        let shell = shell.map(mirrored);
+        let geometry = ShellGeometry::new(&shell, &wireframe.map(|point| -point), &turned, &[]);
+        let volume = geometry.volume(&shell) * count as f64;
         assert!((volume / truth - 1.0).abs() < 1e-4, "{volume} {truth}");
     }
 

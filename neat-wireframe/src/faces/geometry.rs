@@ -226,13 +226,13 @@ impl ShellGeometry {
         PatchFace::new(face, |step| self.points(step, FINE))
     }
 
-    /// Likewise of a patch.
+    /// Area of a patch, and the flux of x through it.
     fn moments_of_patch(&self, face: &Face) -> [f64; 2] {
         let patch = self.patch(face);
         patch.map_or([0.0, 0.0], |patch| patch.moments(&self.origin))
     }
 
-    /// Likewise of a wall between two splines.
+    /// Area of a wall between two splines, and the flux of x through it.
     fn moments_of_wall(&self, face: &Face, direction: Vector3<f64>) -> [f64; 2] {
         let Some([one, other]) = face.rims() else {
             return [0.0, 0.0];
@@ -329,14 +329,15 @@ fn as_spline(arc: &CircularArc) -> Option<Spline> {
 }
 
 /// A spline where all surfaces are, from one vertex to the other if it is open. In planes its
-/// control points move; on what is round it needs more of them.
+/// control points move, and patches are where it is; on what is round it needs more of them.
 fn spline_on_surfaces(
     spline: &Spline,
     surfaces: &[Surface],
     ends: Option<[Vector3<f64>; 2]>,
 ) -> Spline {
-    let is_plane = |surface: &Surface| matches!(surface, Surface::Plane { .. });
-    let mut moved = if surfaces.iter().all(is_plane) {
+    let is_flat =
+        |surface: &Surface| matches!(surface, Surface::Plane { .. } | Surface::Patch { .. });
+    let mut moved = if surfaces.iter().all(is_flat) {
         spline.map(|point| on_surfaces(*point, surfaces))
     } else {
         let pieces = spline.pieces();

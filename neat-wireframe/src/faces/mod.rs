@@ -142,11 +142,17 @@ pub fn find_shells(
             break shells;
         }
         // Each of them was chosen, and will not be again.
+        let mut left_out = 0;
         for (face, against) in faces.iter().zip(&mut against) {
-            if unseen.contains(&face.boundary()) {
+            if *against < f64::MAX && unseen.contains(&face.boundary()) {
                 *against = f64::MAX;
+                left_out += 1;
             }
         }
+        assert!(
+            left_out > 0,
+            "find_shells: a face that was none of those asked"
+        );
     };
     if points.is_empty() || views.is_empty() {
         return shells;
@@ -186,23 +192,19 @@ fn patches(
         .filter_map(|face| regions[*face].as_ref())
         .collect();
     let chosen: Vec<&Face> = chosen.iter().map(|face| &faces[*face]).collect();
-    let found = free_faces::free_faces(curves, &chosen);
-    let of_faces = chosen.into_iter().chain(&found).flat_map(Face::steps);
-    let own: BTreeSet<CurveIndex> = of_faces.map(|step| step.curve).collect();
-    let is_possible = |face: &&Face| {
-        let Some(region) = Region::new(curves, face) else {
-            return false;
-        };
-        let Region::Patch { face: patch, .. } = &region else {
+    let of_faces = chosen.iter().flat_map(|face| face.steps());
+    let used: BTreeSet<CurveIndex> = of_faces.map(|step| step.curve).collect();
+    free_faces::free_faces(curves, &chosen, |face, region| {
+        let Region::Patch { face: patch, .. } = region else {
             return false;
         };
         let area = patch.moments(&Vector3::zeros())[0];
-        sightings.against(&region, &outline(curves, face)) <= selection::MOST_AGAINST
-            && shells::is_mostly_free(curves, own.clone(), (&region, area))
-            && !(beside.iter())
-                .any(|other| region.passes_through(other) || other.passes_through(&region))
-    };
-    found.iter().filter(is_possible).cloned().collect()
+        let passes = |other: &&Region| region.passes_through(other) || other.passes_through(region);
+        patch.off <= curves.arc_sigma()
+            && sightings.against(region, &outline(curves, face)) <= selection::MOST_AGAINST
+            && shells::is_mostly_free(curves, face, &used, (region, area))
+            && !beside.iter().any(passes)
+    })
 }
 
 /// The points along the boundary of a face.

@@ -63,24 +63,26 @@ impl Outlines {
     /// The boundaries of faces of solids whose outlines images do not show.
     pub fn unseen(&self, curves: &Curves, shells: &[Shell]) -> BTreeSet<Vec<CurveIndex>> {
         let mut unseen = BTreeSet::new();
-        for shell in shells.iter().filter(|shell| shell.closed) {
-            let regions: Vec<Option<Region>> = (shell.faces.iter())
-                .map(|face| Region::new(curves, face))
-                .collect();
-            for (place, face) in shell.faces.iter().enumerate() {
-                let Some(region) = &regions[place] else {
-                    continue;
-                };
-                let others = regions.iter().enumerate();
-                let others = others.filter(|(other, _)| *other != place);
-                let others: Vec<&Region> = others.filter_map(|(_, other)| other.as_ref()).collect();
-                let [shown, asked] = self.shown(face, region, &others);
-                let hidden = asked - shown;
-                let against = hidden as f64 * ((1.0 - BY_CHANCE) / (1.0 - SHOWN)).ln()
-                    - shown as f64 * (SHOWN / BY_CHANCE).ln();
-                if against > MOST_AGAINST {
-                    unseen.insert(face.boundary());
-                }
+        let faces: Vec<(&Shell, &Face)> = (shells.iter())
+            .flat_map(|shell| shell.faces.iter().map(move |face| (shell, face)))
+            .collect();
+        let regions: Vec<Option<Region>> = (faces.par_iter())
+            .map(|(_, face)| Region::new(curves, face))
+            .collect();
+        for (place, (shell, face)) in faces.iter().enumerate() {
+            let (true, Some(region)) = (shell.closed, &regions[place]) else {
+                continue;
+            };
+            // Other things may be in front, too.
+            let others = regions.iter().enumerate();
+            let others = others.filter(|(other, _)| *other != place);
+            let others: Vec<&Region> = others.filter_map(|(_, other)| other.as_ref()).collect();
+            let [shown, asked] = self.shown(face, region, &others);
+            let hidden = asked - shown;
+            let against = hidden as f64 * ((1.0 - BY_CHANCE) / (1.0 - SHOWN)).ln()
+                - shown as f64 * (SHOWN / BY_CHANCE).ln();
+            if against > MOST_AGAINST {
+                unseen.insert(face.boundary());
             }
         }
         unseen

@@ -1,7 +1,7 @@
 //! Triangles of patches: the Delaunay triangulation of their places, with those of a grid among them.
 
 use super::face::{Face, Step};
-use super::patch::PatchFace;
+use super::patch::{PatchFace, place_on_side};
 use super::round_triangulation::{Corner, Ring, between};
 use nalgebra::{Vector2, Vector3};
 
@@ -70,27 +70,20 @@ pub(super) fn cut_patch(
         let whole = shares[shares.len() - 1];
         let corners = indices.iter().zip(&shares).map(|(index, length)| {
             let share = if whole > 0.0 { length / whole } else { 0.0 };
-            let place = match side {
-                0 => [share, 0.0],
-                1 => [1.0, share],
-                2 => [1.0 - share, 1.0],
-                _ => [0.0, 1.0 - share],
-            };
             Corner {
                 index: *index,
-                place: Vector2::from(place),
+                place: place_on_side(side, share),
             }
         });
         outer.extend(corners);
     }
     let mut rings = vec![outer];
-    for (steps, places) in face.loops[1..].iter().zip(&patch.holes) {
-        let corners = chain(steps).into_iter().zip(places);
-        let corner = |(index, place): (usize, &Vector2<f64>)| Corner {
+    for steps in &face.loops[1..] {
+        let corner = |index: usize| Corner {
             index,
-            place: *place,
+            place: patch.patch.place(&points[index]),
         };
-        let mut ring: Ring = corners.map(corner).collect();
+        let mut ring: Ring = chain(steps).into_iter().map(corner).collect();
         if ring.len() > 1 && ring[0].index == ring[ring.len() - 1].index {
             ring.pop();
         }

@@ -1,5 +1,6 @@
 //! Where a face lies in space: what a ray hits.
 
+use super::bounds::Bounds;
 use super::cells::{closed_points, polygon_of};
 use super::curves::Curves;
 use super::face::{Face, Step};
@@ -38,6 +39,7 @@ pub(super) enum Region {
     Patch {
         face: PatchFace,
         grid: Vec<[(Vector2<f64>, Vector3<f64>); 3]>,
+        bounds: Bounds,
     },
 }
 
@@ -62,15 +64,11 @@ impl Region {
                 )))
             }
             Surface::Patch { .. } => {
-                let points = |step: &Step| {
-                    let curve = curves.find(step.curve);
-                    curve
-                        .map(|curve| curve.points_along(step))
-                        .unwrap_or_default()
-                };
-                let face = PatchFace::new(face, points)?;
+                let face = PatchFace::new(face, |step| curves.points_along(step))?;
                 let grid = face.patch.grid();
-                Some(Self::Patch { face, grid })
+                let corners: Vec<Vector3<f64>> = grid.iter().flatten().map(|(_, p)| *p).collect();
+                let bounds = Bounds::of(&corners);
+                Some(Self::Patch { face, grid, bounds })
             }
             round => {
                 let surface = Unrolled::new(&round)?;
@@ -97,7 +95,10 @@ impl Region {
                 on_face.map(|(t, _)| t).collect()
             }
             Self::Wall(wall) => wall.hits(origin, direction),
-            Self::Patch { face, grid } => {
+            Self::Patch { face, grid, bounds } => {
+                if !bounds.are_hit(origin, direction) {
+                    return Vec::new();
+                }
                 let hit = |corners: &[(Vector2<f64>, Vector3<f64>); 3]| {
                     let [a, b, c] = corners.map(|(place, _)| place);
                     let (t, [x, y]) = hit(&corners.map(|(_, point)| point), origin, direction)?;
@@ -171,6 +172,7 @@ impl Region {
             Self::Plane { frame, .. } => frame.normal,
             Self::Round { surface, .. } => surface.outward(surface.place(point).x),
             Self::Wall(wall) => return wall.is_near(point, distance),
+            Self::Patch { bounds, .. } if !bounds.widened(distance).contain(point) => return false,
             Self::Patch { face, .. } => {
                 let [u, v] = face.patch.tangents(&face.patch.place(point));
                 u.cross(&v).normalize()

@@ -144,7 +144,8 @@ fn leave_out_where_curves_are(
     curves: &Curves,
     geometry: &ShellGeometry,
 ) -> bool {
-    let others = OtherCurves::beside(curves, shell.curves().collect());
+    let own: BTreeSet<CurveIndex> = shell.curves().collect();
+    let others = OtherCurves::beside(curves, &own, &own);
     let regions: Vec<Option<Region>> = (shell.faces.iter())
         .map(|face| Region::new(curves, face))
         .collect();
@@ -171,13 +172,16 @@ fn leave_out_where_curves_are(
     shell.faces.len() < count
 }
 
-/// Whether other curves than those of some faces take no more than a little of a face of this area.
+/// Whether curves that bound no face take no more than a little of a face of this area; `used` are
+/// those that do.
 pub(super) fn is_mostly_free(
     curves: &Curves,
-    own: BTreeSet<CurveIndex>,
+    face: &Face,
+    used: &BTreeSet<CurveIndex>,
     (region, area): (&Region, f64),
 ) -> bool {
-    let enclosed = OtherCurves::beside(curves, own).enclosed_on(region);
+    let own: BTreeSet<CurveIndex> = face.steps().map(|step| step.curve).collect();
+    let enclosed = OtherCurves::beside(curves, &own, used).enclosed_on(region);
     enclosed.is_none_or(|enclosed| enclosed <= LITTLE * area)
 }
 
@@ -193,8 +197,8 @@ struct OtherCurves<'a> {
 }
 
 impl<'a> OtherCurves<'a> {
-    /// `own`: the curves of the faces.
-    fn beside(curves: &'a Curves, own: BTreeSet<CurveIndex>) -> Self {
+    /// `own`: the curves of the faces; `used`: those that are no others, for whatever reason.
+    fn beside(curves: &'a Curves, own: &BTreeSet<CurveIndex>, used: &BTreeSet<CurveIndex>) -> Self {
         let bounding: Vec<&Curve> = (curves.all.iter())
             .filter(|curve| own.contains(&curve.index))
             .collect();
@@ -202,7 +206,7 @@ impl<'a> OtherCurves<'a> {
         let margin = MARGIN * bounds.extent();
         let around = bounds.widened(margin);
         let others = (curves.observed())
-            .filter(|curve| !own.contains(&curve.index))
+            .filter(|curve| !own.contains(&curve.index) && !used.contains(&curve.index))
             .map(|curve| (curve.ends, &curve.points))
             .chain(curves.loose.iter().map(|points| (None, points)))
             .filter(|(_, points)| Bounds::of(*points).meets(&around));
