@@ -30,14 +30,20 @@ const WITHIN: f64 = 3.0;
 /// Points of a loop that are asked whether they lie on a patch.
 const POINTS: usize = 32;
 
+/// A loop on a patch: how far it is off at most, and the places of its points.
+struct OnPatch {
+    off: f64,
+    places: Vec<Vector2<f64>>,
+}
+
 /// A loop that may be the boundary of a patch.
 struct Candidate {
     /// Its place among the loops.
     place: usize,
     face: Face,
     area: f64,
-    /// The loops that lie on it, each with how far it is off and the places of its points.
-    on_it: BTreeMap<usize, (f64, Vec<Vector2<f64>>)>,
+    /// The loops that lie on it.
+    on_it: BTreeMap<usize, OnPatch>,
 }
 
 /// The patches between faces, the largest first, that are possible and pass through none before them.
@@ -71,20 +77,19 @@ pub(super) fn free_faces(
         let Candidate {
             place, mut face, ..
         } = candidate;
-        let is_nearest = |(hole, (off, _)): &(&usize, &(f64, Vec<Vector2<f64>>))| {
+        let is_nearest = |(hole, on_it): &(&usize, &OnPatch)| {
             let mut others = left.iter().filter_map(|other| other.on_it.get(hole));
-            !taken.contains(*hole) && !others.any(|(other, _)| other < off)
+            !taken.contains(*hole) && !others.any(|other| other.off < on_it.off)
         };
-        let holes: Vec<(&usize, &(f64, Vec<Vector2<f64>>))> =
-            candidate.on_it.iter().filter(is_nearest).collect();
+        let holes: Vec<(&usize, &OnPatch)> = candidate.on_it.iter().filter(is_nearest).collect();
         // Of loops in each other the outermost are its holes.
-        let is_inner = |(hole, (_, places)): &(&usize, &(f64, Vec<Vector2<f64>>))| {
+        let is_inner = |(hole, on_it): &(&usize, &OnPatch)| {
             let mut others = holes.iter().filter(|(other, _)| other != hole);
-            others.any(|(_, (_, around))| contains(around, &places[0]))
+            others.any(|(_, around)| contains(&around.places, &on_it.places[0]))
         };
         let outermost: Vec<_> = holes.iter().filter(|hole| !is_inner(hole)).collect();
-        for (hole, (_, places)) in &outermost {
-            face.loops.push(clockwise(&loops[**hole], places));
+        for (hole, on_it) in &outermost {
+            face.loops.push(clockwise(&loops[**hole], &on_it.places));
         }
         let Some(region) = Region::new(curves, &face) else {
             continue;
@@ -117,7 +122,7 @@ fn candidates(curves: &Curves, loops: &[Vec<Step>]) -> Vec<Candidate> {
             .enumerate()
             .filter(|(other, chain)| *other != place && Bounds::of(*chain).meets(&around));
         let on_it =
-            others.filter_map(|(other, chain)| Some((other, off_patch(&patch, chain, most)?)));
+            others.filter_map(|(other, chain)| Some((other, on_patch(&patch, chain, most)?)));
         Some(Candidate {
             place,
             on_it: on_it.collect(),
@@ -226,13 +231,8 @@ fn patch_within(curves: &Curves, steps: &[Step]) -> Option<Face> {
     })
 }
 
-/// How far a loop is off a patch, and the places of its points, if it lies on it and within its
-/// boundary.
-fn off_patch(
-    patch: &PatchFace,
-    chain: &[Vector3<f64>],
-    most: f64,
-) -> Option<(f64, Vec<Vector2<f64>>)> {
+/// A loop on a patch, if it lies on it and within its boundary.
+fn on_patch(patch: &PatchFace, chain: &[Vector3<f64>], most: f64) -> Option<OnPatch> {
     let mut largest: f64 = 0.0;
     let mut places = Vec::with_capacity(POINTS);
     for k in 0..POINTS {
@@ -245,7 +245,10 @@ fn off_patch(
         }
         places.push(place);
     }
-    Some((largest, places))
+    Some(OnPatch {
+        off: largest,
+        places,
+    })
 }
 
 /// A loop so that it has the rest of the patch on its left; `places` are those along it.
