@@ -18,6 +18,8 @@ pub(crate) struct Payload<'a> {
     edges: &'a [[usize; 2]],
     /// Points along each arc, and behind them along each spline.
     arcs: Vec<Vec<Vector3<f64>>>,
+    /// Points within faces, for their triangles.
+    within: Vec<Vector3<f64>>,
     faces: Vec<FacePayload>,
     junction_fields: &'a JunctionFields,
     edge_fields: &'a EdgeFields,
@@ -37,8 +39,8 @@ pub(crate) struct Payload<'a> {
 struct FacePayload {
     /// That bound it, with those of its holes.
     edges: Vec<usize>,
-    /// Of the junctions, and behind them the points of the arcs and splines: the first of a closed
-    /// one once.
+    /// Of the junctions, and behind them the points of the arcs and splines, the first of a closed one
+    /// once, and those within faces.
     triangles: Vec<[usize; 3]>,
 }
 
@@ -95,6 +97,7 @@ impl<'a> Payload<'a> {
             junctions: &document.junctions,
             edges: &document.edges,
             arcs: document.drawn_curves().collect(),
+            within: document.points_within_faces(),
             faces: faces(document),
             junction_fields: &document.junction_fields,
             edge_fields: &document.edge_fields,

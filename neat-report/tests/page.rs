@@ -89,6 +89,28 @@ fn splines_are_drawn_behind_arcs() {
 }
 
 #[test]
+fn triangles_of_faces_have_their_corners() {
+    // A block whose top is drawn from one arc to another: the patch has points within.
+    let loft = include_str!("../../neat-export/tests/data/lofted.json");
+    let mut report = small_report();
+    report.document = serde_json::from_str(loft).unwrap();
+    report.document.edge_support = Vec::new();
+    let data = data_of(&report.render().unwrap());
+    let count = |key: &str| data[key].as_array().unwrap().len();
+    let of_arcs = data["arcs"].as_array().unwrap().iter();
+    let of_arcs: usize = of_arcs.map(|arc| arc.as_array().unwrap().len()).sum();
+    let corners = count("junctions") + of_arcs + count("within");
+    let faces = data["faces"].as_array().unwrap();
+    let triangles = faces
+        .iter()
+        .flat_map(|face| face["triangles"].as_array().unwrap());
+    let used = triangles.flat_map(|triangle| triangle.as_array().unwrap());
+    let last = used.map(|corner| corner.as_u64().unwrap() as usize).max();
+    assert!(count("within") > 100);
+    assert_eq!(last, Some(corners - 1));
+}
+
+#[test]
 fn nothing_is_fetched() {
     let page = small_report().render().unwrap();
     for forbidden in [

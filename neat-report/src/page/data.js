@@ -10,6 +10,7 @@ function readData() {
   data.toModel = toModel;
   data.points = data.junctions.map(toModel);
   data.arcs = data.arcs.map((points) => points.map(toModel));
+  data.within = data.within.map(toModel);
   data.faces = lightFaces(data);
   data.degrees = data.junctions.map(() => 0);
   for (const ends of data.edges) for (const end of ends) data.degrees[end]++;

@@ -104,15 +104,19 @@ impl WireframeDocument {
     /// within patches, for [`Self::drawn_triangles`].
     pub fn drawn(&self) -> Wireframe3d {
         let mut drawn = self.with_curves();
+        drawn.junctions.extend(self.points_within_faces());
+        drawn
+    }
+
+    /// The points within patches, which stand at the end of the junctions of [`Self::drawn`].
+    pub fn points_within_faces(&self) -> Vec<Vector3<f64>> {
         if !self.has_patches() {
-            return drawn;
+            return Vec::new();
         }
+        let points = self.with_curves().junctions;
         let chains = self.chains_between_junctions();
         let (arcs, splines) = chains.split_at(self.arcs.len());
-        let chains = [arcs, splines];
-        let within = points_within(&self.shells, &self.edges, chains, &drawn.junctions);
-        drawn.junctions.extend(within);
-        drawn
+        points_within(&self.shells, &self.edges, [arcs, splines], &points)
     }
 
     fn has_patches(&self) -> bool {
