@@ -9,17 +9,15 @@ use super::arc_ends::{MIN_RADIUS, OPEN_END};
 use super::arc_joints::wrapped;
 use super::circle_fitting::FoundArc;
 use super::corners::WINDOW_IN_PIXELS;
-use super::curves::BESIDE_IN_PIXELS;
 use super::edge_samples::Images;
 use super::spline_fitting::{
     COST, NUMBERS_OF_ARC, NUMBERS_OF_CONTROL, Points, gain_by_length, through_points,
 };
+use super::splines::DRIFT;
 use nalgebra::Vector3;
 use neat_core::Spline;
 use std::f64::consts::TAU;
 
-/// A curve leaves its arc by no more pixels at its ends than arcs of one edge lie beside each other.
-const DRIFT: f64 = 2.0 * BESIDE_IN_PIXELS;
 /// Parts of an arc of which each is asked how well images show it.
 const PARTS: usize = 16;
 /// An arc is the curve where images say this share of what they say where they say most, by length.

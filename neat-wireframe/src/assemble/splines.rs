@@ -24,7 +24,7 @@ use std::collections::BTreeSet;
 const GOES_ON: f64 = 0.866;
 /// Beside the end of one, the other is no farther away in pixels: both may have left the curve
 /// there by as much as arcs of one edge lie beside each other.
-const DRIFT: f64 = 2.0 * BESIDE_IN_PIXELS;
+pub(super) const DRIFT: f64 = 2.0 * BESIDE_IN_PIXELS;
 /// Overlapping arcs have at most this share of the shorter one in common, judged: those of the
 /// ellipses of `part-009` have up to .55.
 const MOST_COMMON: f64 = 0.75;
@@ -60,32 +60,29 @@ pub(super) fn take_splines(
     junctions: &[Vector3<f64>],
     arcs: &mut Vec<FoundArc>,
 ) -> Vec<Spline> {
+    let found = |arcs: Vec<usize>, pixel: f64, spline: Spline| Found {
+        arcs,
+        pixel,
+        gain: images.gain_of_spline(&spline, pixel, None),
+        spline,
+    };
     let of_chain = |chain: Chain| {
         let spline = images.spline_of(&chain, junctions, arcs)?;
         let pixel = chain.pixel(arcs);
         let of_chain = chain.arcs.into_iter().map(|(arc, _)| arc);
-        Some((of_chain.collect(), pixel, spline))
+        Some(found(of_chain.collect(), pixel, spline))
     };
-    let mut found: Vec<(Vec<usize>, f64, Spline)> = chains(images, junctions, arcs)
-        .into_par_iter()
-        .filter_map(of_chain)
-        .collect();
-    let taken: BTreeSet<usize> = found.iter().flat_map(|(arcs, ..)| arcs.clone()).collect();
     let of_arc = |arc: usize| {
         let spline = images.free_curve(&arcs[arc], junctions)?;
-        Some((vec![arc], arcs[arc].pixel, spline))
+        Some(found(vec![arc], arcs[arc].pixel, spline))
     };
+    let chains = chains(images, junctions, arcs).into_par_iter();
+    let of_chains: Vec<Found> = chains.filter_map(of_chain).collect();
+    let taken = arcs_of(&of_chains);
     let others = (0..arcs.len()).into_par_iter();
     let others = others.filter(|arc| !taken.contains(arc));
-    found.extend(others.filter_map(of_arc).collect::<Vec<_>>());
-    let mut found: Vec<Found> = (found.into_iter())
-        .map(|(arcs, pixel, spline)| Found {
-            arcs,
-            pixel,
-            gain: images.gain_of_spline(&spline, pixel, None),
-            spline,
-        })
-        .collect();
+    let mut found: Vec<Found> = others.filter_map(of_arc).collect();
+    found.splice(..0, of_chains);
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let mut edgels = images.nothing_taken();
     found.retain(|found| {
@@ -101,13 +98,21 @@ pub(super) fn take_splines(
         }
         is_own
     });
-    let taken: BTreeSet<usize> = found.iter().flat_map(|found| found.arcs.clone()).collect();
+    let taken = arcs_of(&found);
     let mut index = 0..arcs.len();
     arcs.retain(|_| index.next().is_none_or(|index| !taken.contains(&index)));
     if !found.is_empty() {
         arcs.retain(|arc| images.has_own(arc, &edgels));
     }
     found.into_iter().map(|found| found.spline).collect()
+}
+
+fn arcs_of(found: &[Found]) -> BTreeSet<usize> {
+    found
+        .iter()
+        .flat_map(|found| &found.arcs)
+        .copied()
+        .collect()
 }
 
 fn point_of(arcs: &[FoundArc], (arc, end): End) -> Vector3<f64> {

@@ -65,9 +65,8 @@ pub(super) fn free_faces(
         vec![Step { curve, reversed }]
     }));
     let mut left: Vec<Candidate> = candidates(curves, &loops);
-    // What is a hole in a larger one is no face.
-    left.sort_by(|a, b| b.area.total_cmp(&a.area).then(a.place.cmp(&b.place)));
-    left.reverse();
+    // The largest last, to be taken first: what is a hole in it is no face.
+    left.sort_by(|a, b| a.area.total_cmp(&b.area).then(b.place.cmp(&a.place)));
     let mut taken: BTreeSet<usize> = BTreeSet::new();
     let mut accepted: Vec<(Face, Region)> = Vec::new();
     while let Some(candidate) = left.pop() {

@@ -98,7 +98,7 @@ use outlines::Outlines;
 use rayon::prelude::*;
 use region::Region;
 use std::collections::BTreeSet;
-use visibility::Sightings;
+use visibility::{DetectedView, Sightings};
 
 /// The shells of a wireframe, closed ones first.
 ///
@@ -120,7 +120,8 @@ pub fn find_shells(
     inferred.extend(creases::facing_ends(&observed));
     let (curves, faces) = candidates::candidates(observed.with_inferred(inferred));
     let _span = tracing::debug_span!("find_shells", faces = faces.len()).entered();
-    let sightings = Sightings::new(&curves, views);
+    let detected = DetectedView::all(views);
+    let sightings = Sightings::new(&curves, &detected);
     let (regions, mut against): (Vec<Option<Region>>, Vec<f64>) = (faces.par_iter())
         .map(|face| {
             let region = Region::new(&curves, face);
@@ -130,7 +131,7 @@ pub fn find_shells(
             (region, against)
         })
         .unzip();
-    let outlines = Outlines::new(views);
+    let outlines = Outlines { views: &detected };
     let shells = loop {
         let chosen = selection::select(&curves, &faces, &regions, &against);
         let patches = patches(&curves, &faces, &regions, &chosen, &sightings);
@@ -209,6 +210,7 @@ fn patches(
 
 /// The points along the boundary of a face.
 fn outline(curves: &Curves, face: &Face) -> Vec<Vector3<f64>> {
-    let of_steps = face.steps().filter_map(|step| curves.find(step.curve));
-    of_steps.flat_map(|curve| curve.points.clone()).collect()
+    face.steps()
+        .flat_map(|step| curves.points_along(step))
+        .collect()
 }

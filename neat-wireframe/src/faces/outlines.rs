@@ -5,19 +5,13 @@
 //! solid hides the outlines of such a face, they are shown, each with a probability of [`SHOWN`]; if it
 //! is none, by chance.
 
-use super::chain::point_along;
 use super::curves::Curves;
 use super::face::{CurveIndex, Face, Shell};
 use super::region::Region;
 use super::selection::MOST_AGAINST;
 use super::surface::Surface;
-use super::unrolled::{self, Chain, Unrolled};
-use super::visibility::{BY_CHANCE, STEP, is_shown};
-use crate::ViewObservation;
-use crate::projection::project_in_front;
-use crate::segment_grid::SegmentGrid;
-use nalgebra::{Vector2, Vector3};
-use neat_core::{Camera, LineSegment2};
+use super::visibility::{BY_CHANCE, DetectedView};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -29,37 +23,12 @@ const SAMPLES: usize = 16;
 /// … and how many of them have to be in the image and hidden by no face, so that it is.
 const MIN_SAMPLES: usize = 8;
 
-/// One view with its segments.
-struct OutlineView {
-    camera: Camera,
-    segments: Vec<LineSegment2>,
-    grid: SegmentGrid,
-}
-
 /// The views that may show outlines.
-pub(super) struct Outlines {
-    views: Vec<OutlineView>,
+pub(super) struct Outlines<'a> {
+    pub views: &'a [DetectedView],
 }
 
-impl Outlines {
-    pub fn new(views: &[ViewObservation]) -> Self {
-        let usable = views
-            .par_iter()
-            .filter(|view| view.camera.validate().is_ok());
-        let views = usable.map(|view| {
-            let segments: Vec<LineSegment2> = view.segments.iter().map(|s| s.segment).collect();
-            let (width, height) = (view.camera.width, view.camera.height);
-            OutlineView {
-                camera: view.camera,
-                grid: SegmentGrid::new(&segments, width, height),
-                segments,
-            }
-        });
-        Self {
-            views: views.collect(),
-        }
-    }
-
+impl Outlines<'_> {
     /// The boundaries of faces of solids whose outlines images do not show.
     pub fn unseen(&self, curves: &Curves, shells: &[Shell]) -> BTreeSet<Vec<CurveIndex>> {
         let mut unseen = BTreeSet::new();
@@ -100,56 +69,33 @@ impl Outlines {
             return [0, 0];
         };
         let counts = self.views.par_iter().map(|view| {
-            let outlines = outlines(surface, loops, &view.camera.center_in_world);
-            let seen = outlines
-                .iter()
-                .filter_map(|outline| view.shows(outline, others));
-            let seen: Vec<bool> = seen.collect();
+            let angles = surface.outline_angles(&view.camera.center_in_world);
+            let angles = angles.into_iter().flatten();
+            let outlines = angles.flat_map(|angle| surface.pieces_at(loops, angle));
+            let seen: Vec<bool> = outlines
+                .filter_map(|outline| shows(view, &outline, others))
+                .collect();
             [seen.iter().filter(|shown| **shown).count(), seen.len()]
         });
         counts.reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]])
     }
 }
 
-/// The outlines of a round face as seen from a point.
-fn outlines(surface: &Unrolled, loops: &[Chain], center: &Vector3<f64>) -> Vec<[Vector3<f64>; 2]> {
-    let pieces = surface
-        .outline_angles(center)
-        .into_iter()
-        .flatten()
-        .flat_map(|angle| {
-            let heights = unrolled::crossings(loops, angle);
-            let point = move |height: f64| surface.point(&Vector2::new(angle, height));
-            let pieces: Vec<_> = (heights.chunks_exact(2))
-                .map(|ends| [point(ends[0]), point(ends[1])])
-                .collect();
-            pieces
-        });
-    pieces.collect()
-}
-
-impl OutlineView {
-    /// Whether segments lie along most of an outline; `None` where it is not seen.
-    fn shows(&self, outline: &[Vector3<f64>; 2], others: &[&Region]) -> Option<bool> {
-        let center = &self.camera.center_in_world;
-        let (mut asked, mut shown) = (0, 0);
-        for k in 0..SAMPLES {
-            let place = (k as f64 + 0.5) / SAMPLES as f64;
-            let [point, next] = [place, place + STEP].map(|place| point_along(outline, place));
-            let pixels = [point, next].map(|point| project_in_front(&self.camera, &point));
-            let [Some(pixel), Some(next)] = pixels else {
-                continue;
-            };
-            let inside = (0.0..f64::from(self.camera.width)).contains(&pixel.x)
-                && (0.0..f64::from(self.camera.height)).contains(&pixel.y);
-            if inside && !others.iter().any(|other| other.is_between(center, &point)) {
-                asked += 1;
-                let along = next - pixel;
-                shown += usize::from(is_shown(&self.grid, &self.segments, &pixel, &along));
-            }
+/// Whether segments of a view lie along most of an outline; `None` where it is not seen.
+fn shows(view: &DetectedView, outline: &[Vector3<f64>; 2], others: &[&Region]) -> Option<bool> {
+    let center = &view.camera.center_in_world;
+    let (mut asked, mut shown) = (0, 0);
+    for k in 0..SAMPLES {
+        let place = (k as f64 + 0.5) / SAMPLES as f64;
+        let Some((point, pixel, along)) = view.look_up(outline, place) else {
+            continue;
+        };
+        if !others.iter().any(|other| other.is_between(center, &point)) {
+            asked += 1;
+            shown += usize::from(view.is_shown(&pixel, &along));
         }
-        (asked >= MIN_SAMPLES).then_some(2 * shown >= asked)
     }
+    (asked >= MIN_SAMPLES).then_some(2 * shown >= asked)
 }
 
 #[cfg(test)]

@@ -210,6 +210,11 @@ impl Patch {
         place
     }
 
+    /// The distance of a point from the nearest place.
+    pub fn distance(&self, point: &Vector3<f64>) -> f64 {
+        (self.point(&self.place(point)) - point).norm()
+    }
+
     /// The integrals of the area and of the flux of x from a point over what is within loops of
     /// places, which are 1 to the left of it: by Gauss' theorem as integrals around it.
     fn integrals(&self, chain: &[Vector2<f64>], from: &Vector3<f64>) -> [f64; 2] {
@@ -254,12 +259,8 @@ impl Patch {
 
     /// Triangles of a grid, by their places.
     pub fn grid(&self) -> Vec<[(Vector2<f64>, Vector3<f64>); 3]> {
-        let corner = |i: usize, j: usize| {
-            let place = Vector2::new(i as f64, j as f64) / GRID as f64;
-            (place, self.point(&place))
-        };
-        let corners: Vec<_> = (0..=GRID)
-            .flat_map(|i| (0..=GRID).map(move |j| corner(i, j)))
+        let corners: Vec<_> = grid_places(GRID)
+            .map(|place| (place, self.point(&place)))
             .collect();
         let at = |i: usize, j: usize| corners[i * (GRID + 1) + j];
         let cells = (0..GRID * GRID).map(|k| (k / GRID, k % GRID));
@@ -294,15 +295,7 @@ impl PatchFace {
             chain.dedup();
             chain
         };
-        let mut sides = face.sides()?.map(chain);
-        // A side without steps is where the one before it ends; the first one where the loop does.
-        let mut end = *sides.iter().rev().find_map(|side| side.last())?;
-        for side in &mut sides {
-            match side.last() {
-                Some(last) => end = *last,
-                None => side.push(end),
-            }
-        }
+        let sides = with_points(face.sides()?.map(chain))?;
         let holes: Vec<Vec<Vector3<f64>>> =
             face.loops[1..].iter().map(|steps| chain(steps)).collect();
         // Straight pieces have points at their ends alone.
@@ -335,9 +328,7 @@ impl PatchFace {
             .iter()
             .enumerate()
             .map(|(k, side)| patch.off_side(k, side));
-        let of_holes = on_it
-            .iter()
-            .map(|point| (patch.point(&patch.place(point)) - point).norm());
+        let of_holes = on_it.iter().map(|point| patch.distance(point));
         let off = of_sides.chain(of_holes).fold(0.0, f64::max);
         Some(Self { patch, holes, off })
     }
@@ -351,6 +342,19 @@ impl PatchFace {
     pub fn moments(&self, from: &Vector3<f64>) -> [f64; 2] {
         self.patch.moments(&self.holes, from)
     }
+}
+
+/// Four sides of which those without anything are the point where the one before them ends, the first
+/// one where the loop does; `None` if there is nothing at all.
+pub(super) fn with_points<T: Copy>(mut sides: [Vec<T>; 4]) -> Option<[Vec<T>; 4]> {
+    let mut end = *sides.iter().rev().find_map(|side| side.last())?;
+    for side in &mut sides {
+        match side.last() {
+            Some(last) => end = *last,
+            None => side.push(end),
+        }
+    }
+    Some(sides)
 }
 
 /// The place at a share of a side.

@@ -1,9 +1,10 @@
 //! Triangles of patches: the Delaunay triangulation of their places, with those of a grid among them.
 
 use super::face::{Face, Step};
-use super::patch::{PatchFace, place_on_side};
+use super::patch::{PatchFace, place_on_side, with_points};
 use super::round_triangulation::{Corner, Ring, between};
 use nalgebra::{Vector2, Vector3};
+use neat_core::LineSegment2;
 
 /// Cells along each side of the grid: as many as halves of the pieces of curves that turn by half a
 /// turn.
@@ -17,13 +18,9 @@ pub(super) fn inner_places(face: &PatchFace) -> Vec<(Vector2<f64>, Vector3<f64>)
     let places = places.map(|place| Vector2::from(place.map(|k| k as f64 / GRID as f64)));
     let near = BESIDE / GRID as f64;
     let is_free = |place: &Vector2<f64>| {
-        let sides = face.holes.iter().flat_map(|hole| hole.windows(2));
-        let mut distances = sides.map(|ends| {
-            let (along, offset) = (ends[1] - ends[0], place - ends[0]);
-            let share = (along.dot(&offset) / along.norm_squared()).clamp(0.0, 1.0);
-            (offset - along * share).norm()
-        });
-        face.contains(place) && distances.all(|distance| distance > near)
+        let mut sides = face.holes.iter().flat_map(|hole| hole.windows(2));
+        face.contains(place)
+            && sides.all(|ends| LineSegment2::new(ends[0], ends[1]).distance_to_point(place) > near)
     };
     let free = places.filter(is_free);
     free.map(|place| (place, face.patch.point(&place)))
@@ -50,32 +47,27 @@ pub(super) fn cut_patch(
         indices.dedup();
         indices
     };
+    let Some(sides) = with_points(sides.map(chain)) else {
+        return 0;
+    };
     let mut outer: Ring = Vec::new();
-    let mut end = sides
-        .iter()
-        .rev()
-        .find_map(|side| chain(side).last().copied());
-    for (side, steps) in sides.into_iter().enumerate() {
-        let mut indices = chain(steps);
-        match indices.pop() {
-            Some(last) => end = Some(last),
-            None => indices.extend(end),
-        }
-        let ends = [indices.clone(), Vec::from_iter(end)].concat();
-        let mut shares = vec![0.0];
-        for pair in ends.windows(2) {
+    for (side, indices) in sides.iter().enumerate() {
+        let mut lengths = vec![0.0];
+        for pair in indices.windows(2) {
             let length = (points[pair[1]] - points[pair[0]]).norm();
-            shares.push(shares[shares.len() - 1] + length);
+            lengths.push(lengths[lengths.len() - 1] + length);
         }
-        let whole = shares[shares.len() - 1];
-        let corners = indices.iter().zip(&shares).map(|(index, length)| {
+        let whole = lengths[lengths.len() - 1];
+        // The last one is the first of the next side, unless it is the only one.
+        let count = (indices.len() - 1).max(1);
+        let corners = indices[..count].iter().zip(&lengths);
+        outer.extend(corners.map(|(index, length)| {
             let share = if whole > 0.0 { length / whole } else { 0.0 };
             Corner {
                 index: *index,
                 place: place_on_side(side, share),
             }
-        });
-        outer.extend(corners);
+        }));
     }
     let mut rings = vec![outer];
     for steps in &face.loops[1..] {

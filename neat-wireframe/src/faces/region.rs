@@ -162,7 +162,7 @@ impl Region {
             Self::Plane { frame, .. } => (frame.normal.dot(point) - frame.offset).abs(),
             Self::Round { surface, .. } => surface.distance(point),
             Self::Wall(wall) => wall.distance(point),
-            Self::Patch { face, .. } => (face.patch.point(&face.patch.place(point)) - point).norm(),
+            Self::Patch { face, .. } => face.patch.distance(point),
         }
     }
 
@@ -210,10 +210,5 @@ fn rulings_at(surface: &Unrolled, loops: &[Chain], ruling: usize) -> Vec<[Vector
         ]
     };
     let angle = from + (to - from) * (ruling as f64 + 0.5) / RULINGS as f64;
-    let point = |height: f64| surface.point(&Vector2::new(angle, height));
-    let heights = unrolled::crossings(loops, angle);
-    let pieces = heights.chunks_exact(2);
-    pieces
-        .map(|ends| [point(ends[0]), point(ends[1])])
-        .collect()
+    surface.pieces_at(loops, angle)
 }

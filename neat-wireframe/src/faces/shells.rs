@@ -173,7 +173,7 @@ fn leave_out_where_curves_are(
 }
 
 /// Whether curves that bound no face take no more than a little of a face of this area; `used` are
-/// those that do.
+/// those that do, its own among them.
 pub(super) fn is_mostly_free(
     curves: &Curves,
     face: &Face,
@@ -197,7 +197,7 @@ struct OtherCurves<'a> {
 }
 
 impl<'a> OtherCurves<'a> {
-    /// `own`: the curves of the faces; `used`: those that are no others, for whatever reason.
+    /// `own`: the curves of the faces; `used`: these and more that are no others.
     fn beside(curves: &'a Curves, own: &BTreeSet<CurveIndex>, used: &BTreeSet<CurveIndex>) -> Self {
         let bounding: Vec<&Curve> = (curves.all.iter())
             .filter(|curve| own.contains(&curve.index))
@@ -206,7 +206,7 @@ impl<'a> OtherCurves<'a> {
         let margin = MARGIN * bounds.extent();
         let around = bounds.widened(margin);
         let others = (curves.observed())
-            .filter(|curve| !own.contains(&curve.index) && !used.contains(&curve.index))
+            .filter(|curve| !used.contains(&curve.index))
             .map(|curve| (curve.ends, &curve.points))
             .chain(curves.loose.iter().map(|points| (None, points)))
             .filter(|(_, points)| Bounds::of(*points).meets(&around));

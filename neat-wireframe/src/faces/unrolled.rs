@@ -117,6 +117,16 @@ impl Unrolled {
         })
     }
 
+    /// The pieces of the ruling at an angle that are within loops.
+    pub fn pieces_at(&self, loops: &[Chain], angle: f64) -> Vec<[Vector3<f64>; 2]> {
+        let point = |height: f64| self.point(&Vector2::new(angle, height));
+        let heights = crossings(loops, angle);
+        let pieces = heights.chunks_exact(2);
+        pieces
+            .map(|ends| [point(ends[0]), point(ends[1])])
+            .collect()
+    }
+
     /// The angles at which the surface turns away from a point; `None` where all or nothing of it is seen
     /// from there.
     pub fn outline_angles(&self, from: &Vector3<f64>) -> Option<[f64; 2]> {
@@ -166,7 +176,7 @@ pub(super) fn contains(loops: &[Chain], place: &Vector2<f64>) -> bool {
 }
 
 /// The heights at which loops pass an angle, ascending.
-pub(super) fn crossings(loops: &[Chain], angle: f64) -> Vec<f64> {
+fn crossings(loops: &[Chain], angle: f64) -> Vec<f64> {
     let mut heights: Vec<f64> = heights_at(loops, angle).collect();
     heights.sort_by(f64::total_cmp);
     heights

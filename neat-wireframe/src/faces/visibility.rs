@@ -28,11 +28,64 @@ const APART: f64 = 6.0;
 /// Points on each curve that are asked for.
 const SAMPLES: usize = 24;
 /// Their direction is that to a point so much farther on, by the length of the curve.
-pub(super) const STEP: f64 = 0.01;
+const STEP: f64 = 0.01;
 /// A curve is asked for in a view if so many of its points lie behind the face, alone.
 const MIN_SAMPLES: usize = 4;
 /// A curve lies behind a face if it is so far from its surface, by the extent of the wireframe.
 const BEHIND: f64 = 0.02;
+
+/// A view with its 2D segments.
+pub(super) struct DetectedView {
+    pub camera: Camera,
+    segments: Vec<LineSegment2>,
+    grid: SegmentGrid,
+}
+
+impl DetectedView {
+    /// Those with a usable camera.
+    pub fn all(views: &[ViewObservation]) -> Vec<Self> {
+        let usable = views
+            .par_iter()
+            .filter(|view| view.camera.validate().is_ok());
+        let detected = usable.map(|view| {
+            let segments: Vec<LineSegment2> = view.segments.iter().map(|s| s.segment).collect();
+            let (width, height) = (view.camera.width, view.camera.height);
+            Self {
+                camera: view.camera,
+                grid: SegmentGrid::new(&segments, width, height),
+                segments,
+            }
+        });
+        detected.collect()
+    }
+
+    /// The point at a share of a chain with its pixel and the direction in which the chain goes on
+    /// there; `None` outside of the image.
+    pub fn look_up(
+        &self,
+        chain: &[Vector3<f64>],
+        place: f64,
+    ) -> Option<(Vector3<f64>, Vector2<f64>, Vector2<f64>)> {
+        let [point, next] = [place, place + STEP].map(|place| point_along(chain, place));
+        let pixel = project_in_front(&self.camera, &point)?;
+        let next = project_in_front(&self.camera, &next)?;
+        let inside = (0.0..f64::from(self.camera.width)).contains(&pixel.x)
+            && (0.0..f64::from(self.camera.height)).contains(&pixel.y);
+        inside.then_some((point, pixel, next - pixel))
+    }
+
+    /// Whether a segment passes a point of the image in this direction.
+    pub fn is_shown(&self, pixel: &Vector2<f64>, along: &Vector2<f64>) -> bool {
+        let mut shown = false;
+        self.grid.for_each_near(pixel, NEAR, |index| {
+            let segment = &self.segments[index];
+            let direction = segment.end - segment.start;
+            shown |= segment.distance_to_point(pixel) <= NEAR
+                && direction.perp(along).abs() <= PARALLEL * direction.norm() * along.norm();
+        });
+        shown
+    }
+}
 
 /// A point of a curve in a view where no other curve is near.
 struct Sample {
@@ -54,14 +107,11 @@ pub(super) struct Sightings {
 }
 
 impl Sightings {
-    pub fn new(curves: &Curves, views: &[ViewObservation]) -> Self {
+    pub fn new(curves: &Curves, views: &[DetectedView]) -> Self {
         let chains: Vec<&[Vector3<f64>]> = (curves.observed().map(|curve| &curve.points[..]))
             .chain(curves.loose.iter().map(|points| &points[..]))
             .collect();
-        let usable = views
-            .par_iter()
-            .filter(|view| view.camera.validate().is_ok());
-        let in_view = |view: &ViewObservation| {
+        let in_view = |view: &DetectedView| {
             let samples = samples(&chains, view);
             let of_curves = samples
                 .into_iter()
@@ -76,7 +126,7 @@ impl Sightings {
             }
         };
         Self {
-            views: usable.map(in_view).collect(),
+            views: views.par_iter().map(in_view).collect(),
             behind: BEHIND * curves.extent,
         }
     }
@@ -152,10 +202,8 @@ pub(super) fn log_likelihood_ratio(seen: usize, asked: usize) -> f64 {
 }
 
 /// The points of each curve that the view shows or hides without doubt.
-fn samples(chains: &[&[Vector3<f64>]], view: &ViewObservation) -> Vec<Vec<Sample>> {
+fn samples(chains: &[&[Vector3<f64>]], view: &DetectedView) -> Vec<Vec<Sample>> {
     let camera = &view.camera;
-    let segments: Vec<LineSegment2> = view.segments.iter().map(|s| s.segment).collect();
-    let detected = SegmentGrid::new(&segments, camera.width, camera.height);
     let mut pieces = Vec::new();
     let mut owners = Vec::new();
     for (owner, chain) in chains.iter().enumerate() {
@@ -172,44 +220,21 @@ fn samples(chains: &[&[Vector3<f64>]], view: &ViewObservation) -> Vec<Vec<Sample
         let mut of_curve = Vec::new();
         for k in 0..SAMPLES {
             let place = (k as f64 + 0.5) / SAMPLES as f64;
-            let [point, next] = [place, place + STEP].map(|place| point_along(chain, place));
-            let (Some(pixel), Some(next)) = (
-                project_in_front(camera, &point),
-                project_in_front(camera, &next),
-            ) else {
+            let Some((point, pixel, along)) = view.look_up(chain, place) else {
                 continue;
             };
-            let inside = (0.0..f64::from(camera.width)).contains(&pixel.x)
-                && (0.0..f64::from(camera.height)).contains(&pixel.y);
-            let mut alone = inside;
+            let mut alone = true;
             projected.for_each_near(&pixel, APART, |piece| {
                 alone &= owners[piece] == curve || pieces[piece].distance_to_point(&pixel) > APART;
             });
             if alone {
-                let seen = is_shown(&detected, &segments, &pixel, &(next - pixel));
+                let seen = view.is_shown(&pixel, &along);
                 of_curve.push(Sample { point, pixel, seen });
             }
         }
         samples.push(of_curve);
     }
     samples
-}
-
-/// Whether a segment passes a point of the image in this direction.
-pub(super) fn is_shown(
-    grid: &SegmentGrid,
-    segments: &[LineSegment2],
-    pixel: &Vector2<f64>,
-    along: &Vector2<f64>,
-) -> bool {
-    let mut shown = false;
-    grid.for_each_near(pixel, NEAR, |index| {
-        let segment = &segments[index];
-        let direction = segment.end - segment.start;
-        shown |= segment.distance_to_point(pixel) <= NEAR
-            && direction.perp(along).abs() <= PARALLEL * direction.norm() * along.norm();
-    });
-    shown
 }
 
 #[cfg(test)]
