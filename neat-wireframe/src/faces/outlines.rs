@@ -15,8 +15,8 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
-/// Probability that 2D segments lie along an outline that is seen: the median of 31 cylinders and cones
-/// of solids on parts is .85, the least .5, and of two cones that are none it is 0 of 216.
+/// Probability that 2D segments lie along an outline that is seen: 22 cylinders and cones of right
+/// solids show .74 and more of theirs, a median of .92, on renderings; photographs may show less.
 const SHOWN: f64 = 0.8;
 /// Points along an outline that are asked for …
 const SAMPLES: usize = 16;
