@@ -118,6 +118,7 @@ fn with_edges(document: &WireframeDocument, passes: &[bool]) -> WireframeDocumen
     WireframeDocument {
         arcs: document.arcs.clone(),
         splines: document.splines.clone(),
+        domes: document.domes.clone(),
         shells: (document.shells.iter())
             .filter_map(|shell| shell.with_indices(new_edge, new_junction))
             .collect(),

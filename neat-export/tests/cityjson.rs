@@ -47,10 +47,8 @@ fn drawn_up() -> Wireframe3d {
 /// With the faces that are found in it.
 fn with_shells(wireframe: &Wireframe3d, covariances: &[Option<Matrix3<f64>>]) -> WireframeDocument {
     let graph = MeasuredGraph {
-        wireframe,
-        arcs: &[],
-        splines: &[],
         covariances,
+        ..MeasuredGraph::of(wireframe)
     };
     WireframeDocument {
         shells: find_shells(&graph, &[], &[]),

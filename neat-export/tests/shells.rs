@@ -30,10 +30,9 @@ fn exported(document: &WireframeDocument, format: Format, filter: EdgeFilter) ->
 fn add_shells(document: &mut WireframeDocument) {
     let wireframe = document.wireframe();
     let graph = MeasuredGraph {
-        wireframe: &wireframe,
         arcs: &document.arcs,
         splines: &document.splines,
-        covariances: &[],
+        ..MeasuredGraph::of(&wireframe)
     };
     document.shells = find_shells(&graph, &[], &[]);
 }
@@ -325,8 +324,7 @@ fn a_loft_with_a_hole_is_a_patch() {
     assert!(shell.closed && shell.faces.len() == 10);
     assert_eq!(found.shells, document.shells);
     // By another program, from what the two arcs say.
-    let (arcs, splines) = (&document.arcs, &document.splines);
-    let geometry = ShellGeometry::new(shell, &document.wireframe(), arcs, splines);
+    let geometry = ShellGeometry::new(shell, &document.graph(&document.wireframe()));
     assert!((geometry.volume(shell) / 1.982_808_58 - 1.0).abs() < 1e-4);
     let step = exported(&document, Format::Step, EdgeFilter::default());
     assert_eq!(count(&step, "MANIFOLD_SOLID_BREP"), 1);

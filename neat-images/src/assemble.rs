@@ -2,7 +2,7 @@
 
 use crate::distilled::{BackEndReport, Distilled};
 use nalgebra::Matrix4;
-use neat_core::{Camera, CircularArc, EdgelMap, Scene, SceneError, Spline, Wireframe3d};
+use neat_core::{Camera, CircularArc, Dome, EdgelMap, Scene, SceneError, Spline, Wireframe3d};
 use neat_detect::{DetectorConfig, edgel_maps};
 use neat_wireframe::assemble::{
     AssembleConfig, Assembled, Photographs, Witnesses, assemble_with_progress,
@@ -49,6 +49,8 @@ pub struct Draft {
     pub arc_covariances: Vec<Option<Matrix4<f64>>>,
     /// Smooth curves that are no circles, likewise.
     pub splines: Vec<Spline>,
+    /// Parts of spheres that outlines show, likewise.
+    pub domes: Vec<Dome>,
     /// What each step kept and removed.
     pub report: BackEndReport,
     /// Edges that are structure with less than this probability are left out.
@@ -107,6 +109,7 @@ impl Draft {
             arcs: built.arcs,
             arc_covariances: built.arc_covariances,
             splines: built.splines,
+            domes: built.domes,
             report: BackEndReport::Assembler {
                 steps: built.report,
             },
@@ -157,6 +160,7 @@ impl Draft {
             wireframe: &wireframe,
             arcs: &self.arcs,
             splines: &self.splines,
+            domes: &self.domes,
             covariances: &covariances,
         };
         let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
@@ -168,6 +172,7 @@ impl Draft {
             shells,
             arc_covariances: self.arc_covariances,
             splines: self.splines,
+            domes: self.domes,
             confidence,
             kinds,
             report,

@@ -31,6 +31,8 @@ pub struct Distilled {
     pub arcs: Vec<CircularArc>,
     /// Smooth curves that are no circles, likewise.
     pub splines: Vec<Spline>,
+    /// Parts of spheres that outlines show, likewise.
+    pub domes: Vec<Dome>,
     /// Faces between edges, arcs and splines, likewise.
     pub shells: Vec<Shell>,
     /// How sure the centres and radii of arcs are, see
@@ -153,6 +155,9 @@ impl Distilled {
         fill_arcs(&mut document, arcs, covariances, original_from_world);
         document.splines = (self.splines.iter())
             .map(|spline| spline.map(|point| original_from_world.apply(point)))
+            .collect();
+        document.domes = (self.domes.iter())
+            .map(|dome| dome.map(|point| original_from_world.apply(point)))
             .collect();
         self.confidence
             .fill(&mut document, &names, original_from_world);

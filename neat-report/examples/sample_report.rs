@@ -92,12 +92,7 @@ fn empty(sample: &Report) -> Report {
 /// The truth, slightly moved, with two edges too many and what the 2D segments say.
 fn document(data: &SyntheticData) -> WireframeDocument {
     let views = &data.scene.views;
-    let graph = MeasuredGraph {
-        wireframe: &data.truth,
-        arcs: &[],
-        splines: &[],
-        covariances: &[],
-    };
+    let graph = MeasuredGraph::of(&data.truth);
     let shells = find_shells(&graph, &[], &[]);
     let mut wireframe = data.truth.clone();
     for (index, junction) in wireframe.junctions.iter_mut().enumerate() {

@@ -165,7 +165,9 @@ fn faces(document: &WireframeDocument) -> Vec<FacePayload> {
     let faces = document.shells.iter().flat_map(|shell| &shell.faces);
     let edge = |step: &Step| match step.curve {
         CurveIndex::Edge(edge) => Some(edge),
-        CurveIndex::Arc(_) | CurveIndex::Spline(_) | CurveIndex::Smooth(_) => None,
+        CurveIndex::Arc(_) | CurveIndex::Spline(_) | CurveIndex::Smooth(_) | CurveIndex::Rim(_) => {
+            None
+        }
     };
     (faces.zip(document.triangles_of_faces()))
         .map(|(face, triangles)| FacePayload {

@@ -1,7 +1,7 @@
 """Everyday parts, by their features: plates, brackets, shafts, housings.
 
 `FIRST` are those on which the assembler was worked on, `SECOND` were looked at only once it was
-done. Lengths are in mm; a scene scales its part to unit size.
+done, `ROUND` have parts of spheres, and what looks like such. Lengths are in mm; a scene scales its part to unit size.
 """
 
 import math
@@ -460,6 +460,87 @@ def lever():
     return p
 
 
+def dowel():
+    with BuildPart() as p:
+        Cylinder(10, 40)
+        with Locations((0, 0, 20)):
+            Sphere(10)
+    return p
+
+
+def ballknob():
+    with BuildPart() as p:
+        Cylinder(17, 6)
+        Cylinder(6, 30, align=(Align.CENTER, Align.CENTER, Align.MIN))
+        with Locations((0, 0, 33)):
+            Sphere(13)
+    return p
+
+
+def rivet():
+    with BuildPart() as p:
+        with BuildSketch(Plane.XZ):
+            with BuildLine():
+                Line((0, 0), (16, 0))
+                RadiusArc((16, 0), (0, 8), -20)
+                Line((0, 8), (0, 0))
+            make_face()
+        revolve(axis=Axis.Z)
+        Cylinder(7, 25, align=(Align.CENTER, Align.CENTER, Align.MAX))
+    return p
+
+
+def observatory():
+    with BuildPart() as p:
+        Box(70, 60, 15, align=(Align.CENTER, Align.CENTER, Align.MAX))
+        Cylinder(22, 12, align=(Align.CENTER, Align.CENTER, Align.MIN))
+        with Locations((0, 0, 12)):
+            Sphere(22, arc_size1=0)
+        with Locations((28, 23, 0), (-28, 23, 0), (28, -23, 0), (-28, -23, 0)):
+            Hole(3)
+    return p
+
+
+def acornnut():
+    with BuildPart() as p:
+        with BuildSketch():
+            RegularPolygon(18, 6)
+        extrude(amount=14)
+        with Locations((0, 0, 14)):
+            Cylinder(13, 4, align=(Align.CENTER, Align.CENTER, Align.MIN))
+        with Locations((0, 0, 18)):
+            Sphere(13, arc_size1=0)
+        with Locations((0, 0, 12)):
+            Cylinder(8, 12, align=(Align.CENTER, Align.CENTER, Align.MAX), mode=Mode.SUBTRACT)
+    return p
+
+
+def dimple():
+    with BuildPart() as p:
+        Box(50, 40, 18, align=(Align.CENTER, Align.CENTER, Align.MAX))
+        with Locations((-8, 0, 6)):
+            Sphere(16, mode=Mode.SUBTRACT)
+    return p
+
+
+def roundedge():
+    with BuildPart() as p:
+        Cylinder(20, 30)
+        fillet(p.edges().filter_by(GeomType.CIRCLE).sort_by(Axis.Z)[-1:], 12)
+    return p
+
+
+def bullet():
+    with BuildPart() as p:
+        with BuildSketch(Plane.XZ):
+            with BuildLine():
+                Polyline((0, 40), (0, 0), (12, 0), (12, 15))
+                Spline((12, 15), (9, 30), (0, 40), tangents=((0, 1), (-1, 0.6)))
+            make_face()
+        revolve(axis=Axis.Z)
+    return p
+
+
 FIRST = [
     bracket,
     flange,
@@ -496,4 +577,14 @@ SECOND = [
     castle,
     prismhole,
     lever,
+]
+ROUND = [
+    dowel,
+    ballknob,
+    rivet,
+    observatory,
+    acornnut,
+    dimple,
+    roundedge,
+    bullet,
 ]

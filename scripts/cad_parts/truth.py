@@ -16,6 +16,7 @@ from OCP.GeomAbs import (
     GeomAbs_Ellipse,
     GeomAbs_Line,
     GeomAbs_Plane,
+    GeomAbs_Sphere,
 )
 from OCP.gp import gp_Pnt, gp_Vec
 from OCP.GProp import GProp_GProps
@@ -129,6 +130,10 @@ def face_of(face, place):
         angle, axis = cone.SemiAngle(), way(cone.Axis().Direction())
         numbers = {"apex": at(cone.Apex()).tolist(), "axis": (axis * np.sign(angle)).tolist()}
         return {"type": "cone", "area": area, **numbers, "half_angle": abs(angle)}
+    if kind == GeomAbs_Sphere:
+        sphere = surface.Sphere()
+        center, radius = at(sphere.Location()).tolist(), sphere.Radius() * scale
+        return {"type": "sphere", "area": area, "center": center, "radius": radius}
     return {"type": "other", "area": area}
 
 

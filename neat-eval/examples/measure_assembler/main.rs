@@ -90,6 +90,7 @@ fn main() -> Result<()> {
         let mut document = WireframeDocument::from(&wireframe);
         document.arcs = built.arcs.iter().map(|arc| arc.map(original)).collect();
         document.splines = built.splines.iter().map(|s| s.map(original)).collect();
+        document.domes = built.domes.iter().map(|d| d.map(original)).collect();
         let (text, score) = measured(dir, &scene, &built.wireframe, &wireframe)?;
         let of_curves = curves(dir, &document)?;
         let of_edges = match &mut probabilities {
@@ -97,10 +98,11 @@ fn main() -> Result<()> {
             None => String::new(),
         };
         println!(
-            "{name:18} {text} {} edges, {} arcs, {} splines{of_curves}{of_edges} {seconds:.1} s",
+            "{name:18} {text} {} edges, {} arcs, {} splines, {} domes{of_curves}{of_edges} {seconds:.1} s",
             wireframe.edges.len(),
             document.arcs.len(),
-            document.splines.len()
+            document.splines.len(),
+            document.domes.len()
         );
         scores.extend(score);
         if let Some(kept) = &kept {

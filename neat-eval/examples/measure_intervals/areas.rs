@@ -76,10 +76,8 @@ impl Areas {
 /// The faces of the solids that a true wireframe bounds: for truths that list none.
 pub fn faces_of_solids(wireframe: &Wireframe3d, arcs: &[CircularArc]) -> Vec<TrueFace> {
     let graph = MeasuredGraph {
-        wireframe,
         arcs,
-        splines: &[],
-        covariances: &[],
+        ..MeasuredGraph::of(wireframe)
     };
     let mut shells = find_shells(&graph, &[], &[]);
     shells.retain(|shell| shell.closed);

@@ -189,13 +189,15 @@ fn documented(mut scene: Scene) -> Result<WireframeDocument> {
         &scene.original_from_world,
     );
     document.splines = built.splines.iter().map(|s| s.map(original)).collect();
+    document.domes = built.domes.iter().map(|d| d.map(original)).collect();
     let junctions = confidence.junctions.iter();
     let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
     let world = MeasuredGraph {
-        wireframe: &built.wireframe,
         arcs: &built.arcs,
         splines: &built.splines,
+        domes: &built.domes,
         covariances: &covariances,
+        ..MeasuredGraph::of(&built.wireframe)
     };
     let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
     let points = surface_points(&cameras, &scene.sparse_points);

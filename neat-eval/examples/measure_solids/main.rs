@@ -21,7 +21,7 @@ mod prepared;
 mod truth;
 
 use nalgebra::{Matrix3, Vector3};
-use neat_core::{Camera, CircularArc, Scene, Spline, Wireframe3d};
+use neat_core::{Camera, CircularArc, Dome, Scene, Spline, Wireframe3d};
 use neat_eval::{CadFaces, FaceShares, FoundFace, SceneFaceScores, SceneFaces, SceneTruth};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::confidence::{ConfidenceConfig, assess, transformed_covariance};
@@ -44,6 +44,7 @@ struct Input {
     wireframe: Wireframe3d,
     arcs: Vec<CircularArc>,
     splines: Vec<Spline>,
+    domes: Vec<Dome>,
     covariances: Vec<Option<Matrix3<f64>>>,
     views: Vec<ViewObservation>,
     points: Vec<SurfacePoint>,
@@ -87,6 +88,7 @@ fn main() -> Result<()> {
             wireframe: truth.wireframe.clone(),
             arcs: truth.arcs.clone(),
             splines: truth.splines.clone(),
+            domes: Vec::new(),
             covariances: Vec::new(),
             views: Vec::new(),
             points: Vec::new(),
@@ -127,12 +129,12 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
     }
     let mut scene = prepared(dir, folder.as_deref())?;
     let original = |scene: &Scene, p: &Vector3<f64>| scene.original_from_world.apply(p);
-    let (wireframe, arcs, splines) = match folder {
+    let (wireframe, arcs, splines, domes) = match folder {
         Some(folder) => {
             let document = read_json(&folder.join("wireframe.json"))?;
             let world = scene.original_from_world.inverse();
             let wireframe = document.wireframe().map(|p| world.apply(p));
-            (wireframe, document.arcs, document.splines)
+            (wireframe, document.arcs, document.splines, document.domes)
         }
         None => {
             let built = assembled(&scene)?;
@@ -144,7 +146,9 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
                 .iter()
                 .map(|arc| arc.map(|p| original(&scene, p)));
             let splines = (built.splines.iter()).map(|s| s.map(|p| original(&scene, p)));
-            (built.wireframe, arcs.collect(), splines.collect())
+            let domes = (built.domes.iter()).map(|d| d.map(|p| original(&scene, p)));
+            let (arcs, splines) = (arcs.collect(), splines.collect());
+            (built.wireframe, arcs, splines, domes.collect())
         }
     };
     let views = ViewObservation::from_scene(&scene, MIN_SEGMENT_SCORE);
@@ -168,6 +172,7 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
         wireframe: wireframe.map(|p| original(&scene, p)),
         arcs,
         splines,
+        domes,
         covariances: (confidence.junctions.iter())
             .map(|junction| junction.covariance.as_ref().map(covariance))
             .collect(),
@@ -177,20 +182,25 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
 }
 
 impl Input {
-    fn shells(&self) -> Vec<Shell> {
-        let graph = MeasuredGraph {
+    fn graph(&self) -> MeasuredGraph<'_> {
+        MeasuredGraph {
             wireframe: &self.wireframe,
             arcs: &self.arcs,
             splines: &self.splines,
+            domes: &self.domes,
             covariances: &self.covariances,
-        };
-        find_shells(&graph, &self.views, &self.points)
+        }
+    }
+
+    fn shells(&self) -> Vec<Shell> {
+        find_shells(&self.graph(), &self.views, &self.points)
     }
 
     fn document(&self, shells: Vec<Shell>) -> WireframeDocument {
         WireframeDocument {
             arcs: self.arcs.clone(),
             splines: self.splines.clone(),
+            domes: self.domes.clone(),
             shells,
             ..WireframeDocument::from(&self.wireframe)
         }
@@ -204,7 +214,7 @@ fn scores(shells: &[Shell], input: &Input, truth: &Truth) -> String {
         shells.iter().map(|shell| shell.faces.len()).sum::<usize>()
     );
     for shell in shells {
-        let geometry = ShellGeometry::new(shell, &input.wireframe, &input.arcs, &input.splines);
+        let geometry = ShellGeometry::new(shell, &input.graph());
         let faces = shell.faces.len();
         text += &match (shell.closed, truth.volume) {
             (false, _) => format!(", sheet of {faces}"),

@@ -1,7 +1,7 @@
 //! Which faces of a CAD model are found, by area.
 //!
 //! Source: ours. A found face is a true one if its corners lie on the same surface (those of a wall
-//! between splines on the boundary of a true face that is no plane, cylinder or cone), both have the
+//! between splines on the boundary of a true face that is none of plane, cylinder, cone and sphere), both have the
 //! same area, and their middles are in one place: so it is found whole, and once. Other than
 //! areas by points on surfaces, which count a face with a forgotten hole in it as nearly right,
 //! this says which faces of a model are there.
@@ -53,7 +53,10 @@ pub struct CadFaceScores {
     /// The cones.
     #[serde(default)]
     pub cones: FaceShare,
-    /// Spheres and all others. Only walls between splines are ever found for them.
+    /// The spheres.
+    #[serde(default)]
+    pub spheres: FaceShare,
+    /// All others. Only walls between splines and patches are ever found for them.
     pub others: FaceShare,
     /// Of the true area, what is found.
     pub recall: f64,
@@ -114,6 +117,7 @@ impl CadFaces {
             planes: FaceShare::default(),
             cylinders: FaceShare::default(),
             cones: FaceShare::default(),
+            spheres: FaceShare::default(),
             others: FaceShare::default(),
             recall: 0.0,
             precision: None,
@@ -124,6 +128,7 @@ impl CadFaces {
                 Some(Surface::Plane { .. }) => &mut scores.planes,
                 Some(Surface::Cylinder { .. }) => &mut scores.cylinders,
                 Some(Surface::Cone { .. }) => &mut scores.cones,
+                Some(Surface::Sphere { .. }) => &mut scores.spheres,
                 Some(Surface::Extruded { .. } | Surface::Patch { .. }) | None => &mut scores.others,
             };
             share.all.add(face.area);
@@ -135,6 +140,7 @@ impl CadFaces {
             &scores.planes,
             &scores.cylinders,
             &scores.cones,
+            &scores.spheres,
             &scores.others,
         ];
         let recalled = total(kinds.into_iter().map(|kind| kind.found.area));
@@ -223,6 +229,18 @@ impl CadFaces {
                 let opens_alike = (one - other).abs() <= self.max_angle.to_radians();
                 a.dot(b) >= cosine && opens_alike
             }
+            (
+                Surface::Sphere {
+                    center: a,
+                    radius: r,
+                    ..
+                },
+                Surface::Sphere {
+                    center: b,
+                    radius: s,
+                    ..
+                },
+            ) => (a - b).norm() <= self.max_distance && (r - s).abs() <= self.max_distance,
             _ => false,
         }
     }
@@ -247,6 +265,7 @@ impl CadFaceScores {
             ("planes", self.planes),
             ("cylinders", self.cylinders),
             ("cones", self.cones),
+            ("spheres", self.spheres),
             ("others", self.others),
         ];
         for (name, share) in kinds.into_iter().filter(|(_, share)| share.all.faces > 0) {

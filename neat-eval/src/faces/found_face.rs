@@ -29,7 +29,7 @@ impl FoundFace {
         let mut triangles = document.triangles_of_faces().into_iter();
         let mut found = Vec::new();
         for shell in &document.shells {
-            let geometry = ShellGeometry::new(shell, &wireframe, &document.arcs, &document.splines);
+            let geometry = ShellGeometry::new(shell, &document.graph(&wireframe));
             found.extend(shell.faces.iter().zip(&mut triangles).map(|(face, cut)| {
                 let corners = |triangle: [usize; 3]| triangle.map(|corner| points[corner]);
                 Self {
@@ -97,16 +97,7 @@ mod tests {
                 .collect(),
             ..WireframeDocument::default()
         };
-        document.shells = find_shells(
-            &MeasuredGraph {
-                wireframe: &document.wireframe(),
-                arcs: &[],
-                splines: &[],
-                covariances: &[],
-            },
-            &[],
-            &[],
-        );
+        document.shells = find_shells(&MeasuredGraph::of(&document.wireframe()), &[], &[]);
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("wireframe.json");
         neat_wireframe::export::write_json(&path, &document).unwrap();

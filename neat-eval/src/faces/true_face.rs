@@ -9,7 +9,7 @@ use std::path::Path;
 /// A true face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrueFace {
-    /// What it is a part of; `None` where that is no plane, cylinder or cone. The side of its
+    /// What it is a part of; `None` where that is no plane, cylinder, cone or sphere. The side of its
     /// normal plays no role.
     pub surface: Option<Surface>,
     /// Its area.
@@ -35,6 +35,8 @@ struct TruthJson {
 #[derive(Deserialize)]
 struct CurveJson {
     points: Vec<Vector3<f64>>,
+    /// Why no image shows it, of a smooth one.
+    reason: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -46,6 +48,7 @@ struct FaceJson {
     offset: Option<f64>,
     axis_point: Option<Vector3<f64>>,
     axis: Option<Vector3<f64>>,
+    center: Option<Vector3<f64>>,
     radius: Option<f64>,
     apex: Option<Vector3<f64>>,
     half_angle: Option<f64>,
@@ -63,7 +66,7 @@ impl TrueFace {
     /// Reads the `faces` of a true wireframe, with the edges around them; none where it has none.
     ///
     /// # Errors
-    /// If the file is missing or no such JSON, a plane, a cylinder or a cone lacks its numbers, or
+    /// If the file is missing or no such JSON, a plane, a cylinder, a cone or a sphere lacks its numbers, or
     /// a face names an edge that is not there.
     pub fn read(path: &Path) -> Result<Vec<Self>, SceneError> {
         Self::parse(
@@ -125,6 +128,14 @@ impl FaceJson {
                         convex: true,
                     },
                 ),
+                "sphere" => self
+                    .center
+                    .zip(self.radius)
+                    .map(|(center, radius)| Surface::Sphere {
+                        center,
+                        radius,
+                        convex: true,
+                    }),
                 _ => return Ok(None),
             };
         let missing = || format!("is a {} without its numbers", self.kind);
@@ -142,7 +153,16 @@ impl BoundaryJson {
                     .collect()
             }
             "curve" => Some(truth.curves.get(self.index)?.points.clone()),
-            _ => Some(truth.smooth_edges.get(self.index)?.points.clone()),
+            _ => {
+                let edge = truth.smooth_edges.get(self.index)?;
+                // A seam is where a model happens to be cut open.
+                let is_seam = edge.reason.as_deref() == Some("seam");
+                Some(if is_seam {
+                    Vec::new()
+                } else {
+                    edge.points.clone()
+                })
+            }
         }
     }
 }

@@ -40,12 +40,7 @@ pub(super) fn polygons(
     first_face: usize,
     turn: &Matrix3<f64>,
 ) -> Vec<Polygon> {
-    let geometry = ShellGeometry::new(
-        shell,
-        &document.wireframe(),
-        &document.arcs,
-        &document.splines,
-    );
+    let geometry = ShellGeometry::new(shell, &document.graph(&document.wireframe()));
     let is_round = |face: &Face| !matches!(face.surface, Surface::Plane { .. });
     let mut round = match shell.faces.iter().any(is_round) {
         true => triangles(shell, document, &geometry),
@@ -88,6 +83,7 @@ fn triangles(
         edges: document.edges.clone(),
         arcs: document.arcs.clone(),
         splines: document.splines.clone(),
+        domes: document.domes.clone(),
         shells: vec![shell.clone()],
         ..WireframeDocument::default()
     };

@@ -17,7 +17,7 @@ pub(super) fn representations(
     let wireframe = document.wireframe();
     let (mut solids, mut sheets) = (Vec::new(), Vec::new());
     for shell in &document.shells {
-        let geometry = ShellGeometry::new(shell, &wireframe, &document.arcs, &document.splines);
+        let geometry = ShellGeometry::new(shell, &document.graph(&wireframe));
         let faces = ShellWriter::new(step, &geometry).faces(shell).join(",");
         if shell.closed {
             let shell = step.add(&format!("CLOSED_SHELL('',({faces}))"));
@@ -185,6 +185,22 @@ impl<'a> ShellWriter<'a> {
                 let surface = self
                     .step
                     .add(&format!("CONICAL_SURFACE('',{placement},{radius},{angle})"));
+                (surface, *convex)
+            }
+            Surface::Sphere {
+                center,
+                radius,
+                convex,
+            } => {
+                // Around its rim: parameters of the surface end at the pole.
+                let rim = self.geometry.curves[&face.loops[0][0].curve].arc;
+                let axis = rim.map_or_else(Vector3::z, |rim| rim.normal());
+                let x = x_axis(&axis, &(points[0] - center));
+                let placement = self.step.placement(center, &axis, &x);
+                let radius = real(*radius);
+                let surface = self
+                    .step
+                    .add(&format!("SPHERICAL_SURFACE('',{placement},{radius})"));
                 (surface, *convex)
             }
             Surface::Extruded { direction } => self.extruded(face, direction),

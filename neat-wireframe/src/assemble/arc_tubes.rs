@@ -1,7 +1,9 @@
-//! What known arcs explain: chords of their own, and the outlines of the tubes between them. The
+//! What known arcs explain: chords of their own, and the outlines of the tubes between them and of the
+//! domes around their axes. The
 //! rims of a cylinder or a cone tell where it is, which few views of an outline do not.
 
 use super::circle_fitting::FoundArc;
+use super::domes::FoundDome;
 use super::edge_samples::Images;
 use super::known_tubes::GAP;
 use super::line_fitting::directions_across;
@@ -18,21 +20,23 @@ const MIN_LENGTH_IN_PIXELS: f64 = 4.0;
 /// told by its bow.
 const NEAR_IN_PIXELS: f64 = 8.0;
 
-/// Arcs, and the tubes between them.
+/// Arcs, the tubes between them and the domes around their axes.
 pub(super) struct KnownArcs {
     arcs: Vec<FoundArc>,
     tubes: Vec<Tube>,
+    domes: Vec<FoundDome>,
 }
 
 impl KnownArcs {
-    pub(super) fn new(arcs: &[FoundArc]) -> Self {
+    pub(super) fn new(arcs: &[FoundArc], domes: &[FoundDome]) -> Self {
         Self {
             arcs: arcs.to_vec(),
+            domes: domes.to_vec(),
             tubes: tubes_between(arcs),
         }
     }
 
-    /// Whether a line along arcs or tubes is nothing else: as soon as these have their edgels,
+    /// Whether a line along arcs, tubes or domes is nothing else: as soon as these have their edgels,
     /// not more than `least` speaks for it.
     pub(super) fn explain(&self, images: &Images, line: &LineSegment3, least: f64) -> bool {
         let gap = GAP * images.reach * images.pixel_size(line, 0..images.views.len());
@@ -50,12 +54,18 @@ impl KnownArcs {
             })
         };
         let along: Vec<&FoundArc> = self.arcs.iter().filter(is_chord).collect();
-        if touched.is_empty() && along.is_empty() {
+        let domes: Vec<&FoundDome> = (self.domes.iter())
+            .filter(|found| found.is_touched_by(line))
+            .collect();
+        if touched.is_empty() && along.is_empty() && domes.is_empty() {
             return false;
         }
         let mut taken = images.nothing_taken();
         for tube in &touched {
             images.claim_outlines(tube, &mut taken);
+        }
+        for found in domes {
+            images.claim_dome(found, &mut taken);
         }
         let beside = images.beside_tubes();
         for found in along {
@@ -148,15 +158,15 @@ mod tests {
                 rim(radii[0], start, [0.0, TAU]),
                 rim(radii[1], end, [0.0, TAU]),
             ];
-            assert!(KnownArcs::new(&rims).explain(&images, &line, 3.0));
-            assert!(!KnownArcs::new(&rims[..1]).explain(&images, &line, 3.0));
+            assert!(KnownArcs::new(&rims, &[]).explain(&images, &line, 3.0));
+            assert!(!KnownArcs::new(&rims[..1], &[]).explain(&images, &line, 3.0));
         }
         // An edge of a cube, on the cylinder around it.
         let cube = TestViews::of_cube(60);
         let upright = (0..12).map(cube_edge);
         let upright = upright.filter(|edge| edge.start.xy() == edge.end.xy());
         let radius = 0.5_f64.sqrt();
-        let known = KnownArcs::new(&[-0.5, 0.5].map(|z| rim(radius, z, [0.0, TAU])));
+        let known = KnownArcs::new(&[-0.5, 0.5].map(|z| rim(radius, z, [0.0, TAU])), &[]);
         for edge in upright {
             assert!(!known.explain(&cube.images(), &edge, 3.0));
         }
@@ -166,7 +176,7 @@ mod tests {
     fn chords_of_an_arc_are_explained() {
         let views = views_of_arcs(20, |_| arc(1.5));
         let images = views.images();
-        let known = KnownArcs::new(&[found(arc(1.5))]);
+        let known = KnownArcs::new(&[found(arc(1.5))], &[]);
         let chord = LineSegment3::new(arc(1.5).point_at(0.5), arc(1.5).point_at(0.62));
         assert!(images.evidence(&chord, None, 0.0).gain > 3.0);
         assert!(known.explain(&images, &chord, 3.0));

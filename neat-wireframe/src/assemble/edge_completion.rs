@@ -149,7 +149,7 @@ mod tests {
         let cube = TestViews::of_cube(20);
         let images = cube.images();
         let (mut corners, mut taken) = without(&images, 7);
-        let limits = (3.0, &KnownArcs::new(&[]));
+        let limits = (3.0, &KnownArcs::new(&[], &[]));
         assert_eq!(corners.junctions.len(), 8);
         assert_eq!(complete_edges(&images, &mut corners, &mut taken, limits), 1);
         assert_eq!(corners.ends.len(), 12);

@@ -190,6 +190,7 @@ mod tests {
                     view: 0,
                     chance: 0.1,
                 }],
+                ..LineEvidence::default()
             },
         };
         let lines: Vec<ChosenLine> = lines.iter().map(chosen).collect();

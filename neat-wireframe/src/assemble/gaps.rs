@@ -92,6 +92,7 @@ mod tests {
                 showing: (0..cameras.len())
                     .map(|view| Showing { view, chance: 0.1 })
                     .collect(),
+                ..LineEvidence::default()
             },
             placed: true,
         };

@@ -56,11 +56,21 @@ pub(super) struct LineEvidence {
     pub gain: f64,
     /// The views that show it, ascending.
     pub showing: Vec<Showing>,
+    /// How many views show parts of it.
+    pub partly: usize,
 }
 
 impl LineEvidence {
     pub(super) fn views(&self) -> impl Iterator<Item = usize> + Clone + '_ {
         self.showing.iter().map(|showing| showing.view)
+    }
+
+    /// What is said for it against something else that lies along a part of it, in nats: of that as many
+    /// views show all as show parts.
+    pub(super) fn gain_of_whole(&self) -> f64 {
+        let [shown, partly, _] = OF_VISIBLE;
+        let gain = |of: f64| (2.0 * of / (shown + partly)).ln();
+        self.showing.len() as f64 * gain(shown) + self.partly as f64 * gain(partly)
     }
 }
 
@@ -153,7 +163,7 @@ impl Images<'_> {
         let views = self.views_of(middle, in_view, taken);
         let mut evidence = LineEvidence {
             gain: f64::NEG_INFINITY,
-            showing: Vec::new(),
+            ..LineEvidence::default()
         };
         // Most lines that are none end here.
         if most_of_views(&views, free) <= least {
@@ -174,6 +184,8 @@ impl Images<'_> {
                     chance,
                 });
                 of_showing.push(of_view);
+            } else {
+                evidence.partly += 1;
             }
         }
         of_showing.sort_by(|a: &f64, b| b.total_cmp(a));

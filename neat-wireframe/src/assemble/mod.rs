@@ -35,6 +35,7 @@ mod curve_pieces;
 mod curve_samples;
 mod curved_edges;
 mod curves;
+mod domes;
 mod edge_completion;
 mod edge_cutting;
 mod edge_samples;
@@ -68,6 +69,7 @@ mod splines;
 mod straightness;
 mod swept_tubes;
 mod tangent_ends;
+mod touched_spheres;
 mod view_segments;
 mod wander;
 
@@ -91,6 +93,7 @@ use common_directions::turn_to_common_directions;
 use corners::find_corners;
 use curved_edges::{add_as_arcs, take_curved_edges};
 use curves::find_arcs;
+use domes::{FoundDome, find_domes, retain_beside_domes, settled_domes};
 use edge_completion::complete_edges;
 use edge_cutting::{cut_edges, in_order};
 use edge_samples::Images;
@@ -227,10 +230,15 @@ pub fn assemble_with_progress(
     )?;
     let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
+    let domes = find_domes(&images, arcs);
+    retain_beside_domes(&images, &domes, arcs, config.min_evidence);
+    let found = (&mut *arcs, &domes[..]);
     let (wireframe, splines) =
-        graph_of(selection, arcs, photographs, config, &mut report, progress)?;
+        graph_of(selection, found, photographs, config, &mut report, progress)?;
+    let domes = settled_domes(&domes, arcs);
     report.arcs = arcs.len();
     report.splines = splines.len();
+    report.domes = domes.len();
     let arc_covariances = covariances_of_arcs(&images, arcs, scene_radius);
     let wireframe = wireframe.map(|junction| junction * scene_radius);
     report.junctions = wireframe.junctions.len();
@@ -243,6 +251,9 @@ pub fn assemble_with_progress(
         arc_covariances,
         splines: (splines.iter())
             .map(|spline| spline.map(|point| point * scene_radius))
+            .collect(),
+        domes: (domes.iter())
+            .map(|dome| dome.map(|point| point * scene_radius))
             .collect(),
         report,
         refined_cameras,
@@ -323,7 +334,7 @@ fn proposals(
 /// From lines to a graph: merged, continued, joined at corners, completed, cut and fitted.
 fn graph_of(
     mut selection: Selection<'_>,
-    arcs: &mut Vec<FoundArc>,
+    (arcs, domes): (&mut Vec<FoundArc>, &[FoundDome]),
     photographs: Option<Photographs<'_>>,
     config: &AssembleConfig,
     report: &mut AssembleReport,
@@ -331,7 +342,7 @@ fn graph_of(
 ) -> ControlFlow<(), (Wireframe3d, Vec<Spline>)> {
     let images = selection.images;
     let least = config.min_evidence;
-    let known = &KnownArcs::new(arcs);
+    let known = &KnownArcs::new(arcs, domes);
     (selection.lines).retain(|found| !known.explain(&images, &found.line, least));
     report.outlines += report.lines - selection.lines.len();
     report.lines = selection.lines.len();

@@ -2,7 +2,7 @@
 
 use crate::Wireframe3d;
 use nalgebra::Matrix4;
-use neat_core::{Camera, CircularArc, Spline};
+use neat_core::{Camera, CircularArc, Dome, Spline};
 use serde::{Deserialize, Serialize};
 
 /// A wireframe, and how it came about.
@@ -17,6 +17,8 @@ pub struct Assembled {
     pub arc_covariances: Vec<Option<Matrix4<f64>>>,
     /// Smooth curves that are no circles.
     pub splines: Vec<Spline>,
+    /// Parts of spheres that outlines show.
+    pub domes: Vec<Dome>,
     /// What each step found.
     pub report: AssembleReport,
     /// The cameras of all views, from where the images show the wireframe; `None` where they
@@ -52,6 +54,9 @@ pub struct AssembleReport {
     pub splines: usize,
     /// … and outlines of round things, which are left out, too.
     pub outlines: usize,
+    /// Parts of spheres, by their outlines.
+    #[serde(default)]
+    pub domes: usize,
     /// Lines that were pieces of others.
     pub merged_pieces: usize,
     /// Directions that several lines have, and were turned to.

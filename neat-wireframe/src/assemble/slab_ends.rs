@@ -252,7 +252,7 @@ mod tests {
             &images,
             &mut corners,
             &mut taken,
-            (3.0, &KnownArcs::new(&[])),
+            (3.0, &KnownArcs::new(&[], &[])),
         );
         assert_eq!(corners.ends.len(), before + count);
         for [a, b] in &corners.ends[before..] {

@@ -9,19 +9,21 @@
 use super::Place;
 use crate::export::WireframeDocument;
 use crate::faces::{
-    Chain, CurveIndex, FINE, Face, PatchFace, Step, Surface, Unrolled, area_vector_of_spline,
-    ends_of_arc, goes_around, moments_of_wall, nearest_junctions,
+    Cap, Chain, CurveIndex, FINE, Face, PatchFace, Step, Surface, Unrolled, area_vector_of_spline,
+    ends_of_arc, goes_around, moments_of_wall, nearest_junctions, twice_segment,
 };
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Spline};
 use std::f64::consts::{PI, TAU};
 
 /// The places of one step after the other: both ends of an edge; of an arc its centre, its radius,
-/// and, if it is no circle, its ends; of a spline its control points.
+/// and, if it is no circle, its ends; of a spline its control points; of the rim of a dome its sphere. A
+/// part of a sphere hangs on that first.
 pub(super) fn places(document: &WireframeDocument, face: &Face) -> Vec<Place> {
     let of_step = |steps: &[Step], step: &Step| match step.curve {
         CurveIndex::Edge(edge) => document.edges[edge].map(Place::Junction).to_vec(),
         CurveIndex::Smooth(ends) => ends.map(Place::Junction).to_vec(),
+        CurveIndex::Rim(_) => vec![Place::Sphere],
         CurveIndex::Arc(arc) => {
             let ends = nearest_junctions(ends_of_arc(&document.arcs[arc]), &document.junctions);
             let ends = ends.filter(|_| steps.len() > 1).into_iter().flatten();
@@ -36,9 +38,11 @@ pub(super) fn places(document: &WireframeDocument, face: &Face) -> Vec<Place> {
             controls.map(|k| Place::Control(spline, k)).collect()
         }
     };
-    let loops = face.loops.iter();
-    loops
-        .flat_map(|steps| steps.iter().flat_map(move |step| of_step(steps, step)))
+    let is_sphere = matches!(face.surface, Surface::Sphere { .. });
+    let along = face.loops.iter();
+    let along = along.flat_map(|steps| steps.iter().flat_map(move |step| of_step(steps, step)));
+    (is_sphere.then_some(Place::Sphere).into_iter())
+        .chain(along)
         .collect()
 }
 
@@ -61,11 +65,21 @@ pub(super) fn value(document: &WireframeDocument, face: &Face, points: &[Vector3
         left = others;
         *first
     };
+    if let Surface::Sphere { .. } = face.surface {
+        take();
+    }
     let mut pieces: Vec<(bool, Piece)> = Vec::new();
     for steps in &face.loops {
         for step in steps {
             let piece = match step.curve {
                 CurveIndex::Edge(_) | CurveIndex::Smooth(_) => Piece::Edge([take(), take()]),
+                CurveIndex::Rim(dome) => {
+                    take();
+                    Piece::Arc {
+                        arc: document.domes[dome].rim(),
+                        ends: None,
+                    }
+                }
                 CurveIndex::Arc(arc) => {
                     let (center, radius) = (take(), take().x);
                     let ends = (steps.len() > 1).then(|| [take(), take()]);
@@ -101,6 +115,7 @@ pub(super) fn value(document: &WireframeDocument, face: &Face, points: &[Vector3
             round(&axis, true, &pieces)
         }
         Surface::Cylinder { .. } | Surface::Cone { .. } => unrolled(face, &pieces),
+        Surface::Sphere { .. } => cap(face, &pieces),
         Surface::Extruded { direction } => extruded(&direction, &pieces),
         Surface::Patch { .. } => patch(face, &pieces),
     }
@@ -134,14 +149,14 @@ impl Piece {
             Self::Edge(ends) => straight(ends),
             Self::Spline(spline) => 0.5 * area_vector_of_spline(spline, origin),
             Self::Arc { arc, ends } => {
-                let sector = 0.5 * arc.normal() * arc.radius.powi(2) * arc.sweep();
+                let segment = 0.5 * arc.normal() * twice_segment(arc);
                 let Some([from, to]) = *ends else {
-                    return sector;
+                    return segment;
                 };
                 // Junctions lie beside the circle: straight to it, along it, and back.
                 let [start, end] = ends_of_arc(arc);
-                let along = 0.5 * (arc.center - origin).cross(&(end - start));
-                straight(&[from, start]) + along + sector + straight(&[end, to])
+                let chord = straight(&[start, end]);
+                straight(&[from, start]) + chord + segment + straight(&[end, to])
             }
         }
     }
@@ -168,7 +183,8 @@ fn is_between_rims(face: &Face, axis: &Vector3<f64>, pieces: &[(bool, Piece)]) -
         Piece::Edge(_) => false,
         Piece::Spline(_) => true,
     };
-    let rims = face.rims_among(|step| matches!(step.curve, CurveIndex::Arc(_)));
+    let is_rim = |step: &Step| matches!(step.curve, CurveIndex::Arc(_) | CurveIndex::Rim(_));
+    let rims = face.rims_among(is_rim);
     rims.is_some() && !pieces.iter().any(is_askew)
 }
 
@@ -218,6 +234,19 @@ fn extruded(direction: &Vector3<f64>, pieces: &[(bool, Piece)]) -> f64 {
         moments_of_wall(*rims, direction, &start)[0]
     };
     rims.first_chunk().map_or(0.0, area)
+}
+
+/// The area of a part of a sphere, which stays where it is.
+fn cap(face: &Face, pieces: &[(bool, Piece)]) -> f64 {
+    let Some((reversed, piece)) = pieces.first() else {
+        return 0.0;
+    };
+    let mut points = piece.points();
+    if *reversed {
+        points.reverse();
+    }
+    let cap = Cap::new(&face.surface, &points);
+    cap.map_or(0.0, |cap| cap.moments(&Vector3::zeros())[0])
 }
 
 /// The area of a patch.

@@ -98,6 +98,8 @@ enum Place {
     Radius(usize),
     /// A control point of a spline.
     Control(usize, usize),
+    /// A sphere: that it is there says nothing of how sure it is.
+    Sphere,
 }
 
 /// A quantity with its value.
@@ -313,7 +315,7 @@ impl<'a> Dimensions<'a> {
                         sum += both + both.transpose();
                     }
                 }
-                Place::Junction(_) | Place::Control(..) => {}
+                Place::Junction(_) | Place::Control(..) | Place::Sphere => {}
             }
         }
         let finite = sum.iter().all(|x| x.is_finite());
@@ -335,6 +337,7 @@ impl<'a> Dimensions<'a> {
             Place::Center(arc) => self.document.arcs[arc].center,
             Place::Radius(arc) => Vector3::x() * self.document.arcs[arc].radius,
             Place::Control(spline, control) => self.document.splines[spline].controls[control],
+            Place::Sphere => Vector3::zeros(),
         }
     }
 
@@ -348,7 +351,7 @@ impl<'a> Dimensions<'a> {
             }
             Place::Radius(arc) => [of_arc(arc)?[9], 0.0, 0.0, 0.0, 0.0, 0.0],
             // Nobody has asked the views how sure they are.
-            Place::Control(..) => return None,
+            Place::Control(..) | Place::Sphere => return None,
         };
         Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
     }

@@ -290,12 +290,7 @@ fn holes_have_radii_and_spacings() {
 fn cube_with_faces(sigma: f64) -> (WireframeDocument, Vec<Matrix3<f64>>) {
     let (mut document, roots) = unsure_cube(sigma);
     let wireframe = document.wireframe();
-    let graph = MeasuredGraph {
-        wireframe: &wireframe,
-        arcs: &[],
-        splines: &[],
-        covariances: &[],
-    };
+    let graph = MeasuredGraph::of(&wireframe);
     document.shells = find_shells(&graph, &[], &[]);
     (document, roots)
 }

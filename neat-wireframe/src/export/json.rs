@@ -3,10 +3,11 @@
 use super::{EdgeFields, ExportError, JunctionFields, check};
 use crate::Wireframe3d;
 use crate::faces::{
-    Face, Shell, Surface, ends_of_arc, ends_of_spline, nearest_junctions, points_within, triangles,
+    CurveIndex, Face, MeasuredGraph, Shell, Surface, ends_of_arc, ends_of_spline,
+    nearest_junctions, points_within, triangles,
 };
 use nalgebra::Vector3;
-use neat_core::{CircularArc, Spline, file};
+use neat_core::{CircularArc, Dome, Spline, file};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -44,6 +45,9 @@ pub struct WireframeDocument {
     /// Smooth curves that are no arcs, likewise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub splines: Vec<Spline>,
+    /// Parts of spheres that images show by their outlines, likewise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub domes: Vec<Dome>,
     /// Faces between edges, arcs and splines, closed shells first, in the frame of the user's
     /// files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -100,28 +104,51 @@ impl WireframeDocument {
 
     /// The graph with arcs and splines as chains of straight pieces, for what knows none: behind
     /// the junctions the points of one arc after the other and then of the splines, behind the
-    /// edges their pieces. They share no points; the ends of a closed one are one. Last come points
-    /// within patches, for [`Self::drawn_triangles`].
+    /// edges their pieces. They share no points; the ends of a closed one are one. Last come points of
+    /// faces, for [`Self::drawn_triangles`].
     pub fn drawn(&self) -> Wireframe3d {
         let mut drawn = self.with_curves();
         drawn.junctions.extend(self.points_within_faces());
         drawn
     }
 
-    /// The points within patches, which stand at the end of the junctions of [`Self::drawn`].
+    /// The points along the rims of domes and within patches and domes, which stand at the end of the
+    /// junctions of [`Self::drawn`].
     pub fn points_within_faces(&self) -> Vec<Vector3<f64>> {
-        if !self.has_patches() {
+        if !self.has_inner_points() {
             return Vec::new();
         }
-        let points = self.with_curves().junctions;
+        let mut within: Vec<Vector3<f64>> = self.drawn_rims().flat_map(without_last).collect();
+        let mut points = self.with_curves().junctions;
+        points.extend(&within);
         let chains = self.chains_between_junctions();
-        let (arcs, splines) = chains.split_at(self.arcs.len());
-        points_within(&self.shells, &self.edges, [arcs, splines], &points)
+        within.extend(points_within(
+            &self.shells,
+            &self.edges,
+            self.of_kinds(&chains),
+            &points,
+        ));
+        within
     }
 
-    fn has_patches(&self) -> bool {
+    fn has_inner_points(&self) -> bool {
         let mut faces = self.shells.iter().flat_map(|shell| &shell.faces);
-        faces.any(|face| matches!(face.surface, Surface::Patch { .. }))
+        let ends_at_rim =
+            |face: &Face| (face.steps()).any(|step| matches!(step.curve, CurveIndex::Rim(_)));
+        faces.any(|face| {
+            matches!(face.surface, Surface::Patch { .. } | Surface::Sphere { .. })
+                || ends_at_rim(face)
+        })
+    }
+
+    /// What faces are bounded by; `wireframe` is [`Self::wireframe`].
+    pub fn graph<'a>(&'a self, wireframe: &'a Wireframe3d) -> MeasuredGraph<'a> {
+        MeasuredGraph {
+            arcs: &self.arcs,
+            splines: &self.splines,
+            domes: &self.domes,
+            ..MeasuredGraph::of(wireframe)
+        }
     }
 
     /// [`Self::drawn`] without points within faces.
@@ -167,11 +194,23 @@ impl WireframeDocument {
         }
         let points = self.drawn().junctions;
         let chains = self.chains_between_junctions();
-        let (arcs, splines) = chains.split_at(self.arcs.len());
-        triangles(&self.shells, &self.edges, [arcs, splines], &points)
+        triangles(&self.shells, &self.edges, self.of_kinds(&chains), &points)
     }
 
-    /// For each arc, and then each spline, the junctions of [`Self::drawn`] along it.
+    /// Points along the rim of each dome; the first and the last are the same.
+    fn drawn_rims(&self) -> impl Iterator<Item = Vec<Vector3<f64>>> {
+        (self.domes.iter()).map(|dome| dome.rim().points(Self::TURN_OF_DRAWN_ARCS))
+    }
+
+    /// Chains of arcs, of splines and of the rims of domes.
+    fn of_kinds<'a>(&self, chains: &'a [Vec<usize>]) -> [&'a [Vec<usize>]; 3] {
+        let (arcs, others) = chains.split_at(self.arcs.len());
+        let (splines, rims) = others.split_at(self.splines.len());
+        [arcs, splines, rims]
+    }
+
+    /// For each arc, each spline and then the rim of each dome, the junctions of [`Self::drawn`] along
+    /// it.
     fn chains(&self) -> Vec<Vec<usize>> {
         let mut first = self.junctions.len();
         let chain = |points: Vec<Vector3<f64>>| {
@@ -181,7 +220,9 @@ impl WireframeDocument {
             first += count;
             chain
         };
-        self.drawn_curves().map(chain).collect()
+        (self.drawn_curves().chain(self.drawn_rims()))
+            .map(chain)
+            .collect()
     }
 
     /// Likewise, from the junctions nearest to the ends of open ones: those at which they end, if
@@ -221,8 +262,15 @@ impl WireframeDocument {
                 spline,
             });
         }
+        if let Some(dome) = self.domes.iter().position(|dome| !dome.is_valid()) {
+            return Err(ExportError::BadDome {
+                path: path.into(),
+                dome,
+            });
+        }
         let wireframe = self.wireframe();
-        let is_valid = |face: &Face| face.is_valid(&wireframe, &self.arcs, &self.splines);
+        let graph = self.graph(&wireframe);
+        let is_valid = |face: &Face| face.is_valid(&graph);
         if let Some(shell) = (self.shells.iter()).position(|s| !s.faces.iter().all(is_valid)) {
             return Err(ExportError::BadShell {
                 path: path.into(),
@@ -277,6 +325,12 @@ impl WireframeDocument {
         }
         Ok(())
     }
+}
+
+/// The points of a closed chain, each once.
+fn without_last(mut points: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
+    points.pop();
+    points
 }
 
 /// Whether there are none or one for each of so many things, and all numbers are finite; else what

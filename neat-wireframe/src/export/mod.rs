@@ -73,10 +73,21 @@ pub enum ExportError {
         /// Its index.
         spline: usize,
     },
+    /// A dome is none.
+    #[error(
+        "{path}: dome {dome} is none: it needs a centre, an axis of length 1, a radius above 0 and a reach \
+         between 0 and π"
+    )]
+    BadDome {
+        /// The file.
+        path: PathBuf,
+        /// Its index.
+        dome: usize,
+    },
     /// A shell has a face that is none.
     #[error(
-        "{path}: shell {shell} has a face that is none: it needs a plane, a cylinder or a cone, and loops \
-         of edges and arcs that exist and join end to end"
+        "{path}: shell {shell} has a face that is none: it needs a surface, and loops of edges, arcs, \
+         splines and rims of domes that exist and join end to end"
     )]
     BadShell {
         /// The file.

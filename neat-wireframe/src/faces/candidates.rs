@@ -15,11 +15,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Rims of one cylinder or cone agree within so many standard deviations of an arc, of both
 /// together: as one point of a thousand does not.
-const AGREEMENT: f64 = 3.29 * std::f64::consts::SQRT_2;
+pub(super) const AGREEMENT: f64 = 3.29 * std::f64::consts::SQRT_2;
 
 /// All curves, inferred ones among them, and faces with different boundaries. None knows its outer
-/// side yet. A face most of whose curves are inferred, and most of their length, is a guess.
-pub(super) fn candidates(curves: Curves) -> (Curves, Vec<Face>) {
+/// side yet. A face most of whose curves are inferred, and most of their length, is a guess; `caps` have
+/// been shown.
+pub(super) fn candidates(curves: Curves, caps: Vec<Face>) -> (Curves, Vec<Face>) {
     let planes = coplanar_curves(&curves);
     let missing = missing_creases(&curves, &planes);
     let observed: Vec<BTreeSet<CurveIndex>> = (planes.iter())
@@ -67,6 +68,8 @@ pub(super) fn candidates(curves: Curves) -> (Curves, Vec<Face>) {
             faces.push(face);
         }
     }
+    // A lid may have the boundary of one.
+    faces.extend(caps);
     (curves, faces)
 }
 

@@ -4,7 +4,7 @@
 use super::bounds::Bounds;
 use super::face::{CurveIndex, Step};
 use nalgebra::{Matrix3, Vector3};
-use neat_core::{CircularArc, Spline, Wireframe3d};
+use neat_core::{CircularArc, Dome, Spline, Wireframe3d};
 
 /// Arcs are drawn in pieces that turn by so much, in radians.
 pub(super) const TURN: f64 = 0.1;
@@ -29,8 +29,23 @@ pub struct MeasuredGraph<'a> {
     pub arcs: &'a [CircularArc],
     /// Smooth curves beside them.
     pub splines: &'a [Spline],
+    /// Parts of spheres that end at some of these circles, or touch round faces that do.
+    pub domes: &'a [Dome],
     /// Covariances of the junctions; empty, or one for each, `None` where it is not determined.
     pub covariances: &'a [Option<Matrix3<f64>>],
+}
+
+impl<'a> MeasuredGraph<'a> {
+    /// A wireframe of which nothing more is known.
+    pub fn of(wireframe: &'a Wireframe3d) -> Self {
+        Self {
+            wireframe,
+            arcs: &[],
+            splines: &[],
+            domes: &[],
+            covariances: &[],
+        }
+    }
 }
 
 /// A curve that may bound faces.
@@ -141,7 +156,7 @@ impl Curves {
         Self { all, loose, extent }
     }
 
-    /// The same with lines that are inferred from them.
+    /// The same with curves that are inferred from them.
     pub fn with_inferred(mut self, lines: Vec<Curve>) -> Self {
         self.all.extend(lines);
         self.all.sort_by_key(|curve| curve.index);
@@ -151,8 +166,7 @@ impl Curves {
 
     /// Those that images show.
     pub fn observed(&self) -> impl Iterator<Item = &Curve> {
-        let observed = |curve: &&Curve| !matches!(curve.index, CurveIndex::Smooth(_));
-        self.all.iter().filter(observed)
+        self.all.iter().filter(|curve| !curve.index.is_inferred())
     }
 
     /// The place of a curve in [`Curves::all`].

@@ -257,12 +257,7 @@ mod tests {
             junctions: junctions.map(Vector3::from).to_vec(),
             edges: vec![[0, 1], [0, 2], [1, 3], [0, 4], [1, 5], [6, 7]],
         };
-        let curves = Curves::new(&MeasuredGraph {
-            wireframe: &wireframe,
-            arcs: &[],
-            splines: &[],
-            covariances: &[],
-        });
+        let curves = Curves::new(&MeasuredGraph::of(&wireframe));
         let mut noise = Noise(3);
         let sigma = 1e-3;
         let covariance = Matrix3::identity() * f64::powi(sigma, 2) + curves.junction_floor();

@@ -1,9 +1,8 @@
 //! Faces and shells: what a boundary representation is made of.
 
-use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
+use super::curves::{MeasuredGraph, ends_of_arc, ends_of_spline, nearest_junctions};
 use super::surface::Surface;
 use nalgebra::Vector3;
-use neat_core::{CircularArc, Spline, Wireframe3d};
 use serde::{Deserialize, Serialize};
 
 /// Faces that hang together by the curves that they share.
@@ -23,8 +22,9 @@ pub struct Face {
     #[serde(flatten)]
     pub surface: Surface,
     /// Closed chains of curves, the outer one of a plane or a patch first; the others are holes. On what
-    /// is round one may be the outer one, or two run around the axis, and these come first. Seen from the
-    /// side to which the normal points, the face lies on the left of each.
+    /// is round one may be the outer one, or two run around the axis, and these come first; on a sphere
+    /// there is one circle. Seen from the side to which the normal points, the face lies on the left of
+    /// each.
     pub loops: Vec<Vec<Step>>,
 }
 
@@ -39,8 +39,8 @@ pub struct Step {
     pub reversed: bool,
 }
 
-/// What bounds a face: an edge, an arc or a spline of the wireframe, by its index, or an inferred
-/// line.
+/// What bounds a face: an edge, an arc or a spline of the wireframe, by its index, an inferred line, or
+/// the rim of a dome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CurveIndex {
@@ -53,6 +53,15 @@ pub enum CurveIndex {
     /// No edge, but a straight line between two junctions, the lower first, where two faces meet,
     /// without a crease or with one that no image shows from end to end: inferred.
     Smooth([usize; 2]),
+    /// No edge, but the circle in which a dome touches what is beside it without a crease: inferred.
+    Rim(usize),
+}
+
+impl CurveIndex {
+    /// Whether no image shows it.
+    pub fn is_inferred(&self) -> bool {
+        matches!(self, Self::Smooth(_) | Self::Rim(_))
+    }
 }
 
 impl Shell {
@@ -85,7 +94,7 @@ impl Shell {
         let step = |step: &Step| {
             let curve = match step.curve {
                 CurveIndex::Edge(edge) => CurveIndex::Edge(new_edge(edge)?),
-                curve @ (CurveIndex::Arc(_) | CurveIndex::Spline(_)) => curve,
+                curve @ (CurveIndex::Arc(_) | CurveIndex::Spline(_) | CurveIndex::Rim(_)) => curve,
                 CurveIndex::Smooth([a, b]) => {
                     CurveIndex::Smooth([new_junction(a)?, new_junction(b)?])
                 }
@@ -109,22 +118,23 @@ impl Shell {
 
 impl Face {
     /// Whether its surface is one, and its loops are closed chains of curves that exist; of an
-    /// extruded one two splines, as loops of their own or joined by two edges or inferred lines.
-    pub(crate) fn is_valid(
-        &self,
-        wireframe: &Wireframe3d,
-        arcs: &[CircularArc],
-        splines: &[Spline],
-    ) -> bool {
+    /// extruded one two splines, as loops of their own or joined by two edges or inferred lines, of a
+    /// sphere one circle.
+    pub(crate) fn is_valid(&self, graph: &MeasuredGraph) -> bool {
         let exists = |step: &Step| match step.curve {
-            CurveIndex::Edge(edge) => edge < wireframe.edges.len(),
-            CurveIndex::Arc(arc) => arc < arcs.len(),
-            CurveIndex::Spline(spline) => spline < splines.len(),
-            CurveIndex::Smooth([a, b]) => a < b && b < wireframe.junctions.len(),
+            CurveIndex::Edge(edge) => edge < graph.wireframe.edges.len(),
+            CurveIndex::Arc(arc) => arc < graph.arcs.len(),
+            CurveIndex::Spline(spline) => spline < graph.splines.len(),
+            CurveIndex::Smooth([a, b]) => a < b && b < graph.wireframe.junctions.len(),
+            CurveIndex::Rim(dome) => dome < graph.domes.len(),
         };
+        let is_circle = |step: &Step| matches!(step.curve, CurveIndex::Arc(_) | CurveIndex::Rim(_));
         let has_shape = match self.surface {
             Surface::Extruded { .. } => self.rims().is_some(),
             Surface::Patch { .. } => self.sides().is_some(),
+            Surface::Sphere { .. } => {
+                self.loops.len() == 1 && self.loops[0].len() == 1 && self.steps().all(is_circle)
+            }
             Surface::Plane { .. } | Surface::Cylinder { .. } | Surface::Cone { .. } => {
                 !self.loops.is_empty()
             }
@@ -132,7 +142,7 @@ impl Face {
         self.surface.is_valid()
             && has_shape
             && self.steps().all(exists)
-            && (self.loops.iter()).all(|steps| is_closed(steps, wireframe, (arcs, splines)))
+            && (self.loops.iter()).all(|steps| is_closed(steps, graph))
     }
 
     /// The four sides of a patch, of which some have no step; `None` of what has no such sides.
@@ -186,12 +196,14 @@ impl Face {
     fn map(&self, f: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Self {
         let origin = f(&Vector3::zeros());
         let scale = (f(&Vector3::x()) - origin).x;
-        // In the mirror, left is right.
-        let loops = if scale < 0.0 {
-            self.turned().loops
-        } else {
-            self.loops.clone()
-        };
+        let mut loops = self.loops.clone();
+        if scale < 0.0 {
+            // In the mirror, left is right; but rims of domes run around these.
+            loops = self.turned().loops;
+            for step in loops.iter_mut().flatten() {
+                step.reversed ^= matches!(step.curve, CurveIndex::Rim(_));
+            }
+        }
         Self {
             surface: self.surface.map(f),
             loops,
@@ -219,20 +231,17 @@ impl Step {
 
 /// Whether each step begins where the one before it ends. A step alone is a circle or a spline that
 /// runs around.
-fn is_closed(
-    steps: &[Step],
-    wireframe: &Wireframe3d,
-    (arcs, splines): (&[CircularArc], &[Spline]),
-) -> bool {
-    let junctions = &wireframe.junctions;
+fn is_closed(steps: &[Step], graph: &MeasuredGraph) -> bool {
+    let junctions = &graph.wireframe.junctions;
     let ends = |step: &Step| {
         let [start, end] = match step.curve {
-            CurveIndex::Edge(edge) => wireframe.edges[edge],
-            CurveIndex::Arc(arc) => nearest_junctions(ends_of_arc(&arcs[arc]), junctions)?,
+            CurveIndex::Edge(edge) => graph.wireframe.edges[edge],
+            CurveIndex::Arc(arc) => nearest_junctions(ends_of_arc(&graph.arcs[arc]), junctions)?,
             CurveIndex::Spline(spline) => {
-                nearest_junctions(ends_of_spline(&splines[spline]), junctions)?
+                nearest_junctions(ends_of_spline(&graph.splines[spline]), junctions)?
             }
             CurveIndex::Smooth(ends) => ends,
+            CurveIndex::Rim(_) => return None,
         };
         Some(if step.reversed {
             [end, start]
@@ -244,8 +253,9 @@ fn is_closed(
         [] => false,
         [step] => match step.curve {
             CurveIndex::Edge(_) | CurveIndex::Smooth(_) => false,
-            CurveIndex::Arc(arc) => arcs[arc].is_closed(),
-            CurveIndex::Spline(spline) => splines[spline].closed,
+            CurveIndex::Arc(arc) => graph.arcs[arc].is_closed(),
+            CurveIndex::Spline(spline) => graph.splines[spline].closed,
+            CurveIndex::Rim(_) => true,
         },
         [.., last] => {
             let before = std::iter::once(last).chain(steps);

@@ -297,14 +297,15 @@ mod tests {
         let mut junctions: Vec<Vector3<f64>> = (0..8).map(corner).collect();
         junctions[6].z += lift;
         let wireframe = Wireframe3d { junctions, edges };
-        let graph = MeasuredGraph {
-            wireframe: &wireframe,
-            arcs,
-            splines: &[],
-            covariances: &[],
-        };
-        let shells = find_shells(&graph, &[], &[]);
+        let shells = find_shells(&graph(&wireframe, arcs), &[], &[]);
         (wireframe, shells)
+    }
+
+    fn graph<'a>(wireframe: &'a Wireframe3d, arcs: &'a [CircularArc]) -> MeasuredGraph<'a> {
+        MeasuredGraph {
+            arcs,
+            ..MeasuredGraph::of(wireframe)
+        }
     }
 
     fn patches(shells: &[Shell]) -> usize {
@@ -336,14 +337,15 @@ mod tests {
         let truth: f64 = (0..count)
             .map(|k| below(share(k) + 0.5 / count as f64))
             .sum::<f64>();
-        let geometry = ShellGeometry::new(shell, &wireframe, &arcs, &[]);
+        let geometry = ShellGeometry::new(shell, &graph(&wireframe, &arcs));
         let volume = geometry.volume(shell) * count as f64;
         assert!((volume / truth - 1.0).abs() < 1e-4, "{volume} {truth}");
         // In the mirror as well.
         let mirrored = |point: &Vector3<f64>| -point;
         let turned = arcs.map(|arc| arc.map(mirrored));
         let shell = shell.map(mirrored);
-        let geometry = ShellGeometry::new(&shell, &wireframe.map(|point| -point), &turned, &[]);
+        let mirror = wireframe.map(|point| -point);
+        let geometry = ShellGeometry::new(&shell, &graph(&mirror, &turned));
         let volume = geometry.volume(&shell) * count as f64;
         assert!((volume / truth - 1.0).abs() < 1e-4, "{volume} {truth}");
     }

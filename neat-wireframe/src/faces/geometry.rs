@@ -5,7 +5,8 @@
 //! boundary representation wants them on all of them; they move by the shortest way that leads
 //! there.
 
-use super::curves::{ends_of_arc, ends_of_spline, nearest_junctions};
+use super::cap::Cap;
+use super::curves::{MeasuredGraph, ends_of_arc, ends_of_spline, nearest_junctions};
 use super::extrusion::{extrude, moments_of_wall};
 use super::face::{CurveIndex, Face, Shell, Step};
 use super::patch::PatchFace;
@@ -14,7 +15,7 @@ use super::quadrature::{GAUSS, place_and_derivative};
 use super::surface::Surface;
 use super::unrolled::{Chain, Unrolled, turn};
 use nalgebra::{DMatrix, DVector, Vector3};
-use neat_core::{CircularArc, Spline, Wireframe3d};
+use neat_core::{CircularArc, Spline};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -28,6 +29,9 @@ pub(crate) const FINE: f64 = 0.02;
 /// Arcs that go around no axis become splines whose pieces turn by so much: these differ from the
 /// arc by less than a ten thousandth of its radius (a test of `Spline::nearest_to`).
 const TURN_OF_PIECES: f64 = 0.4;
+/// An arc that turns by less, in radians, is a straight line: over its chord it rises by a thousandth of
+/// that, and nobody knows in which plane.
+const FLAT: f64 = 0.008;
 /// They go around one that is turned against theirs by less than this sine: 10°.
 const TILTED: f64 = 0.174;
 /// Round surfaces are not flat: the way to them is gone in so many steps.
@@ -61,12 +65,7 @@ impl ShellGeometry {
     ///
     /// # Panics
     /// If the shell names curves that the wireframe does not have.
-    pub fn new(
-        shell: &Shell,
-        wireframe: &Wireframe3d,
-        arcs: &[CircularArc],
-        splines: &[Spline],
-    ) -> Self {
+    pub fn new(shell: &Shell, graph: &MeasuredGraph) -> Self {
         let mut surfaces_of: BTreeMap<CurveIndex, Vec<Surface>> = BTreeMap::new();
         let mut curves = BTreeMap::new();
         for face in &shell.faces {
@@ -76,7 +75,7 @@ impl ShellGeometry {
                         .entry(step.curve)
                         .or_default()
                         .push(face.surface);
-                    let curve = as_measured(step, steps.len() > 1, wireframe, (arcs, splines));
+                    let curve = as_measured(step, steps.len() > 1, graph);
                     curves.insert(step.curve, curve);
                 }
             }
@@ -91,7 +90,7 @@ impl ShellGeometry {
             }
         }
         let vertices: BTreeMap<usize, Vector3<f64>> = (surfaces_at.into_iter())
-            .map(|(j, surfaces)| (j, on_surfaces(wireframe.junctions[j], &surfaces)))
+            .map(|(j, surfaces)| (j, on_surfaces(graph.wireframe.junctions[j], &surfaces)))
             .collect();
         for (index, curve) in &mut curves {
             let surfaces = &surfaces_of[index];
@@ -154,6 +153,7 @@ impl ShellGeometry {
         match face.surface {
             Surface::Plane { normal, .. } => normal.dot(&self.area_vector(face)),
             Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face)[0],
+            Surface::Sphere { .. } => self.moments_of_cap(face)[0],
             Surface::Extruded { direction } => self.moments_of_wall(face, direction)[0],
             Surface::Patch { .. } => self.moments_of_patch(face)[0],
         }
@@ -167,6 +167,7 @@ impl ShellGeometry {
                 (offset - normal.dot(&self.origin)) * normal.dot(&self.area_vector(face))
             }
             Surface::Cylinder { .. } | Surface::Cone { .. } => self.moments_of_round(face)[1],
+            Surface::Sphere { .. } => self.moments_of_cap(face)[1],
             Surface::Extruded { direction } => self.moments_of_wall(face, direction)[1],
             Surface::Patch { .. } => self.moments_of_patch(face)[1],
         };
@@ -185,10 +186,10 @@ impl ShellGeometry {
                 return sign * area_vector_of_spline(spline, &self.origin);
             }
             let twice = match (&curve.arc, ends) {
+                // Its chord, and the segment beside that: the centre of a flat arc is far away.
                 (Some(arc), ends) => {
                     let [start, end] = ends.unwrap_or_default();
-                    (arc.center - self.origin).cross(&(end - start))
-                        + arc.normal() * arc.radius.powi(2) * arc.sweep()
+                    start.cross(&end) + arc.normal() * twice_segment(arc)
                 }
                 (None, Some([start, end])) => start.cross(&end),
                 (None, None) => Vector3::zeros(),
@@ -232,6 +233,14 @@ impl ShellGeometry {
         patch.map_or([0.0, 0.0], |patch| patch.moments(&self.origin))
     }
 
+    /// Area of a cap of a sphere, and the flux of x through it.
+    fn moments_of_cap(&self, face: &Face) -> [f64; 2] {
+        let rim = face.steps().next();
+        let rim = rim.map(|step| self.points(step, FINE)).unwrap_or_default();
+        let cap = Cap::new(&face.surface, &rim);
+        cap.map_or([0.0, 0.0], |cap| cap.moments(&self.origin))
+    }
+
     /// Area of a wall between two splines, and the flux of x through it.
     fn moments_of_wall(&self, face: &Face, direction: Vector3<f64>) -> [f64; 2] {
         let Some([one, other]) = face.rims() else {
@@ -246,13 +255,20 @@ impl ShellGeometry {
     }
 }
 
+/// Twice the area between an arc and its chord.
+pub(crate) fn twice_segment(arc: &CircularArc) -> f64 {
+    arc.radius.powi(2) * (arc.sweep() - arc.sweep().sin())
+}
+
 /// The curve of a step as the wireframe has it: `open` if others are beside it in its loop.
-fn as_measured(
-    step: &Step,
-    open: bool,
-    wireframe: &Wireframe3d,
-    (arcs, splines): (&[CircularArc], &[Spline]),
-) -> ShellCurve {
+fn as_measured(step: &Step, open: bool, graph: &MeasuredGraph) -> ShellCurve {
+    let MeasuredGraph {
+        wireframe,
+        arcs,
+        splines,
+        domes,
+        ..
+    } = *graph;
     let junctions = |ends| open.then(|| nearest_junctions(ends, &wireframe.junctions))?;
     match step.curve {
         CurveIndex::Edge(edge) => ShellCurve {
@@ -261,7 +277,7 @@ fn as_measured(
         },
         CurveIndex::Arc(arc) => ShellCurve {
             ends: junctions(ends_of_arc(&arcs[arc])),
-            arc: Some(arcs[arc]),
+            arc: (!open || arcs[arc].sweep() > FLAT).then_some(arcs[arc]),
             spline: None,
         },
         CurveIndex::Spline(spline) => ShellCurve {
@@ -271,6 +287,10 @@ fn as_measured(
         },
         CurveIndex::Smooth(ends) => ShellCurve {
             ends: Some(ends),
+            ..ShellCurve::default()
+        },
+        CurveIndex::Rim(dome) => ShellCurve {
+            arc: Some(domes[dome].rim()),
             ..ShellCurve::default()
         },
     }
@@ -353,8 +373,11 @@ fn spline_on_surfaces(
 }
 
 /// The circle of an arc in the plane of a face and around the axis of another, or where two round
-/// faces of one axis meet. A whole one begins where all circles around this axis do.
+/// faces of one axis meet.
 fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> CircularArc {
+    if let Some((center, radius, normal)) = circle_on_sphere(arc, surfaces) {
+        return turned_as(arc, (center, radius, normal), whole);
+    }
     let (mut center, mut radius) = (arc.center, arc.radius);
     let plane = surfaces.iter().find_map(|surface| match surface {
         Surface::Plane { normal, offset } => Some((*normal, *offset)),
@@ -400,6 +423,48 @@ fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> C
             arc.normal()
         }
     };
+    turned_as(arc, (center, radius, normal), whole)
+}
+
+/// Centre, radius and normal of the circle in which a sphere meets a plane, or a cylinder of its axis.
+fn circle_on_sphere(
+    arc: &CircularArc,
+    surfaces: &[Surface],
+) -> Option<(Vector3<f64>, f64, Vector3<f64>)> {
+    let (center, radius) = surfaces.iter().find_map(|surface| match surface {
+        Surface::Sphere { center, radius, .. } => Some((*center, *radius)),
+        _ => None,
+    })?;
+    surfaces.iter().find_map(|surface| match surface {
+        Surface::Plane { normal, offset } => {
+            let height = offset - normal.dot(&center);
+            let squared = radius * radius - height * height;
+            Some((center + normal * height, squared.max(0.0).sqrt(), *normal))
+        }
+        Surface::Cylinder {
+            point,
+            axis,
+            radius: of_cylinder,
+            ..
+        } => {
+            // Where it touches the cylinder, it is as wide.
+            let height = (radius * radius - of_cylinder * of_cylinder)
+                .max(0.0)
+                .sqrt();
+            let side = axis.dot(&(arc.center - center)).signum();
+            let middle = point + axis * axis.dot(&(center - point));
+            Some((middle + axis * (side * height), *of_cylinder, *axis))
+        }
+        _ => None,
+    })
+}
+
+/// A circle that runs as an arc does. A whole one begins where all circles around this axis do.
+fn turned_as(
+    arc: &CircularArc,
+    (center, radius, normal): (Vector3<f64>, f64, Vector3<f64>),
+    whole: bool,
+) -> CircularArc {
     let up = normal * normal.dot(&arc.normal()).signum();
     let toward = if whole {
         Vector3::from(NO_AXIS)
@@ -433,6 +498,50 @@ fn between(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Rotation3;
+    use neat_core::Wireframe3d;
+
+    #[test]
+    fn a_side_that_is_all_but_straight_changes_no_area() {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let turn = Rotation3::new(Vector3::new(0.3, -0.7, 0.5));
+        let junctions: Vec<Vector3<f64>> = (corners.iter())
+            .map(|[x, y]| turn * Vector3::new(*x, *y, 0.2))
+            .collect();
+        // In a plane that has nothing to do with that of the face.
+        let [start, end] = [junctions[3], junctions[0]];
+        let bow = turn * Vector3::new(0.0, 1e-6, -1e-5);
+        let flat = CircularArc::through([start, 0.5 * (start + end) + bow, end]).unwrap();
+        assert!(flat.radius > 1e4);
+        let wireframe = Wireframe3d {
+            junctions,
+            edges: vec![[0, 1], [1, 2], [2, 3]],
+        };
+        let graph = MeasuredGraph {
+            arcs: &[flat],
+            ..MeasuredGraph::of(&wireframe)
+        };
+        let step = |curve| Step {
+            curve,
+            reversed: false,
+        };
+        let normal = turn * Vector3::z();
+        let sides = [0, 1, 2].map(|edge| step(CurveIndex::Edge(edge)));
+        let face = Face {
+            surface: Surface::Plane {
+                normal,
+                offset: 0.2,
+            },
+            loops: vec![[&sides[..], &[step(CurveIndex::Arc(0))]].concat()],
+        };
+        let shell = Shell {
+            closed: false,
+            faces: vec![face],
+        };
+        let geometry = ShellGeometry::new(&shell, &graph);
+        let area = geometry.area(&shell.faces[0]);
+        assert!((area - 1.0).abs() < 1e-4, "{area}");
+    }
 
     #[test]
     fn a_short_arc_stays_short_and_a_long_one_long() {

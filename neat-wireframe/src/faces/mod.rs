@@ -3,7 +3,8 @@
 //!
 //! Curves that lie in one plane within their covariances divide it into cells, and two coaxial
 //! circles are the rims of a cylinder or a cone: each is a face that may be there
-//! (`candidates.rs`). Where a round face goes on without a crease, the line between them is
+//! (`candidates.rs`), and what outlines have shown of spheres are caps (`domes.rs`). Where a round face
+//! goes on without a crease, the line between them is
 //! inferred (`rulings.rs`), and so is an edge that is missing where two planes meet
 //! (`creases.rs`). Images speak against a face through which they show what lies behind it
 //! (`visibility.rs`); among the others those are chosen that give the most edges two faces
@@ -28,19 +29,21 @@
 //!         .filter(|[a, b]| a != b)
 //!         .collect(),
 //! };
-//! let graph = MeasuredGraph { wireframe: &cube, arcs: &[], splines: &[], covariances: &[] };
+//! let graph = MeasuredGraph::of(&cube);
 //! let shells = find_shells(&graph, &[], &[]);
 //! assert!(shells[0].closed && shells[0].faces.len() == 6);
-//! let geometry = ShellGeometry::new(&shells[0], &cube, &[], &[]);
+//! let geometry = ShellGeometry::new(&shells[0], &graph);
 //! assert!((geometry.volume(&shells[0]) - 1.0).abs() < 1e-9);
 //! ```
 
 mod bounds;
 mod candidates;
+mod cap;
 mod cells;
 mod chain;
 mod creases;
 mod curves;
+mod domes;
 mod explained_planes;
 mod extrusion;
 mod face;
@@ -83,8 +86,9 @@ pub(crate) use curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 pub use face::{CurveIndex, Face, Shell, Step};
 pub(crate) use triangulation::{points_within, triangles};
 
+pub(crate) use cap::Cap;
 pub(crate) use extrusion::moments_of_wall;
-pub(crate) use geometry::{FINE, area_vector_of_spline, goes_around};
+pub(crate) use geometry::{FINE, area_vector_of_spline, goes_around, twice_segment};
 pub use geometry::{ShellCurve, ShellGeometry};
 pub(crate) use patch::PatchFace;
 pub use surface::Surface;
@@ -118,7 +122,9 @@ pub fn find_shells(
     let observed = Curves::new(graph);
     let mut inferred = rulings::missing_rulings(&observed);
     inferred.extend(creases::facing_ends(&observed));
-    let (curves, faces) = candidates::candidates(observed.with_inferred(inferred));
+    let domes = domes::domes(&observed, graph.domes);
+    inferred.extend(domes.rims);
+    let (curves, faces) = candidates::candidates(observed.with_inferred(inferred), domes.caps);
     let _span = tracing::debug_span!("find_shells", faces = faces.len()).entered();
     let detected = DetectedView::all(views);
     let sightings = Sightings::new(&curves, &detected);

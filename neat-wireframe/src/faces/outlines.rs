@@ -133,11 +133,10 @@ mod tests {
                 (0..points.len() / 2).map(|k| [2 * k, 2 * k + 1]).collect();
             views_of_edges(&[camera], &points, &edges)
         });
+        let nothing = Wireframe3d::default();
         let graph = MeasuredGraph {
-            wireframe: &Wireframe3d::default(),
             arcs: &[circle(-HALF_HEIGHT), circle(HALF_HEIGHT)],
-            splines: &[],
-            covariances: &[],
+            ..MeasuredGraph::of(&nothing)
         };
         find_shells(&graph, &views.collect::<Vec<_>>(), &[])
     }

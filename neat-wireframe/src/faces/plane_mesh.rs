@@ -163,12 +163,7 @@ mod tests {
                 .collect(),
             edges: vec![[0, 1], [1, 2], [2, 3], [3, 0], [2, 4], [4, 5], [5, 2]],
         };
-        let curves = Curves::new(&MeasuredGraph {
-            wireframe: &wireframe,
-            arcs: &[],
-            splines: &[],
-            covariances: &[],
-        });
+        let curves = Curves::new(&MeasuredGraph::of(&wireframe));
         let points = curves.all.iter().flat_map(|curve| &curve.measured);
         let fit = PlaneFit::through(points, curves.extent).unwrap();
         let mesh = PlaneMesh::new(&curves, &fit.solved().unwrap()).unwrap();

@@ -3,6 +3,7 @@
 
 use super::bounds::Bounds;
 use super::curves::{Curve, Curves};
+use super::face::CurveIndex;
 use super::plane_fit::{FittedPlane, PlaneFit};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -50,11 +51,14 @@ pub(super) fn coplanar_curves(curves: &Curves) -> Vec<CoplanarCurves> {
 }
 
 /// Pairs of edges at a junction and single arcs and splines, those first that determine their plane
-/// best: by the area that they span.
+/// best: by the area that they span. Where a dome touches something there is no plane.
 fn seeds(curves: &Curves) -> Vec<Vec<usize>> {
     let mut at_junction: Vec<(usize, usize)> = Vec::new();
     let mut seeds: Vec<(f64, Vec<usize>)> = Vec::new();
     for (place, curve) in curves.all.iter().enumerate() {
+        if matches!(curve.index, CurveIndex::Rim(_)) {
+            continue;
+        }
         if curve.is_straight() {
             at_junction.extend(curve.ends.iter().flatten().map(|end| (*end, place)));
             continue;
@@ -107,6 +111,7 @@ fn grown(curves: &Curves, seed: &[usize], neighbours: &Neighbours) -> Option<Cop
         .widened(REACH * curves.arc_sigma());
     let within = (0..curves.all.len()).filter(|place| {
         neighbours.bounds[*place].lies_in(&around)
+            && !matches!(curves.all[*place].index, CurveIndex::Rim(_))
             && holds(&plane, &curves.all[*place])
             && members.binary_search(place).is_err()
     });

@@ -1,6 +1,7 @@
 //! Where a face lies in space: what a ray hits.
 
 use super::bounds::Bounds;
+use super::cap::Cap;
 use super::cells::{closed_points, polygon_of};
 use super::curves::Curves;
 use super::face::{Face, Step};
@@ -33,6 +34,7 @@ pub(super) enum Region {
         surface: Unrolled,
         loops: Vec<Chain>,
     },
+    Cap(Cap),
     /// Between two splines.
     Wall(Wall),
     /// Through its boundary, with the triangles of a grid.
@@ -54,6 +56,10 @@ impl Region {
                     frame,
                     polygons: face.loops.iter().map(polygon).collect(),
                 })
+            }
+            Surface::Sphere { .. } => {
+                let around = closed_points(curves, face.loops.first()?);
+                Cap::new(&face.surface, &around).map(Self::Cap)
             }
             Surface::Extruded { direction } => {
                 let [one, other] = face.rims()?;
@@ -94,6 +100,7 @@ impl Region {
                 let on_face = hits.filter(|(_, place)| unrolled::contains(loops, place));
                 on_face.map(|(t, _)| t).collect()
             }
+            Self::Cap(cap) => cap.hits(origin, direction),
             Self::Wall(wall) => wall.hits(origin, direction),
             Self::Patch { face, grid, bounds } => {
                 if !bounds.are_hit(origin, direction) {
@@ -125,6 +132,9 @@ impl Region {
             Self::Plane { .. } => 0,
             Self::Round { surface, loops } => (0..RULINGS)
                 .filter(|ruling| rulings_at(surface, loops, *ruling).iter().any(passes))
+                .count(),
+            Self::Cap(cap) => (0..RULINGS)
+                .filter(|line| cap.pieces_at(*line, RULINGS, AT_END).iter().any(passes))
                 .count(),
             Self::Wall(wall) => wall
                 .rulings(RULINGS)
@@ -161,6 +171,7 @@ impl Region {
         match self {
             Self::Plane { frame, .. } => (frame.normal.dot(point) - frame.offset).abs(),
             Self::Round { surface, .. } => surface.distance(point),
+            Self::Cap(cap) => cap.distance(point),
             Self::Wall(wall) => wall.distance(point),
             Self::Patch { face, .. } => face.patch.distance(point),
         }
@@ -171,6 +182,7 @@ impl Region {
         let toward = match self {
             Self::Plane { frame, .. } => frame.normal,
             Self::Round { surface, .. } => surface.outward(surface.place(point).x),
+            Self::Cap(cap) => cap.outward(point),
             Self::Wall(wall) => return wall.is_near(point, distance),
             Self::Patch { bounds, .. } if !bounds.widened(distance).contain(point) => return false,
             Self::Patch { face, .. } => {

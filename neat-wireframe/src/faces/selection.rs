@@ -4,8 +4,8 @@
 //! The energy is a sum over faces and curves, in nats. A face costs what images say against it
 //! ([`super::visibility`]). A curve that lacks a face costs [`MISSING_FACE`], twice if it has none;
 //! a curve between two faces of one plane is no crease and costs [`FLAT`]. An inferred line that has
-//! no face is none, and costs nothing. A cone costs [`CONE`], an acute angle up to [`ACUTE`]. No
-//! curve has three faces, no two faces lie on each other, and none but a plane passes through
+//! no face is none, and costs nothing. A cone costs [`CONE`], an acute angle up to [`ACUTE`], and a part of
+//! a sphere wins what its outlines have said for it, [`SHOWN`]. No curve has three faces, no two faces lie on each other, and none but a plane passes through
 //! another face. The minimum is found by branch and bound.
 
 use super::curves::{Curve, Curves};
@@ -26,13 +26,16 @@ const FLAT: f64 = 2.0 * MISSING_FACE;
 /// Coaxial rims of different radii stand on two sides of a step more often than they bound a cone.
 /// Less than a rim without a face: it decides where both would do.
 const CONE: f64 = 1.0;
+/// A dome has at least as much (`LEAST` of `assemble/domes.rs`).
+const SHOWN: f64 = 12.0;
 /// Two faces under an acute angle cost so much times its cosine: rims alone do not tell a pin with
 /// chamfers from a tube with sharp ends or from two frustums, and most things are blunt. Less than
 /// a rim without a face.
 const ACUTE: f64 = 1.0;
 /// Faces against which images speak more than this are out whatever they would close.
 pub(super) const MOST_AGAINST: f64 = 3.0;
-/// Cosine of the angle of two faces that go on as one plane, or lie on each other: 3°.
+/// Cosine of the angle of two faces that go on as one plane, lie on each other, or touch at the rim of a
+/// dome: 3°.
 pub(super) const SAME_PLANE: f64 = 0.9986;
 /// Places of a curve at which the angle between two faces is asked.
 const PLACES: usize = 7;
@@ -79,7 +82,7 @@ pub(super) fn select(
     let mut beside: Vec<Vec<(usize, Pair)>> = vec![Vec::new(); faces.len()];
     let mut contended: Vec<Vec<usize>> = possible.iter().map(|face| vec![*face]).collect();
     for (curve, at) in &at_curve {
-        let is_inferred = matches!(curve, CurveIndex::Smooth(_));
+        let is_inferred = curve.is_inferred();
         for (k, (one, step)) in at.iter().enumerate() {
             for (other, other_step) in &at[k + 1..] {
                 let pair = pair(curves, [&faces[*one], &faces[*other]], [step, other_step]);
@@ -150,9 +153,14 @@ fn pair(curves: &Curves, faces: [&Face; 2], steps: [&Step; 2]) -> Pair {
         cosines.sort_by(f64::total_cmp);
         cosines[count / 2]
     });
-    // A plane that touches a cylinder or a cone goes on as another surface: the end of a slot.
+    // A plane that touches a cylinder or a cone goes on as another surface: the end of a slot. So does
+    // what touches a sphere.
     let is_plane = |face: &Face| matches!(face.surface, Surface::Plane { .. });
-    if is_plane(faces[0]) != is_plane(faces[1]) {
+    let is_sphere = |face: &Face| matches!(face.surface, Surface::Sphere { .. });
+    if matches!(steps[0].curve, CurveIndex::Rim(_)) && cosine > -SAME_PLANE {
+        Pair::Excluding
+    } else if is_plane(faces[0]) != is_plane(faces[1]) || is_sphere(faces[0]) != is_sphere(faces[1])
+    {
         Pair::Crease(cosine)
     } else if cosine > SAME_PLANE {
         Pair::Excluding
@@ -197,8 +205,12 @@ impl<'a> Search<'a> {
         let known: Vec<CurveIndex> = known.into_iter().collect();
         let place = |step: &Step| known.binary_search(&step.curve).ok();
         let candidate = |face: usize| {
-            let is_cone = matches!(faces[face].surface, Surface::Cone { .. });
-            let cost = against[face] + if is_cone { CONE } else { 0.0 };
+            let of_surface = match faces[face].surface {
+                Surface::Cone { .. } => CONE,
+                Surface::Sphere { .. } => -SHOWN,
+                _ => 0.0,
+            };
+            let cost = against[face] + of_surface;
             let curves: Vec<usize> = faces[face].steps().filter_map(place).collect();
             Candidate {
                 face,
@@ -211,13 +223,12 @@ impl<'a> Search<'a> {
             .filter(|candidate| candidate.gain > 0.0)
             .collect();
         order.sort_by(|a, b| b.gain.total_cmp(&a.gain).then(a.face.cmp(&b.face)));
-        let is_inferred = |curve: &CurveIndex| matches!(curve, CurveIndex::Smooth(_));
         Self {
             beside,
             order,
             taken: BTreeSet::new(),
             curves: (known.iter())
-                .map(|curve| (is_inferred(curve), 0))
+                .map(|curve| (curve.is_inferred(), 0))
                 .collect(),
             best: (0.0, Vec::new()),
             states: 0,

@@ -58,13 +58,7 @@ fn shells_in(
     views: &[ViewObservation],
     points: &[SurfacePoint],
 ) -> Vec<Shell> {
-    let graph = MeasuredGraph {
-        wireframe,
-        arcs: &[],
-        splines: &[],
-        covariances: &[],
-    };
-    find_shells(&graph, views, points)
+    find_shells(&MeasuredGraph::of(wireframe), views, points)
 }
 
 #[test]
@@ -85,13 +79,14 @@ fn points_close_a_wall_that_lacks_an_edge_around_what_they_see_through() {
     );
     let points: Vec<SurfacePoint> = on_wall.into_iter().chain(behind).collect();
     let shells = shells_of(&wall, &points);
+    let graph = MeasuredGraph::of(&wall);
     let area: f64 = (shells.iter())
         .flat_map(|shell| {
-            let geometry = ShellGeometry::new(shell, &wall, &[], &[]);
+            let geometry = ShellGeometry::new(shell, &graph);
             shell.faces.iter().map(move |face| geometry.area(face))
         })
         .sum();
-    let is_valid = |face: &Face| face.is_valid(&wall, &[], &[]);
+    let is_valid = |face: &Face| face.is_valid(&graph);
     assert!(shells.iter().flat_map(|shell| &shell.faces).all(is_valid));
     assert!(shells.iter().all(|shell| !shell.closed));
     assert!((area - (1.44 - 0.16)).abs() < 1e-9, "{area} {shells:?}");

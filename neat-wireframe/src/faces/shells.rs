@@ -45,7 +45,7 @@ pub(super) fn shells(
             closed: orientable && two_each,
             faces,
         };
-        let geometry = ShellGeometry::new(&shell, graph.wireframe, graph.arcs, graph.splines);
+        let geometry = ShellGeometry::new(&shell, graph);
         face_outward(&mut shell, &geometry, views);
         if shell.closed && leave_out_where_curves_are(&mut shell, curves, &geometry) {
             // What is left may fall apart.

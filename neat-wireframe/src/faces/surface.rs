@@ -37,6 +37,15 @@ pub enum Surface {
         /// As of a cylinder.
         convex: bool,
     },
+    /// The points at a distance from a centre.
+    Sphere {
+        /// The centre.
+        center: Vector3<f64>,
+        /// The distance.
+        radius: f64,
+        /// Whether the normal points away from the centre.
+        convex: bool,
+    },
     /// Straight lines in one direction through two splines, between which the face is: where it
     /// lies, and to which side its normal points, they say alone.
     Extruded {
@@ -54,8 +63,8 @@ pub enum Surface {
 
 impl Surface {
     /// How far a point lies over the surface, always 0 for one that its boundary says alone; away from
-    /// the axis of a round one whichever side its normal points to, and the direction in which that
-    /// grows.
+    /// the axis or centre of a round one whichever side its normal points to, and the direction in which
+    /// that grows.
     pub fn height_of(&self, at: &Vector3<f64>) -> (f64, Vector3<f64>) {
         let around = |offset: Vector3<f64>, axis: &Vector3<f64>| {
             let along = axis.dot(&offset);
@@ -66,6 +75,11 @@ impl Surface {
         match self {
             Self::Plane { normal, offset } => (normal.dot(at) - offset, *normal),
             Self::Extruded { .. } | Self::Patch { .. } => (0.0, Vector3::zeros()),
+            Self::Sphere { center, radius, .. } => {
+                let offset = at - center;
+                let outward = offset.try_normalize(0.0).unwrap_or_default();
+                (offset.norm() - radius, outward)
+            }
             Self::Cylinder {
                 point,
                 axis,
@@ -99,15 +113,19 @@ impl Surface {
             | Self::Extruded { .. }
             | Self::Patch { .. }
             | Self::Cylinder { convex: true, .. }
-            | Self::Cone { convex: true, .. } => outward,
-            Self::Cylinder { .. } | Self::Cone { .. } => -outward,
+            | Self::Cone { convex: true, .. }
+            | Self::Sphere { convex: true, .. } => outward,
+            Self::Cylinder { .. } | Self::Cone { .. } | Self::Sphere { .. } => -outward,
         }
     }
 
     /// A point of the axis and its direction; `None` of what has none.
     pub(super) fn axis(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         match self {
-            Self::Plane { .. } | Self::Extruded { .. } | Self::Patch { .. } => None,
+            Self::Plane { .. }
+            | Self::Sphere { .. }
+            | Self::Extruded { .. }
+            | Self::Patch { .. } => None,
             Self::Cylinder { point, axis, .. } => Some((*point, *axis)),
             Self::Cone { apex, axis, .. } => Some((*apex, *axis)),
         }
@@ -121,7 +139,10 @@ impl Surface {
         along: &Vector3<f64>,
     ) -> Option<[f64; 2]> {
         match self {
-            Self::Plane { .. } | Self::Extruded { .. } | Self::Patch { .. } => None,
+            Self::Plane { .. }
+            | Self::Sphere { .. }
+            | Self::Extruded { .. }
+            | Self::Patch { .. } => None,
             Self::Cylinder { radius, .. } => Some([*radius, 0.0]),
             Self::Cone {
                 apex,
@@ -142,6 +163,9 @@ impl Surface {
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
         match self {
             Self::Plane { normal, offset } => unit(normal) && offset.is_finite(),
+            Self::Sphere { center, radius, .. } => {
+                finite(center) && radius.is_normal() && *radius > 0.0
+            }
             Self::Extruded { direction } => unit(direction),
             Self::Patch { sides } => sides.iter().filter(|steps| **steps > 0).count() > 1,
             Self::Cylinder {
@@ -196,6 +220,15 @@ impl Surface {
                 half_angle,
                 convex,
             },
+            Self::Sphere {
+                center,
+                radius,
+                convex,
+            } => Self::Sphere {
+                center: f(&center),
+                radius: radius * scale.abs(),
+                convex,
+            },
             Self::Extruded { .. } => *self,
             // In the mirror, its loop runs the other way around.
             Self::Patch { .. } if scale < 0.0 => self.turned(),
@@ -208,7 +241,9 @@ impl Surface {
         let mut turned = *self;
         match &mut turned {
             Self::Plane { normal, offset } => (*normal, *offset) = (-*normal, -*offset),
-            Self::Cylinder { convex, .. } | Self::Cone { convex, .. } => *convex = !*convex,
+            Self::Cylinder { convex, .. }
+            | Self::Cone { convex, .. }
+            | Self::Sphere { convex, .. } => *convex = !*convex,
             // Its loop runs the other way around.
             Self::Patch { sides } => sides.reverse(),
             Self::Extruded { .. } => {}

@@ -1,7 +1,7 @@
 use super::*;
 use crate::export::WireframeDocument;
 use nalgebra::{Rotation3, Vector2, Vector3};
-use neat_core::{CircularArc, Spline, Wireframe3d};
+use neat_core::{CircularArc, Dome, Spline, Wireframe3d};
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
@@ -10,6 +10,7 @@ pub(super) struct Model {
     pub wireframe: Wireframe3d,
     pub arcs: Vec<CircularArc>,
     pub splines: Vec<Spline>,
+    pub domes: Vec<Dome>,
 }
 
 impl Model {
@@ -54,17 +55,21 @@ impl Model {
             .iter()
             .map(|spline| spline.map(moved))
             .collect();
+        self.domes = self.domes.iter().map(|dome| dome.map(moved)).collect();
         self
     }
 
     pub fn shells(&self) -> Vec<Shell> {
-        let graph = MeasuredGraph {
-            wireframe: &self.wireframe,
+        find_shells(&self.graph(), &[], &[])
+    }
+
+    pub fn graph(&self) -> MeasuredGraph<'_> {
+        MeasuredGraph {
             arcs: &self.arcs,
             splines: &self.splines,
-            covariances: &[],
-        };
-        find_shells(&graph, &[], &[])
+            domes: &self.domes,
+            ..MeasuredGraph::of(&self.wireframe)
+        }
     }
 
     /// Number of faces and volume of the one shell, which is closed.
@@ -72,7 +77,7 @@ impl Model {
         let shells = self.shells();
         assert_eq!(shells.len(), 1, "{shells:?}");
         assert!(shells[0].closed, "{shells:?}");
-        let is_valid = |face: &Face| face.is_valid(&self.wireframe, &self.arcs, &self.splines);
+        let is_valid = |face: &Face| face.is_valid(&self.graph());
         assert!(shells[0].faces.iter().all(is_valid));
         let geometry = self.geometry(&shells[0]);
         (shells[0].faces.len(), geometry.volume(&shells[0]))
@@ -81,7 +86,7 @@ impl Model {
 
 impl Model {
     pub fn geometry(&self, shell: &Shell) -> ShellGeometry {
-        ShellGeometry::new(shell, &self.wireframe, &self.arcs, &self.splines)
+        ShellGeometry::new(shell, &self.graph())
     }
 }
 
@@ -382,7 +387,7 @@ fn geometry_lies_on_the_surfaces() {
     assert_eq!(faces, 7);
     assert!((volume - 0.8 * (1.0 - PI * 0.04)).abs() < 3e-3, "{volume}");
     let shell = &block.shells()[0];
-    let geometry = ShellGeometry::new(shell, &block.wireframe, &block.arcs, &[]);
+    let geometry = ShellGeometry::new(shell, &block.graph());
     for face in &shell.faces {
         for point in face.steps().flat_map(|step| geometry.points(step, 0.1)) {
             let (off, _) = face.surface.height_of(&point);
@@ -400,7 +405,7 @@ fn normals_point_out_and_loops_keep_the_face_on_their_left() {
         };
         assert!(normal.dot(&Vector3::repeat(0.5)) < offset);
         let frame = plane_fit::PlaneFrame::new(normal, offset);
-        let geometry = ShellGeometry::new(&model.shells()[0], &model.wireframe, &[], &[]);
+        let geometry = ShellGeometry::new(&model.shells()[0], &model.graph());
         let polygon: Vec<Vector2<f64>> = (face.loops[0].iter())
             .map(|step| frame.coordinates(&geometry.points(step, 0.1)[0]))
             .collect();
@@ -419,16 +424,15 @@ fn a_similarity_moves_faces() {
         let shell = model.shells()[0].map(moved);
         let wireframe = model.wireframe.map(moved);
         let arcs: Vec<CircularArc> = model.arcs.iter().map(|arc| arc.map(moved)).collect();
-        let geometry = ShellGeometry::new(&shell, &wireframe, &arcs, &[]);
+        let graph = MeasuredGraph {
+            arcs: &arcs,
+            ..MeasuredGraph::of(&wireframe)
+        };
+        let geometry = ShellGeometry::new(&shell, &graph);
         let volume = 27.0 * 0.8 * (1.0 - PI * 0.04);
         assert!((geometry.volume(&shell) - volume).abs() < 1e-9 * volume);
         assert!(shell.faces.iter().all(|face| geometry.area(face) > 0.0));
-        assert!(
-            shell
-                .faces
-                .iter()
-                .all(|face| face.is_valid(&wireframe, &arcs, &[]))
-        );
+        assert!(shell.faces.iter().all(|face| face.is_valid(&graph)));
     }
 }
 
@@ -437,6 +441,7 @@ pub(super) fn of_triangles(model: &Model) -> (f64, bool) {
     let document = crate::export::WireframeDocument {
         arcs: model.arcs.clone(),
         splines: model.splines.clone(),
+        domes: model.domes.clone(),
         shells: model.shells(),
         ..crate::export::WireframeDocument::from(&model.wireframe)
     };
@@ -597,10 +602,8 @@ fn splines_are_holes_and_borders_of_planes() {
     model.wireframe.edges.push([first, first + 1]);
     let splines = [oval([0.5, 0.5, 1.0], 16), half];
     let graph = MeasuredGraph {
-        wireframe: &model.wireframe,
-        arcs: &[],
         splines: &splines,
-        covariances: &[],
+        ..MeasuredGraph::of(&model.wireframe)
     };
     let shells = find_shells(&graph, &[], &[]);
     let document = WireframeDocument {
@@ -618,7 +621,7 @@ fn splines_are_holes_and_borders_of_planes() {
     let (mut face, mut with_splines) = (0, Vec::new());
     for shell in &shells {
         assert!(!shell.closed);
-        let geometry = ShellGeometry::new(shell, &model.wireframe, &[], &splines);
+        let geometry = ShellGeometry::new(shell, &graph);
         for bounded in &shell.faces {
             let is_spline = |step: &Step| matches!(step.curve, CurveIndex::Spline(_));
             if bounded.steps().any(is_spline) {

@@ -1,5 +1,6 @@
 //! Triangles of faces, for what knows no surfaces.
 
+use super::cap::Cap;
 use super::face::{CurveIndex, Face, Shell, Step};
 use super::patch::PatchFace;
 use super::patch_triangulation::{cut_patch, inner_places};
@@ -18,13 +19,13 @@ type Corner = (usize, Vector2<f64>);
 /// watertight.
 ///
 /// - `edges`: the junctions that each edge joins.
-/// - `chains`: for each arc, and for each spline, the points along it from the junction at its
-///   start to that at its end; of a closed one the first comes once more.
+/// - `chains`: for each arc, for each spline, and for the rim of each dome, the points along it from the
+///   junction at its start to that at its end; of a closed one the first comes once more.
 /// - `points`: what all are indices of, with [`points_within`] at their end.
 pub(crate) fn triangles(
     shells: &[Shell],
     edges: &[[usize; 2]],
-    chains: [&[Vec<usize>]; 2],
+    chains: [&[Vec<usize>]; 3],
     points: &[Vector3<f64>],
 ) -> Vec<Vec<[usize; 3]>> {
     let around = |steps: &Vec<Step>| {
@@ -54,6 +55,13 @@ pub(crate) fn triangles(
                     strip([&one, &other], points, &direction, &mut triangles);
                 }
             }
+            Surface::Sphere { .. } => {
+                let rim = face.loops.first().map(around).unwrap_or_default();
+                if let Some(cap) = cap_within(face, &rim, points) {
+                    triangles = cap.triangles(&rim, points, first);
+                    first += cap.inner_points().len();
+                }
+            }
             Surface::Patch { .. } => {
                 let along = |step: &Step| indices_along(step, edges, chains);
                 first += cut_patch(face, along, points, first, &mut triangles);
@@ -69,35 +77,51 @@ pub(crate) fn triangles(
     faces.map(of_face).collect()
 }
 
-/// The points within patches, one patch after the other, by those along curves: what the triangles of
-/// faces need beside these.
+/// The points within patches and caps, one face after the other, by those along curves: what the
+/// triangles of faces need beside these.
 pub(crate) fn points_within(
     shells: &[Shell],
     edges: &[[usize; 2]],
-    chains: [&[Vec<usize>]; 2],
+    chains: [&[Vec<usize>]; 3],
     points: &[Vector3<f64>],
 ) -> Vec<Vector3<f64>> {
     let faces = shells.iter().flat_map(|shell| &shell.faces);
-    let along = |step: &Step| {
+    let along = |step: &Step| -> Vec<Vector3<f64>> {
         let indices = indices_along(step, edges, chains).into_iter();
         indices.map(|index| points[index]).collect()
     };
-    let patches = faces.filter_map(|face| PatchFace::new(face, along));
-    let places = patches.flat_map(|patch| inner_places(&patch));
-    places.map(|(_, point)| point).collect()
+    let within = |face: &Face| -> Vec<Vector3<f64>> {
+        if let Surface::Sphere { .. } = face.surface {
+            let rim = face.steps().next().map(along).unwrap_or_default();
+            let cap = Cap::new(&face.surface, &rim);
+            return cap.map_or_else(Vec::new, |cap| cap.inner_points());
+        }
+        let patch = PatchFace::new(face, along);
+        let places = patch.map_or_else(Vec::new, |patch| inner_places(&patch));
+        places.into_iter().map(|(_, point)| point).collect()
+    };
+    faces.flat_map(within).collect()
+}
+
+/// The cap of a sphere within the points of its rim, each of them once.
+fn cap_within(face: &Face, rim: &[usize], points: &[Vector3<f64>]) -> Option<Cap> {
+    let around = rim.iter().chain(rim.first());
+    let around: Vec<Vector3<f64>> = around.map(|index| points[*index]).collect();
+    Cap::new(&face.surface, &around)
 }
 
 /// The points along a step of a loop, both ends among them.
 fn indices_along(
     step: &Step,
     edges: &[[usize; 2]],
-    [arcs, splines]: [&[Vec<usize>]; 2],
+    [arcs, splines, rims]: [&[Vec<usize>]; 3],
 ) -> Vec<usize> {
     let mut along = match step.curve {
         CurveIndex::Edge(edge) => edges[edge].to_vec(),
         CurveIndex::Arc(arc) => arcs[arc].clone(),
         CurveIndex::Spline(spline) => splines[spline].clone(),
         CurveIndex::Smooth(ends) => ends.to_vec(),
+        CurveIndex::Rim(dome) => rims[dome].clone(),
     };
     if step.reversed {
         along.reverse();
