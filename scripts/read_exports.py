@@ -96,13 +96,30 @@ class Spline:
         return self.points(places[:-1] if self.is_closed else places)
 
 
-class Wireframe:
-    """Vertices [V, 3], index pairs [E, 2], arcs, splines and shells."""
+class Dome:
+    """A part of a sphere around an axis, with the circle in which it ends."""
 
-    def __init__(self, vertices, edges, arcs=(), shells=(), name=None, splines=()):
+    def __init__(self, center, axis, radius, reach):
+        axis = np.asarray(axis, dtype=float)
+        across = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+        across /= np.linalg.norm(across)
+        self.center = np.asarray(center) + radius * math.cos(reach) * axis
+        self.axes = radius * math.sin(reach) * np.stack([across, np.cross(axis, across)])
+
+    def points(self, shares):
+        """Around it, counterclockwise as seen from beyond the pole."""
+        angles = 2.0 * math.pi * np.asarray(shares)[:, None]
+        return self.center + np.cos(angles) * self.axes[0] + np.sin(angles) * self.axes[1]
+
+
+class Wireframe:
+    """Vertices [V, 3], index pairs [E, 2], arcs, splines, shells and domes."""
+
+    def __init__(self, vertices, edges, arcs=(), shells=(), name=None, splines=(), domes=()):
         self.vertices = np.asarray(vertices, dtype=float).reshape(-1, 3)
         self.edges = np.asarray(edges, dtype=int).reshape(-1, 2)
         self.arcs, self.splines, self.shells, self.name = arcs, splines, shells, name
+        self.domes = domes
 
     def drawn(self):
         """With arcs and splines as chains of straight pieces, for formats without curves."""
@@ -113,7 +130,7 @@ class Wireframe:
             pieces = np.stack([start, (start + 1) % len(points)], axis=-1)
             edges = np.concatenate([edges, len(vertices) + pieces])
             vertices = np.concatenate([vertices, points])
-        return Wireframe(vertices, edges, shells=self.shells)
+        return Wireframe(vertices, edges, shells=self.shells, domes=self.domes)
 
     def extent(self):
         if len(self.vertices) == 0:
@@ -151,6 +168,8 @@ def volume(shell, wireframe):
             area = sum((area_of_step(step, wireframe) for loop in face["loops"] for step in loop),
                        np.zeros(3))
             return face["plane"]["offset"] * float(np.dot(face["plane"]["normal"], area))
+        if "sphere" in face:
+            return flux_of_cap(face, wireframe)
         if "extruded" in face:
             return flux_of_wall(face, wireframe)
         if "patch" in face:
@@ -158,6 +177,20 @@ def volume(shell, wireframe):
         return flux_of_round(face, wireframe)
 
     return sum(flux(face) for face in shell["faces"]) / 3.0
+
+
+def flux_of_cap(face, wireframe):
+    """Of x through a part of a sphere within a circle: an integral over the angle from its pole."""
+    sphere = face["sphere"]
+    center, radius = np.array(sphere["center"]), sphere["radius"]
+    offsets = points_of_step(face["loops"][0][0], wireframe) - center
+    turns = np.cross(offsets[:-1], offsets[1:]).sum(axis=0)
+    sign = 1.0 if sphere["convex"] else -1.0
+    pole = sign * turns / np.linalg.norm(turns)
+    reach = math.acos(float((offsets @ pole).mean()) / radius)
+    angles = (np.arange(4000) + 0.5) * reach / 4000
+    rings = 2.0 * math.pi * radius**2 * np.sin(angles) * reach / 4000
+    return sign * float((rings * (np.cos(angles) * (center @ pole) + radius)).sum())
 
 
 def flux_of_wall(face, wireframe):
@@ -241,6 +274,8 @@ def points_of_step(step, wireframe):
         points = wireframe.vertices[wireframe.edges[step["edge"]]]
     elif "smooth" in step:
         points = wireframe.vertices[step["smooth"]]
+    elif "rim" in step:
+        points = wireframe.domes[step["rim"]].points(shares)
     elif "spline" in step:
         spline = wireframe.splines[step["spline"]]
         points = spline.points(shares * spline.pieces)
@@ -295,7 +330,8 @@ def check_close(found, expected, extent, what):
 def same_graph(found, expected):
     """Vertices in the same order, edges in any order and direction. Behind them may be those within
     patches, which only triangles have."""
-    has_patches = any("patch" in face for shell in expected.shells for face in shell["faces"])
+    has_patches = any("patch" in face or "sphere" in face
+                      for shell in expected.shells for face in shell["faces"])
     kept = len(expected.vertices) if has_patches else None
     check_close(found.vertices[:kept], expected.vertices, expected.extent(), "vertices")
 
@@ -351,6 +387,7 @@ def read_json(path, expected):
                    {"junctions": [], "edges": [[0, -1]]},
                    dict(document, views=[1]), dict(document, junction_covariances=[[0] * 5]),
                    dict(document, arcs=[{"center": [0, 0, 0], "radius": 1}]),
+                   dict(document, domes=[{"center": [0, 0, 0], "radius": 1}]),
                    dict(document, splines=[{"controls": [[0, 0, 0]] * 3, "closed": False}])):
         check(not jsonschema.Draft202012Validator(schema).is_valid(broken),
               f"the schema accepts {str(broken)[:80]}")
@@ -810,7 +847,8 @@ def main(arguments):
     expected = Wireframe(truth["junctions"], truth.get("edges", truth.get("lines", [])),
                          [Arc(**arc) for arc in truth.get("arcs", [])], truth.get("shells", []),
                          truth.get("metadata", {}).get("scene"),
-                         [Spline(**spline) for spline in truth.get("splines", [])])
+                         [Spline(**spline) for spline in truth.get("splines", [])],
+                         [Dome(**dome) for dome in truth.get("domes", [])])
     readers = [("wireframe.json", read_json), ("wireframe.obj", read_obj),
                ("wireframe.ply", read_ply), ("wireframe.gltf", read_gltf),
                ("wireframe.glb", read_gltf), ("wireframe.dxf", read_dxf),

@@ -5,9 +5,10 @@ use neat_core::CircularArc;
 use neat_export::{EdgeFilter, ExportOptions, Format, export};
 use neat_wireframe::dimensions::Dimensions;
 use neat_wireframe::export::{WireframeDocument, read_json, write_json};
-use neat_wireframe::faces::{CurveIndex, MeasuredGraph, ShellGeometry, Surface, find_shells};
+use neat_wireframe::faces::{CurveIndex, ShellGeometry, Surface, find_shells};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::fs;
 use std::path::Path;
 
@@ -29,12 +30,8 @@ fn exported(document: &WireframeDocument, format: Format, filter: EdgeFilter) ->
 
 fn add_shells(document: &mut WireframeDocument) {
     let wireframe = document.wireframe();
-    let graph = MeasuredGraph {
-        arcs: &document.arcs,
-        splines: &document.splines,
-        ..MeasuredGraph::of(&wireframe)
-    };
-    document.shells = find_shells(&graph, &[], &[]);
+    let shells = find_shells(&document.graph(&wireframe), &[], &[]);
+    document.shells = shells;
 }
 
 fn count(text: &str, entity: &str) -> usize {
@@ -339,6 +336,58 @@ fn a_loft_with_a_hole_is_a_patch() {
     assert_eq!(areas.len(), 10);
     for (face, area) in shell.faces.iter().zip(&areas) {
         assert!((area.value / geometry.area(face) - 1.0).abs() < 1e-4);
+    }
+}
+
+#[test]
+fn pins_with_round_ends_are_solids_with_spheres() {
+    let document = document("domed.json");
+    let mut found = document.clone();
+    add_shells(&mut found);
+    assert_eq!(found.shells, document.shells);
+    let volumes: Vec<f64> = (document.shells.iter())
+        .map(|shell| {
+            assert!(shell.closed && shell.faces.len() == 3);
+            let geometry = ShellGeometry::new(shell, &document.graph(&document.wireframe()));
+            geometry.volume(shell)
+        })
+        .collect();
+    let cylinder = PI * 0.16 * 0.7;
+    let round = cylinder + 2.0 / 3.0 * PI * 0.064;
+    // The ball lacks a cap 0.2 high.
+    let ball = cylinder + 4.0 / 3.0 * PI * 0.125 - PI * 0.04 * (0.5 - 0.2 / 3.0);
+    for (volume, truth) in volumes.iter().zip([round, ball]) {
+        assert!((volume / truth - 1.0).abs() < 1e-9, "{volumes:?}");
+    }
+    let step = exported(&document, Format::Step, EdgeFilter::default());
+    assert_eq!(count(&step, "MANIFOLD_SOLID_BREP"), 2);
+    assert_eq!(count(&step, "SPHERICAL_SURFACE"), 2);
+    // Where the round end touches the pin nothing is observed.
+    assert_eq!(step.matches("EDGE_CURVE('inferred',").count(), 1);
+    assert_watertight(&document);
+    let dimensions = Dimensions::new(&document, None).unwrap().areas();
+    let areas = document.shells.iter().flat_map(|shell| {
+        let geometry = ShellGeometry::new(shell, &document.graph(&document.wireframe()));
+        let areas: Vec<f64> = shell.faces.iter().map(|face| geometry.area(face)).collect();
+        areas
+    });
+    assert_eq!(dimensions.len(), 6);
+    for (dimension, area) in dimensions.iter().zip(areas) {
+        assert!((dimension.value / area - 1.0).abs() < 1e-6);
+    }
+    // A sphere without its circle, or with two, and a rim of no dome.
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("w.json");
+    write_json(&path, &document).unwrap();
+    let text = fs::read_to_string(&path).unwrap();
+    for (sound, broken) in [
+        ("\"rim\":0", "\"rim\":2"),
+        ("\"reach\":1.5707963267948966", "\"reach\":3.2"),
+        ("\"reach\":1.5707963267948966", "\"reach\":0"),
+    ] {
+        assert!(text.contains(sound), "{sound}");
+        fs::write(&path, text.replacen(sound, broken, 1)).unwrap();
+        assert!(read_json(&path).is_err(), "{broken}");
     }
 }
 

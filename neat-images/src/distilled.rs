@@ -2,7 +2,7 @@
 
 use crate::event::{Decision, POSES};
 use nalgebra::{Matrix4, Vector3};
-use neat_core::{Camera, CircularArc, Scene, Spline, Wireframe3d};
+use neat_core::{Camera, CircularArc, Dome, Scene, Spline, Wireframe3d};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::assemble::AssembleReport;
 use neat_wireframe::confidence::{Confidence, fill_arcs};

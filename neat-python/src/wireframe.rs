@@ -183,12 +183,20 @@ impl Wireframe {
         Ok(dict)
     }
 
+    /// Parts of spheres that images show by their outlines, as the dicts of wireframe.json: `center`,
+    /// `axis` to the pole, `radius` and `reach`, the angle from the axis to the rim in radians.
+    #[getter]
+    fn domes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        from_json(py, &serde_json::json!(self.document.domes))
+    }
+
     /// Faces between edges, arcs and splines, closed shells first, as the lists and dicts of
     /// wireframe.json: `closed`, whether it bounds a solid, and `faces`. A face has a `plane`
     /// (`normal`, `offset`), a `cylinder` (`point`, `axis`, `radius`, `convex`), a `cone` (`apex`,
-    /// `axis`, `half_angle`, `convex`), a profile that is `extruded` (`direction`) or a `patch` between
-    /// four `sides`, and `loops` of steps: an `edge`, `arc` or `spline` by its index, or a `smooth` line
-    /// by its two junctions, and whether it is `reversed`.
+    /// `axis`, `half_angle`, `convex`), a `sphere` (`center`, `radius`, `convex`), a profile that is
+    /// `extruded` (`direction`) or a `patch` between four `sides`, and `loops` of steps: an `edge`, `arc`
+    /// or `spline` by its index, a `smooth` line by its two junctions, or the `rim` of a dome by its
+    /// index, and whether it is `reversed`.
     #[getter]
     fn shells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         from_json(py, &serde_json::json!(self.document.shells))

@@ -80,9 +80,13 @@ def test_shells_are_those_of_the_file(tmp_path):
             "loops": [[{"arc": 0, "reversed": False}]]}
     shells = [{"closed": False, "faces": [face]}]
     path = tmp_path / "wireframe.json"
-    path.write_text(json.dumps({"junctions": [], "edges": [], "arcs": [rim], "shells": shells}))
-    assert neat3d.Wireframe.read(path).shells == shells
-    assert neat3d.Wireframe([[0, 0, 0], [1, 0, 0]], [[0, 1]]).shells == []
+    dome = {"center": [0, 0, 1], "axis": [0, 0, 1], "radius": 0.5, "reach": np.pi / 2}
+    path.write_text(json.dumps(
+        {"junctions": [], "edges": [], "arcs": [rim], "domes": [dome], "shells": shells}))
+    read = neat3d.Wireframe.read(path)
+    assert read.shells == shells and read.domes == [dome]
+    none = neat3d.Wireframe([[0, 0, 0], [1, 0, 0]], [[0, 1]])
+    assert none.shells == [] and none.domes == []
 
 
 @pytest.mark.parametrize("format", neat3d.FORMATS)

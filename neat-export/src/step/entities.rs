@@ -79,10 +79,10 @@ impl Entities {
     }
 
     /// The edge along an arc between two vertices.
-    pub fn arc_edge(&mut self, [from, to]: [&String; 2], arc: &CircularArc) -> String {
+    pub fn arc_edge(&mut self, name: &str, [from, to]: [&String; 2], arc: &CircularArc) -> String {
         let placement = self.placement(&arc.center, &arc.normal().normalize(), &arc.axes[0]);
         let circle = self.add(&format!("CIRCLE('',{placement},{})", real(arc.radius)));
-        self.add(&format!("EDGE_CURVE('',{from},{to},{circle},.T.)"))
+        self.add(&format!("EDGE_CURVE('{name}',{from},{to},{circle},.T.)"))
     }
 
     /// The edge along a spline between two vertices, which are one if it runs around.

@@ -128,7 +128,7 @@ fn arc_set(step: &mut Entities, arc: &CircularArc) -> Option<String> {
     } else {
         step.vertex(&end)
     };
-    let edge = step.arc_edge([&from, &to], arc);
+    let edge = step.arc_edge("", [&from, &to], arc);
     Some(step.add(&format!("CONNECTED_EDGE_SET('',({edge}))")))
 }
 

@@ -90,12 +90,11 @@ impl<'a> ShellWriter<'a> {
                 }
             };
             let names = [&corners[0].name, &corners[1].name];
+            let name = if index.is_inferred() { "inferred" } else { "" };
             let edge = match (&curve.arc, &curve.spline) {
-                (Some(arc), _) => Some(step.arc_edge(names, arc)),
+                (Some(arc), _) => Some(step.arc_edge(name, names, arc)),
                 (None, Some(spline)) => Some(step.spline_edge(names, spline)),
                 (None, None) => {
-                    let inferred = matches!(index, CurveIndex::Smooth(_));
-                    let name = if inferred { "inferred" } else { "" };
                     step.named_edge(name, names, [&corners[0].point, &corners[1].point])
                 }
             };

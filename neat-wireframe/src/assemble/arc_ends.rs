@@ -4,8 +4,7 @@
 //! where others do. So an end of an arc moves along its circle to a junction near it; an edge that
 //! goes on from there as a chord of the circle, within what edgels tell, is a part of the arc; and
 //! of the pieces between junctions those are left out that hardly any edgel shows. A circle without
-//! a junction on it is closed if the rest of it is shown. An arc that is all but straight, along an edge,
-//! is a part of that.
+//! a junction on it is closed if the rest of it is shown.
 
 use super::arc_joints::wrapped;
 use super::circle_fitting::{FoundArc, SECTOR_IN_PIXELS};
@@ -14,7 +13,7 @@ use super::curved_edges::CurvedEdge;
 use super::edge_cutting::retain_edges;
 use super::edge_samples::Images;
 use nalgebra::Vector3;
-use neat_core::{LineSegment3, Wireframe3d};
+use neat_core::Wireframe3d;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
@@ -32,10 +31,6 @@ pub(super) const MIN_RADIUS: f64 = SECTOR_IN_PIXELS;
 /// .5 of it and more, those across scallops .02 at most.
 const OF_WHOLE: f64 = 0.1;
 
-/// An arc along an edge is a part of it if it rises over its chord by no more than this share of how far
-/// edgels are off: true ones do by a quarter of that and more.
-const FLAT: f64 = 0.1;
-
 /// Ends the arcs at the junctions of edges, straight and curved ones. Edges that are parts of arcs
 /// are taken away; `sources` belong to the straight ones.
 pub(super) fn end_at_junctions(
@@ -50,10 +45,6 @@ pub(super) fn end_at_junctions(
         let [a, b] = ends.map(|end| junctions[end]);
         [a, middle.unwrap_or(0.5 * (a + b)), b]
     };
-    let lines: Vec<LineSegment3> = (edges.iter())
-        .map(|ends| LineSegment3::new(junctions[ends[0]], junctions[ends[1]]))
-        .collect();
-    arcs.retain(|found| !lines.iter().any(|line| is_part_of(images, found, line)));
     let straight = edges.iter().map(|ends| points_of(*ends, None));
     let bowed = (curved.iter()).map(|edge| points_of(edge.ends, Some(edge.middle)));
     let mut parts: Vec<Option<[Vector3<f64>; 3]>> = straight.chain(bowed).map(Some).collect();
@@ -85,16 +76,6 @@ pub(super) fn junctions_of_edges(
     let of_edges = wireframe.edges.iter().flatten().copied();
     let used: BTreeSet<usize> = of_edges.chain(of_curves).collect();
     used.iter().map(|j| wireframe.junctions[*j]).collect()
-}
-
-/// Whether an arc is nothing but a part of an edge.
-fn is_part_of(images: &Images, found: &FoundArc, line: &LineSegment3) -> bool {
-    let (arc, reach) = (&found.arc, images.reach * found.pixel);
-    let rise = arc.radius * (1.0 - (0.5 * arc.sweep().min(PI)).cos());
-    let mut points = [0.0, 0.5, 1.0]
-        .map(|share| arc.point_at(arc.angles[0] + share * arc.sweep()))
-        .into_iter();
-    rise <= FLAT * reach && points.all(|point| line.distance_to_point(&point) <= MAX_GAP * reach)
 }
 
 /// Takes the edges, each by its start, middle and end, that lie on the circle of an arc and along

@@ -5,16 +5,19 @@ use super::claimed_edgels::claim_edgels;
 use super::config::AssembleConfig;
 use super::curve_pieces::curve_pieces;
 use super::edge_samples::Images;
-use super::line_selection::{Chord, Selection, select_chords};
+use super::line_selection::{Chord, ChosenLine, Selection, select_chords};
 use super::progress::OnProgress;
 use super::proposals;
 use super::rounded_corners::rounded_corners;
 use super::view_segments::PreparedView;
 use super::wander::retain_steady;
-use neat_core::CircularArc;
+use neat_core::{CircularArc, LineSegment3};
 use rayon::prelude::*;
+use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
+/// An arc that rises over its chord by no more than this share of how far edgels are off is a line.
+const FLAT: f64 = 0.1;
 /// Nearer to an arc than so many reaches, all along, a chord is one of its own.
 const SAME: f64 = 2.0;
 
@@ -63,6 +66,28 @@ pub(super) fn find_arcs(
     }
     retain_steady(images, &mut arcs);
     ControlFlow::Continue(arcs)
+}
+
+/// Takes the arcs away that are straight lines, as far as the images can tell.
+pub(super) fn take_straight(
+    images: &Images,
+    arcs: &mut Vec<FoundArc>,
+    least: f64,
+) -> Vec<ChosenLine> {
+    let rise = |arc: &CircularArc| arc.radius * (1.0 - (0.5 * arc.sweep()).cos());
+    let is_straight = |found: &mut FoundArc| {
+        found.arc.sweep() < PI && rise(&found.arc) <= FLAT * images.reach * found.pixel
+    };
+    let line = |found: FoundArc| {
+        let [start, end] = found.arc.angles.map(|angle| found.arc.point_at(angle));
+        let line = LineSegment3::new(start, end);
+        ChosenLine {
+            line,
+            evidence: images.evidence(&line, None, least),
+            placed: false,
+        }
+    };
+    arcs.extract_if(.., is_straight).map(line).collect()
 }
 
 /// The arcs around chords, as far as the images show them.
@@ -116,4 +141,36 @@ pub(super) fn runs_beside(whole: &FoundArc, part: &CircularArc, near: f64) -> bo
                 .arc
                 .contains(whole.arc.angle_of(&point), near / whole.arc.radius)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::circle_fitting::tests::found;
+    use crate::assemble::test_views::{TestViews, cube_edge};
+    use nalgebra::Vector3;
+
+    #[test]
+    fn an_arc_that_no_pixel_tells_from_a_line_is_one() {
+        let cube = TestViews::of_cube(20);
+        let images = cube.images();
+        let edge = cube_edge(0);
+        let aside = edge.start + Vector3::repeat(0.1);
+        // By a thirtieth of a pixel, and by three.
+        let bowed = |pixels: f64| {
+            let middle = edge.point_at(0.5);
+            let out = (middle - aside).normalize() * pixels * found_pixel();
+            found(CircularArc::through([edge.start, middle + out, edge.end]).unwrap())
+        };
+        let mut arcs = vec![bowed(0.03), bowed(3.0)];
+        let lines = take_straight(&images, &mut arcs, 3.0);
+        assert_eq!([lines.len(), arcs.len()], [1, 1]);
+        assert!(lines[0].line.end_distances(&edge).iter().all(|d| *d < 1e-9));
+        assert!(lines[0].evidence.gain > 20.0);
+    }
+
+    /// The size of a pixel of the arcs of tests.
+    fn found_pixel() -> f64 {
+        found(CircularArc::through([Vector3::x(), Vector3::y(), -Vector3::x()]).unwrap()).pixel
+    }
 }

@@ -9,7 +9,7 @@ use super::curve_samples::{SPACING, distance_of_curve};
 use super::edge_samples::{Images, Sample};
 use super::line_fitting::change_by_edgels;
 use super::touched_spheres::{AxisLine, Rim, TouchedSphere, agreed, most_voted};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 use neat_core::{CircularArc, Dome, LineSegment3};
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -71,8 +71,25 @@ impl FoundDome {
     }
 }
 
+/// The domes around the axes of arcs. Arcs for which not more than `least` speaks where outlines of domes
+/// have their edgels are left out.
+pub(super) fn take_domes(images: &Images, arcs: &mut Vec<FoundArc>, least: f64) -> Vec<FoundDome> {
+    let domes = find_domes(images, arcs);
+    if !domes.is_empty() {
+        let mut taken = images.nothing_taken();
+        for found in &domes {
+            images.claim_dome(found, &mut taken);
+        }
+        arcs.retain(|found| {
+            let left = images.settle_arc(found, &taken);
+            left.is_some_and(|left| left.gain > least)
+        });
+    }
+    domes
+}
+
 /// The domes around the axes of arcs.
-pub(super) fn find_domes(images: &Images, arcs: &[FoundArc]) -> Vec<FoundDome> {
+fn find_domes(images: &Images, arcs: &[FoundArc]) -> Vec<FoundDome> {
     let mut domes: Vec<FoundDome> = Vec::new();
     for axis in axes(arcs) {
         let spheres = images.spheres_on(&axis);
@@ -91,26 +108,6 @@ pub(super) fn find_domes(images: &Images, arcs: &[FoundArc]) -> Vec<FoundDome> {
         }
     }
     domes
-}
-
-/// Leaves out arcs for which not more than `least` speaks where outlines of domes have their edgels.
-pub(super) fn retain_beside_domes(
-    images: &Images,
-    domes: &[FoundDome],
-    arcs: &mut Vec<FoundArc>,
-    least: f64,
-) {
-    if domes.is_empty() {
-        return;
-    }
-    let mut taken = images.nothing_taken();
-    for found in domes {
-        images.claim_dome(found, &mut taken);
-    }
-    arcs.retain(|found| {
-        let left = images.settle_arc(found, &taken);
-        left.is_some_and(|left| left.gain > least)
-    });
 }
 
 /// The domes where arcs are that have been placed since: around the axis of the rim at which they end, or
@@ -364,6 +361,7 @@ mod tests {
     use crate::assemble::test_views::TestViews;
     use crate::assemble::view_segments::PreparedView;
     use crate::test_scenes::{cameras_on_sphere, views_of_edges};
+    use nalgebra::Vector3;
     use neat_core::Camera;
     use std::f64::consts::TAU;
 
@@ -427,15 +425,6 @@ mod tests {
             let base = rim(radius, height);
             let views = views_of(&base, &truth, 1.0);
             let images = views.images();
-            let arcs = [found(base)];
-            let domes = find_domes(&images, &arcs);
-            assert_eq!(domes.len(), 1, "{reach} {domes:?}");
-            let [settled] = settled_domes(&domes, &arcs)[..] else {
-                panic!("{reach}");
-            };
-            assert!(settled.center.norm() < 2e-3, "{reach} {settled:?}");
-            assert!((settled.radius - RADIUS).abs() < 2e-3 && settled.axis.z > 0.999);
-            assert!((settled.reach - reach).abs() < 0.02, "{reach} {settled:?}");
             // What its outlines explain is no arc.
             let eyes = images.views.iter().map(|view| view.camera.center_in_world);
             let mut outlines = eyes.filter_map(|eye| truth.outline_from(&eye));
@@ -446,9 +435,16 @@ mod tests {
                 ..outline
             };
             let mut arcs = vec![found(middle), found(base)];
-            retain_beside_domes(&images, &domes, &mut arcs, 5.0);
+            let domes = take_domes(&images, &mut arcs, 5.0);
+            assert_eq!(domes.len(), 1, "{reach} {domes:?}");
             assert_eq!(arcs.len(), 1);
             assert_eq!(arcs[0].arc, base);
+            let [settled] = settled_domes(&domes, &arcs)[..] else {
+                panic!("{reach}");
+            };
+            assert!(settled.center.norm() < 2e-3, "{reach} {settled:?}");
+            assert!((settled.radius - RADIUS).abs() < 2e-3 && settled.axis.z > 0.999);
+            assert!((settled.reach - reach).abs() < 0.02, "{reach} {settled:?}");
         }
     }
 

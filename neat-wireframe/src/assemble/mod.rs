@@ -92,8 +92,8 @@ use collinear_pieces::merge_pieces;
 use common_directions::turn_to_common_directions;
 use corners::find_corners;
 use curved_edges::{add_as_arcs, take_curved_edges};
-use curves::find_arcs;
-use domes::{FoundDome, find_domes, retain_beside_domes, settled_domes};
+use curves::{find_arcs, take_straight};
+use domes::{FoundDome, settled_domes, take_domes};
 use edge_completion::complete_edges;
 use edge_cutting::{cut_edges, in_order};
 use edge_samples::Images;
@@ -104,8 +104,8 @@ use graph_fitting::{fit_edges, fit_graph};
 use hypothesis_scoring::{Alternatives, Scoring, score_hypotheses};
 use line_continuation::{continue_lines, meet_in_slivers};
 use line_selection::{Selection, select_lines, sure_lines};
-use nalgebra::Matrix4;
-use neat_core::{CircularArc, EdgelMap, LineSegment2, Spline};
+use nalgebra::{Matrix4, Vector3};
+use neat_core::{EdgelMap, LineSegment2, Spline};
 use pose_fitting::fit_poses;
 use profiles::place_curves;
 use progress::part;
@@ -219,19 +219,14 @@ pub fn assemble_with_progress(
         select_lines(images, &alternatives, &sure, config, progress)?
     };
     drop(alternatives);
-    report.noise_in_pixels = selection.noise;
-    report.lines = selection.lines.len();
-    report.curved_lines = selection.curved;
-    report.outlines = selection.outlines;
-    let arcs = &mut find_arcs(
-        &selection,
-        config,
-        &mut part(progress, [SELECTED, FOLLOWED]),
-    )?;
+    note_selection(&selection, &mut report);
+    let arcs = &mut {
+        let progress = &mut part(progress, [SELECTED, FOLLOWED]);
+        find_arcs(&selection, config, progress)?
+    };
     let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
-    let domes = find_domes(&images, arcs);
-    retain_beside_domes(&images, &domes, arcs, config.min_evidence);
+    let domes = take_domes(&images, arcs, config.min_evidence);
     let found = (&mut *arcs, &domes[..]);
     let (wireframe, splines) =
         graph_of(selection, found, photographs, config, &mut report, progress)?;
@@ -240,21 +235,18 @@ pub fn assemble_with_progress(
     report.splines = splines.len();
     report.domes = domes.len();
     let arc_covariances = covariances_of_arcs(&images, arcs, scene_radius);
-    let wireframe = wireframe.map(|junction| junction * scene_radius);
+    let in_world = |point: &Vector3<f64>| point * scene_radius;
+    let wireframe = wireframe.map(in_world);
     report.junctions = wireframe.junctions.len();
     report.edges = wireframe.edges.len();
     tracing::debug!(?report, "assembled");
     let refined_cameras = poses.map(|poses| poses.cameras(scene_radius));
     ControlFlow::Continue(Assembled {
         wireframe,
-        arcs: scaled_arcs(arcs, scene_radius),
+        arcs: (arcs.iter()).map(|found| found.arc.map(in_world)).collect(),
         arc_covariances,
-        splines: (splines.iter())
-            .map(|spline| spline.map(|point| point * scene_radius))
-            .collect(),
-        domes: (domes.iter())
-            .map(|dome| dome.map(|point| point * scene_radius))
-            .collect(),
+        splines: splines.iter().map(|spline| spline.map(in_world)).collect(),
+        domes: domes.iter().map(|dome| dome.map(in_world)).collect(),
         report,
         refined_cameras,
     })
@@ -289,11 +281,6 @@ fn counted(
     }
 }
 
-fn scaled_arcs(arcs: &[FoundArc], factor: f64) -> Vec<CircularArc> {
-    let scaled = |found: &FoundArc| found.arc.map(|point| point * factor);
-    arcs.iter().map(scaled).collect()
-}
-
 /// Of centre and radius: by profiles where these have placed an arc, else by edgels.
 fn covariances_of_arcs(
     images: &Images,
@@ -305,6 +292,13 @@ fn covariances_of_arcs(
         Some(found.covariance.or_else(by_edgels)? * scene_radius.powi(2))
     };
     arcs.iter().map(covariance).collect()
+}
+
+fn note_selection(selection: &Selection, report: &mut AssembleReport) {
+    report.noise_in_pixels = selection.noise;
+    report.lines = selection.lines.len();
+    report.curved_lines = selection.curved;
+    report.outlines = selection.outlines;
 }
 
 /// The views in a world whose scene ball is the unit ball.
@@ -342,6 +336,7 @@ fn graph_of(
 ) -> ControlFlow<(), (Wireframe3d, Vec<Spline>)> {
     let images = selection.images;
     let least = config.min_evidence;
+    selection.lines.extend(take_straight(&images, arcs, least));
     let known = &KnownArcs::new(arcs, domes);
     (selection.lines).retain(|found| !known.explain(&images, &found.line, least));
     report.outlines += report.lines - selection.lines.len();
