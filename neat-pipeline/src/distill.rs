@@ -159,6 +159,7 @@ fn paper(
         arcs: Vec::new(),
         arc_covariances: Vec::new(),
         splines: Vec::new(),
+        domes: Vec::new(),
         report: BackEndReport::Paper {
             steps: built.counts,
         },
