@@ -38,6 +38,9 @@ impl Dome {
     pub fn outline_from(&self, eye: &Vector3<f64>) -> Option<CircularArc> {
         let offset = eye - self.center;
         let sine = self.radius / offset.norm();
+        if sine >= 1.0 {
+            return None;
+        }
         let cosine = (1.0 - sine * sine).sqrt();
         let toward = offset.try_normalize(0.0)?;
         let flat = self.axis - toward * toward.dot(&self.axis);
@@ -113,7 +116,7 @@ mod tests {
             reach: 1.2,
         };
         let from = |x: f64, z: f64| Vector3::new(x, 0.3, z);
-        for eye in [from(2.0, 0.5), from(0.4, 3.0), from(1.5, -0.2)] {
+        for eye in [from(2.0, 0.5), from(1.0, 2.0), from(1.5, -0.2)] {
             let outline = dome.outline_from(&eye).unwrap();
             assert!(outline.is_valid());
             for point in outline.points(0.1) {
@@ -130,6 +133,7 @@ mod tests {
         for (dome, eye) in [
             (lens, from(0.2, 3.0)),
             (dome, dome.center),
+            (dome, dome.center + Vector3::new(0.1, 0.2, -0.1)),
             (lens, from(2.0, -4.0)),
         ] {
             assert_eq!(dome.outline_from(&eye), None);
