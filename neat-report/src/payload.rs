@@ -18,7 +18,7 @@ pub(crate) struct Payload<'a> {
     edges: &'a [[usize; 2]],
     /// Points along each arc, and behind them along each spline.
     arcs: Vec<Vec<Vector3<f64>>>,
-    /// Points within faces, for their triangles.
+    /// Points along rims of domes and within faces, for their triangles.
     within: Vec<Vector3<f64>>,
     faces: Vec<FacePayload>,
     junction_fields: &'a JunctionFields,
@@ -40,7 +40,7 @@ struct FacePayload {
     /// That bound it, with those of its holes.
     edges: Vec<usize>,
     /// Of the junctions, and behind them the points of the arcs and splines, the first of a closed one
-    /// once, and those within faces.
+    /// once, and those of `within`.
     triangles: Vec<[usize; 3]>,
 }
 

@@ -83,7 +83,6 @@ fn triangles(
         edges: document.edges.clone(),
         arcs: document.arcs.clone(),
         splines: document.splines.clone(),
-        domes: document.domes.clone(),
         shells: vec![shell.clone()],
         ..WireframeDocument::default()
     };
@@ -96,6 +95,10 @@ fn triangles(
         if let (CurveIndex::Arc(_), None, Some(spline)) = (index, curve.arc, &curve.spline) {
             renamed.insert(*index, CurveIndex::Spline(exact.splines.len()));
             exact.splines.push(spline.clone());
+        }
+        if let (CurveIndex::Rim(_), Some(arc)) = (index, curve.arc) {
+            renamed.insert(*index, CurveIndex::Arc(exact.arcs.len()));
+            exact.arcs.push(arc);
         }
         if let (CurveIndex::Arc(index), Some(arc)) = (index, curve.arc) {
             exact.arcs[*index] = arc;

@@ -7,7 +7,7 @@ const LIGHT = normalize([0.35, 0.55, 0.76]);
 /** Corners and shades of the triangles of each face, and its edges. */
 function lightFaces({ points, arcs, within, faces }) {
   // As the triangles count: behind the junctions those of the arcs and splines, a closed one's first once,
-  // and then those within faces.
+  // and then those along rims of domes and within faces.
   const isClosed = (arc) => norm(subtract(arc[0], arc[arc.length - 1])) === 0;
   const vertices = points.concat(...arcs.map((arc) => (isClosed(arc) ? arc.slice(0, -1) : arc)), within);
   return faces.map(({ edges, triangles }) => ({

@@ -5,7 +5,7 @@ use super::claimed_edgels::claim_edgels;
 use super::config::AssembleConfig;
 use super::curve_pieces::curve_pieces;
 use super::edge_samples::Images;
-use super::line_selection::{Chord, ChosenLine, Selection, select_chords};
+use super::line_selection::{Chord, ChosenLine, MIN_SHOWING, Selection, select_chords};
 use super::progress::OnProgress;
 use super::proposals;
 use super::rounded_corners::rounded_corners;
@@ -68,26 +68,36 @@ pub(super) fn find_arcs(
     ControlFlow::Continue(arcs)
 }
 
-/// Takes the arcs away that are straight lines, as far as the images can tell.
+/// Takes the arcs away that are straight lines, as far as the images can tell: those that these show as
+/// they do other lines.
 pub(super) fn take_straight(
     images: &Images,
     arcs: &mut Vec<FoundArc>,
     least: f64,
 ) -> Vec<ChosenLine> {
     let rise = |arc: &CircularArc| arc.radius * (1.0 - (0.5 * arc.sweep()).cos());
-    let is_straight = |found: &mut FoundArc| {
+    let is_straight = |found: &FoundArc| {
         found.arc.sweep() < PI && rise(&found.arc) <= FLAT * images.reach * found.pixel
     };
-    let line = |found: FoundArc| {
+    let mut lines = Vec::new();
+    arcs.retain(|found| {
+        if !is_straight(found) {
+            return true;
+        }
         let [start, end] = found.arc.angles.map(|angle| found.arc.point_at(angle));
         let line = LineSegment3::new(start, end);
-        ChosenLine {
-            line,
-            evidence: images.evidence(&line, None, least),
-            placed: false,
+        let evidence = images.evidence(&line, None, least);
+        let is_shown = evidence.gain > least && evidence.showing.len() >= MIN_SHOWING;
+        if is_shown {
+            lines.push(ChosenLine {
+                line,
+                evidence,
+                placed: false,
+            });
         }
-    };
-    arcs.extract_if(.., is_straight).map(line).collect()
+        !is_shown
+    });
+    lines
 }
 
 /// The arcs around chords, as far as the images show them.

@@ -97,9 +97,11 @@ fn find_domes(images: &Images, arcs: &[FoundArc]) -> Vec<FoundDome> {
         for arc in &axis.arcs {
             images.claim_arc(arc, &mut taken);
         }
-        let mut of_axis: Vec<FoundDome> = (axis.arcs.par_iter())
-            .flat_map_iter(|rim| images.domes_by(&axis, rim, &spheres, &taken))
-            .collect();
+        let by_rim = |rim: &&FoundArc| {
+            let of_side = |side: usize| images.domes_by(&axis, rim, (side, &spheres[side]), &taken);
+            [0, 1].map(of_side).concat()
+        };
+        let mut of_axis: Vec<FoundDome> = axis.arcs.par_iter().flat_map_iter(by_rim).collect();
         of_axis.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         for found in of_axis {
             if !domes.iter().any(|other| is_same(&found, other)) {
@@ -110,16 +112,19 @@ fn find_domes(images: &Images, arcs: &[FoundArc]) -> Vec<FoundDome> {
     domes
 }
 
-/// The domes where arcs are that have been placed since: around the axis of the rim at which they end, or
-/// as wide as the cylinder that they touch.
+/// The domes where arcs are that have been placed since: through the rim at which they end, or as wide as
+/// the cylinder that they touch.
 pub(super) fn settled_domes(domes: &[FoundDome], arcs: &[FoundArc]) -> Vec<Dome> {
     let settled = |found: &FoundDome| {
         let (dome, gap) = (found.dome, GAP_IN_PIXELS * found.pixel);
-        let off_axis = |found: &FoundArc| {
-            let off = (found.arc.center - dome.center).cross(&dome.axis).norm();
-            off.max(found.arc.radius * found.arc.normal().cross(&dome.axis).norm())
+        let line = AxisLine {
+            origin: dome.center,
+            direction: dome.axis,
         };
-        let around = (arcs.iter()).filter(|found| found.arc.is_closed() && off_axis(found) <= gap);
+        let is_around = |found: &&FoundArc| {
+            found.arc.sweep() > MIN_SWEEP && line.distance_to(&found.arc) <= gap
+        };
+        let around = arcs.iter().filter(is_around);
         let ends = around.filter_map(|rim| Some((rim, reach_at(&dome, &rim.arc, gap)?)));
         let nearest = ends.min_by(|(_, a), (_, b)| {
             let turned = |reach: &f64| (reach - dome.reach).abs();
@@ -132,7 +137,7 @@ pub(super) fn settled_domes(domes: &[FoundDome], arcs: &[FoundArc]) -> Vec<Dome>
         let radius = if is_touched {
             rim.arc.radius
         } else {
-            dome.radius
+            rim.arc.radius.hypot(along)
         };
         Some(Dome {
             center: rim.arc.center + along * axis,
@@ -160,13 +165,7 @@ fn axes(arcs: &[FoundArc]) -> Vec<Axis<'_>> {
     let mut axes: Vec<Axis> = Vec::new();
     for found in whole {
         let (arc, gap) = (&found.arc, GAP_IN_PIXELS * found.pixel);
-        let is_around = |axis: &&mut Axis| {
-            let off = (arc.center - axis.line.origin)
-                .cross(&axis.line.direction)
-                .norm();
-            off.max(arc.radius * arc.normal().cross(&axis.line.direction).norm()) <= gap
-        };
-        match axes.iter_mut().find(is_around) {
+        match (axes.iter_mut()).find(|axis| axis.line.distance_to(arc) <= gap) {
             Some(axis) => axis.arcs.push(found),
             None => axes.push(Axis {
                 line: AxisLine {
@@ -193,43 +192,43 @@ impl Axis<'_> {
 }
 
 impl Images<'_> {
-    /// The spheres around points of an axis that all edgels tell of.
-    fn spheres_on(&self, axis: &Axis) -> Vec<TouchedSphere> {
+    /// The spheres around points of an axis that edgels tell of, as far as they matter to a rim: those that
+    /// are touched toward the axis' end, and those toward its start.
+    fn spheres_on(&self, axis: &Axis) -> [Vec<TouchedSphere>; 2] {
+        let rims: Vec<Rim> = axis.arcs.iter().map(|found| axis.rim(found)).collect();
         let views = self.views.par_iter().zip(self.maps);
         let in_view = views.flat_map_iter(|(view, map)| {
             let edgels = (0..map.len()).map(|edgel| map.get(edgel));
-            edgels.filter_map(|edgel| TouchedSphere::by(&axis.line, &view.camera, edgel))
+            let spheres =
+                edgels.filter_map(|edgel| TouchedSphere::by(&axis.line, &view.camera, edgel));
+            spheres.filter(|sphere| rims.iter().any(|rim| sphere.is_near(rim)))
         });
-        in_view.collect()
+        let (ahead, behind) = in_view.partition(|sphere: &TouchedSphere| sphere.along > 0.0);
+        [ahead, behind]
     }
 
-    /// The domes about as large as a rim.
+    /// The domes about as large as a rim, on one of [both sides](Self::spheres_on).
     fn domes_by(
         &self,
         axis: &Axis,
         found: &FoundArc,
-        spheres: &[TouchedSphere],
+        (side, spheres): (usize, &[TouchedSphere]),
         taken: &[Vec<bool>],
     ) -> Vec<FoundDome> {
         let rim = axis.rim(found);
-        let mut domes = Vec::new();
-        for side in [1.0, -1.0] {
-            let of_side = spheres.iter().filter(|sphere| sphere.along * side > 0.0);
-            let of_side: Vec<TouchedSphere> = of_side.copied().collect();
-            for [height, radius] in most_voted(&rim, &of_side) {
-                let start = agreed([height, radius], &of_side, &rim, found.pixel);
-                let sphere = start.map(|[height, radius]| Dome {
-                    center: axis.line.origin + height * axis.line.direction,
-                    axis: side * axis.line.direction,
-                    radius,
-                    reach: FRAC_PI_2,
-                });
-                domes.extend(
-                    sphere.and_then(|sphere| self.settled_dome(axis, &sphere, found.pixel, taken)),
-                );
-            }
-        }
-        domes
+        let toward = [1.0, -1.0][side] * axis.line.direction;
+        let settled = |voted: [f64; 2]| {
+            let [height, radius] = agreed(voted, spheres, &rim, found.pixel)?;
+            let sphere = Dome {
+                center: axis.line.origin + height * axis.line.direction,
+                axis: toward,
+                radius,
+                reach: FRAC_PI_2,
+            };
+            self.settled_dome(axis, &sphere, found.pixel, taken)
+        };
+        let voted = most_voted(&rim, spheres).into_iter();
+        voted.filter_map(settled).collect()
     }
 
     /// The dome of a sphere, as far as its outlines say most for it.

@@ -40,7 +40,7 @@ const LEAST_NOISE: f64 = 0.05;
 const FITTING_REACHES: [f64; 3] = [1.3, 1.0, 1.0];
 /// So many views must show a line whole: two do wherever they want, and parts of other edges in
 /// more of them make it no line.
-const MIN_SHOWING: usize = 3;
+pub(super) const MIN_SHOWING: usize = 3;
 /// An evidence that others have lowered by more goes back into the queue, in nats.
 const STALE: f64 = 0.5;
 /// 2D segments whose ends lie within so many reaches of a line are its own: they propose

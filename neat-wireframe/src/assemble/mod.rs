@@ -337,6 +337,7 @@ fn graph_of(
     let images = selection.images;
     let least = config.min_evidence;
     selection.lines.extend(take_straight(&images, arcs, least));
+    report.lines = selection.lines.len();
     let known = &KnownArcs::new(arcs, domes);
     (selection.lines).retain(|found| !known.explain(&images, &found.line, least));
     report.outlines += report.lines - selection.lines.len();

@@ -6,7 +6,7 @@
 
 use crate::solve::{Cauchy, reweighted};
 use nalgebra::{Vector2, Vector3};
-use neat_core::{Camera, Edgel};
+use neat_core::{Camera, CircularArc, Edgel};
 
 /// A circle around an axis.
 pub(super) struct Rim {
@@ -51,7 +51,21 @@ const AGREEING_ROUNDS: usize = 4;
 /// What keeps a parameter where no edgel tells of it.
 const RIDGE: f64 = 1e-6;
 
+impl AxisLine {
+    /// How far it is from being the axis of an arc: at its centre, or along it.
+    pub(super) fn distance_to(&self, arc: &CircularArc) -> f64 {
+        let off = (arc.center - self.origin).cross(&self.direction).norm();
+        off.max(arc.radius * arc.normal().cross(&self.direction).norm())
+    }
+}
+
 impl TouchedSphere {
+    /// Whether it is not much larger than a rim, nor far from it.
+    pub(super) fn is_near(&self, rim: &Rim) -> bool {
+        let farthest = FARTHEST * rim.radius;
+        self.radius < farthest && (self.height - rim.height).abs() < farthest
+    }
+
     /// The sphere of which an edgel would be the outline.
     pub(super) fn by(axis: &AxisLine, camera: &Camera, edgel: &Edgel) -> Option<Self> {
         let pixel: Vector2<f64> = edgel.position.cast();

@@ -9,7 +9,7 @@ use crate::faces::{
 use nalgebra::Vector3;
 use neat_core::{CircularArc, Dome, Spline, file};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// The content of a `wireframe.json`.
@@ -197,9 +197,15 @@ impl WireframeDocument {
         triangles(&self.shells, &self.edges, self.of_kinds(&chains), &points)
     }
 
-    /// Points along the rim of each dome; the first and the last are the same.
+    /// Points along the rim of each dome, the first and the last the same; none of one that bounds no face.
     fn drawn_rims(&self) -> impl Iterator<Item = Vec<Vector3<f64>>> {
-        (self.domes.iter()).map(|dome| dome.rim().points(Self::TURN_OF_DRAWN_ARCS))
+        let curves: BTreeSet<CurveIndex> = self.shells.iter().flat_map(Shell::curves).collect();
+        let rim = move |(index, dome): (usize, &Dome)| {
+            let bounds_a_face = curves.contains(&CurveIndex::Rim(index));
+            let points = bounds_a_face.then(|| dome.rim().points(Self::TURN_OF_DRAWN_ARCS));
+            points.unwrap_or_default()
+        };
+        self.domes.iter().enumerate().map(rim)
     }
 
     /// Chains of arcs, of splines and of the rims of domes.
@@ -214,7 +220,9 @@ impl WireframeDocument {
     fn chains(&self) -> Vec<Vec<usize>> {
         let mut first = self.junctions.len();
         let chain = |points: Vec<Vector3<f64>>| {
-            let pieces = points.len() - 1;
+            let Some(pieces) = points.len().checked_sub(1) else {
+                return Vec::new();
+            };
             let count = pieces + usize::from(points[0] != points[pieces]);
             let chain = (0..=pieces).map(|k| first + k % count).collect();
             first += count;

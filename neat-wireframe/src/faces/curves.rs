@@ -5,6 +5,7 @@ use super::bounds::Bounds;
 use super::face::{CurveIndex, Step};
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{CircularArc, Dome, Spline, Wireframe3d};
+use std::f64::consts::FRAC_PI_2;
 
 /// Arcs are drawn in pieces that turn by so much, in radians.
 pub(super) const TURN: f64 = 0.1;
@@ -253,7 +254,17 @@ fn junctions_at(
 fn extent(graph: &MeasuredGraph) -> f64 {
     let of_arcs = graph.arcs.iter().flat_map(|arc| arc.points(TURN));
     let of_splines = graph.splines.iter().flat_map(|spline| spline.points(TURN));
-    let of_curves: Vec<Vector3<f64>> = of_arcs.chain(of_splines).collect();
+    // As wide as its sphere, if it goes beyond half of that.
+    let of_domes = graph.domes.iter().flat_map(|dome| {
+        let reach = dome.reach.min(FRAC_PI_2);
+        let widest = Dome { reach, ..*dome }.rim().points(TURN);
+        let pole = dome.center + dome.radius * dome.axis;
+        widest
+            .into_iter()
+            .chain([pole])
+            .chain(dome.rim().points(TURN))
+    });
+    let of_curves: Vec<Vector3<f64>> = of_arcs.chain(of_splines).chain(of_domes).collect();
     let bounds = Bounds::of(graph.wireframe.junctions.iter().chain(&of_curves));
     // There may be nothing.
     bounds.extent().max(0.0)

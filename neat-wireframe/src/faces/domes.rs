@@ -122,7 +122,33 @@ mod tests {
         // Without the cylinder that it touches there is nothing to close.
         let mut alone = round;
         alone.arcs.clear();
-        assert!(!alone.shells().iter().any(|shell| shell.closed));
+        let [shell] = &alone.shells()[..] else {
+            panic!("a dome is a face");
+        };
+        assert!(!shell.closed && shell.faces.len() == 1);
+    }
+
+    #[test]
+    fn a_capsule_is_a_solid_without_any_edge() {
+        let mut capsule = Model::default();
+        let round = dome(0.7, 0.4, FRAC_PI_2);
+        let turned = round.map(|point| Vector3::new(0.0, 0.0, 0.7) - point);
+        capsule.domes.extend([round, turned]);
+        let volume = PI * 0.16 * 0.7 + 2.0 * volume_of_cap(0.4, FRAC_PI_2);
+        assert_solid(capsule, 3, volume);
+    }
+
+    #[test]
+    fn what_is_seen_within_a_dome_says_that_it_is_no_solid() {
+        for (pin, _) in pins() {
+            // A wire in the round end, beyond the box of all rims.
+            let mut pin = pin.turned();
+            let dome = pin.domes[0];
+            let at = |share: f64| dome.center + dome.axis * (share * dome.radius);
+            pin.wireframe.junctions.extend([at(0.2), at(0.8)]);
+            pin.wireframe.edges.push([0, 1]);
+            assert!(!pin.shells().iter().any(|shell| shell.closed));
+        }
     }
 
     #[test]

@@ -163,7 +163,7 @@ impl Face {
         self.loops.iter().flatten()
     }
 
-    /// The curves of all loops, ascending: no two candidates have the same.
+    /// The curves of all loops, ascending: no two candidates have the same, but for a cap and a lid.
     pub(super) fn boundary(&self) -> Vec<CurveIndex> {
         let mut boundary: Vec<CurveIndex> = self.steps().map(|step| step.curve).collect();
         boundary.sort_unstable();

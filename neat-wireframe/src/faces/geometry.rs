@@ -104,6 +104,10 @@ impl ShellGeometry {
             }
             if let Some(arc) = &mut curve.arc {
                 *arc = match curve.ends {
+                    // Where they touch, both are as wide.
+                    None if index.is_inferred() => {
+                        turned_as(arc, (arc.center, arc.radius, arc.normal()), true)
+                    }
                     None => circle_on_surfaces(arc, &surfaces_of[index], true),
                     Some(ends) => {
                         let circle = circle_on_surfaces(arc, &surfaces_of[index], false);
@@ -426,35 +430,43 @@ fn circle_on_surfaces(arc: &CircularArc, surfaces: &[Surface], whole: bool) -> C
     turned_as(arc, (center, radius, normal), whole)
 }
 
-/// Centre, radius and normal of the circle in which a sphere meets a plane, or a cylinder of its axis.
+/// Centre, radius and normal of the circle in which a sphere meets a plane, another sphere, or a cylinder
+/// of its axis; of a cone that which is on the sphere where the arc is. `None` where they do not meet.
 fn circle_on_sphere(
     arc: &CircularArc,
     surfaces: &[Surface],
 ) -> Option<(Vector3<f64>, f64, Vector3<f64>)> {
-    let (center, radius) = surfaces.iter().find_map(|surface| match surface {
+    let mut spheres = surfaces.iter().filter_map(|surface| match surface {
         Surface::Sphere { center, radius, .. } => Some((*center, *radius)),
         _ => None,
-    })?;
+    });
+    let (center, radius) = spheres.next()?;
+    // In a plane at a height along an axis through its centre.
+    let across = |axis: Vector3<f64>, height: f64| {
+        let squared = radius * radius - height * height;
+        (squared > 0.0).then(|| (center + axis * height, squared.sqrt(), axis))
+    };
+    if let Some((other, of_other)) = spheres.next() {
+        let (axis, apart) = (
+            (other - center).try_normalize(0.0)?,
+            (other - center).norm(),
+        );
+        let squares = radius * radius - of_other * of_other;
+        return across(axis, 0.5 * (apart + squares / apart));
+    }
     surfaces.iter().find_map(|surface| match surface {
-        Surface::Plane { normal, offset } => {
-            let height = offset - normal.dot(&center);
-            let squared = radius * radius - height * height;
-            Some((center + normal * height, squared.max(0.0).sqrt(), *normal))
-        }
+        Surface::Plane { normal, offset } => across(*normal, offset - normal.dot(&center)),
         Surface::Cylinder {
-            point,
             axis,
             radius: of_cylinder,
             ..
         } => {
-            // Where it touches the cylinder, it is as wide.
             let height = (radius * radius - of_cylinder * of_cylinder)
                 .max(0.0)
                 .sqrt();
-            let side = axis.dot(&(arc.center - center)).signum();
-            let middle = point + axis * axis.dot(&(center - point));
-            Some((middle + axis * (side * height), *of_cylinder, *axis))
+            across(*axis, height * axis.dot(&(arc.center - center)).signum())
         }
+        Surface::Cone { axis, .. } => across(*axis, axis.dot(&(arc.center - center))),
         _ => None,
     })
 }

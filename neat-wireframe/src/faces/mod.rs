@@ -132,7 +132,7 @@ pub fn find_shells(
         .map(|face| {
             let region = Region::new(&curves, face);
             let against = (region.as_ref()).map_or(f64::MAX, |region| {
-                sightings.against(region, &outline(&curves, face))
+                sightings.against(region, &outline(&curves, face, region))
             });
             (region, against)
         })
@@ -208,15 +208,15 @@ fn patches(
         let area = patch.moments(&Vector3::zeros())[0];
         let passes = |other: &&Region| region.passes_through(other) || other.passes_through(region);
         patch.off <= curves.arc_sigma()
-            && sightings.against(region, &outline(curves, face)) <= selection::MOST_AGAINST
+            && sightings.against(region, &outline(curves, face, region)) <= selection::MOST_AGAINST
             && shells::is_mostly_free(curves, face, &used, (region, area))
             && !beside.iter().any(passes)
     })
 }
 
-/// The points along the boundary of a face.
-fn outline(curves: &Curves, face: &Face) -> Vec<Vector3<f64>> {
-    face.steps()
-        .flat_map(|step| curves.points_along(step))
+/// The points along the boundary of a face, and within it if it reaches beyond that.
+fn outline(curves: &Curves, face: &Face, region: &Region) -> Vec<Vector3<f64>> {
+    (face.steps().flat_map(|step| curves.points_along(step)))
+        .chain(region.inner_points())
         .collect()
 }

@@ -166,6 +166,14 @@ impl Region {
         points.map(|point| frame.point(&point)).collect()
     }
 
+    /// Points within a face that reaches beyond its curves: a part of a sphere.
+    pub fn inner_points(&self) -> Vec<Vector3<f64>> {
+        match self {
+            Self::Cap(cap) => cap.inner_points(),
+            _ => Vec::new(),
+        }
+    }
+
     /// Distance of a point from the surface of which the face is a part.
     pub fn distance_to_surface(&self, point: &Vector3<f64>) -> f64 {
         match self {

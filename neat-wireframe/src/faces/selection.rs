@@ -178,7 +178,7 @@ struct Search<'a> {
     /// In the order in which they are decided on, those first that win most.
     order: Vec<Candidate>,
     taken: BTreeSet<usize>,
-    /// Of each curve of the group, whether it is an inferred line and how many faces it has.
+    /// Of each curve of the group, whether it is inferred and how many faces it has.
     curves: Vec<(bool, usize)>,
     best: (f64, Vec<usize>),
     states: usize,
@@ -189,6 +189,8 @@ struct Candidate {
     face: usize,
     /// What it wins by its curves, if none of them has two faces, less its own cost.
     gain: f64,
+    /// What of that it wins by what its outlines have said, whatever is beside it.
+    shown: f64,
     /// The places of its curves in [`Search::curves`].
     curves: Vec<usize>,
 }
@@ -205,16 +207,17 @@ impl<'a> Search<'a> {
         let known: Vec<CurveIndex> = known.into_iter().collect();
         let place = |step: &Step| known.binary_search(&step.curve).ok();
         let candidate = |face: usize| {
-            let of_surface = match faces[face].surface {
-                Surface::Cone { .. } => CONE,
-                Surface::Sphere { .. } => -SHOWN,
-                _ => 0.0,
+            let (of_surface, shown) = match faces[face].surface {
+                Surface::Cone { .. } => (CONE, 0.0),
+                Surface::Sphere { .. } => (0.0, SHOWN),
+                _ => (0.0, 0.0),
             };
             let cost = against[face] + of_surface;
             let curves: Vec<usize> = faces[face].steps().filter_map(place).collect();
             Candidate {
                 face,
-                gain: MISSING_FACE * curves.len() as f64 - cost,
+                gain: MISSING_FACE * curves.len() as f64 + shown - cost,
+                shown,
                 curves,
             }
         };
@@ -275,11 +278,13 @@ impl<'a> Search<'a> {
     /// of those that can be taken still the ones that cost least.
     fn most_of_rest(&self, next: usize) -> f64 {
         let mut won_by = vec![[0.0_f64; 2]; self.curves.len()];
+        let mut shown = 0.0;
         for candidate in &self.order[next..] {
             let Some(cost) = self.cost_beside_taken(candidate) else {
                 continue;
             };
-            let won = (candidate.gain - cost) / candidate.curves.len() as f64;
+            shown += candidate.shown;
+            let won = (candidate.gain - candidate.shown - cost) / candidate.curves.len() as f64;
             for curve in &candidate.curves {
                 let [first, second] = &mut won_by[*curve];
                 *second = second.max(won.min(*first));
@@ -294,7 +299,7 @@ impl<'a> Search<'a> {
                 1 => *first,
                 _ => 0.0,
             };
-        self.curves.iter().zip(&won_by).map(of_curve).sum()
+        shown + self.curves.iter().zip(&won_by).map(of_curve).sum::<f64>()
     }
 
     /// What the faces that are taken make a further one cost; `None` if they exclude it.
@@ -308,7 +313,7 @@ impl<'a> Search<'a> {
         beside.map(|(_, pair)| pair.cost()).sum()
     }
 
-    /// A line is inferred for the first face, which wins nothing by it and lacks the other.
+    /// A curve is inferred for the first face, which wins nothing by it and lacks the other.
     fn cost_of_first(&self, candidate: &Candidate) -> f64 {
         let is_first = |curve: &&usize| self.curves[**curve] == (true, 0);
         2.0 * MISSING_FACE * candidate.curves.iter().filter(is_first).count() as f64

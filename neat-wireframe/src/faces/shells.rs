@@ -145,10 +145,11 @@ fn leave_out_where_curves_are(
     geometry: &ShellGeometry,
 ) -> bool {
     let own: BTreeSet<CurveIndex> = shell.curves().collect();
-    let others = OtherCurves::beside(curves, &own, &own);
     let regions: Vec<Option<Region>> = (shell.faces.iter())
         .map(|face| Region::new(curves, face))
         .collect();
+    let within = regions.iter().flatten().flat_map(Region::inner_points);
+    let others = OtherCurves::beside(curves, &own, &own, &within.collect::<Vec<_>>());
     // Rays along it hardly meet edges.
     let ray = Vector3::from(NO_AXIS);
     let within = |point: &Vector3<f64>| {
@@ -181,7 +182,8 @@ pub(super) fn is_mostly_free(
     (region, area): (&Region, f64),
 ) -> bool {
     let own: BTreeSet<CurveIndex> = face.steps().map(|step| step.curve).collect();
-    let enclosed = OtherCurves::beside(curves, &own, used).enclosed_on(region);
+    let within = region.inner_points();
+    let enclosed = OtherCurves::beside(curves, &own, used, &within).enclosed_on(region);
     enclosed.is_none_or(|enclosed| enclosed <= LITTLE * area)
 }
 
@@ -197,12 +199,19 @@ struct OtherCurves<'a> {
 }
 
 impl<'a> OtherCurves<'a> {
-    /// `own`: the curves of the faces; `used`: these and more that are no others.
-    fn beside(curves: &'a Curves, own: &BTreeSet<CurveIndex>, used: &BTreeSet<CurveIndex>) -> Self {
+    /// `own`: the curves of the faces; `used`: these and more that are no others; `within`: points of faces
+    /// that reach beyond their curves.
+    fn beside(
+        curves: &'a Curves,
+        own: &BTreeSet<CurveIndex>,
+        used: &BTreeSet<CurveIndex>,
+        within: &[Vector3<f64>],
+    ) -> Self {
         let bounding: Vec<&Curve> = (curves.all.iter())
             .filter(|curve| own.contains(&curve.index))
             .collect();
-        let bounds = Bounds::of(bounding.iter().flat_map(|curve| &curve.points));
+        let along = bounding.iter().flat_map(|curve| &curve.points);
+        let bounds = Bounds::of(along.chain(within));
         let margin = MARGIN * bounds.extent();
         let around = bounds.widened(margin);
         let others = (curves.observed())
