@@ -112,8 +112,9 @@ fn find_domes(images: &Images, arcs: &[FoundArc]) -> Vec<FoundDome> {
     domes
 }
 
-/// The domes where arcs are that have been placed since: through the rim at which they end, or as wide as
-/// the cylinder that they touch.
+/// The domes where arcs are that have been placed since: around the axis of the rim at which they end, or
+/// as wide as the cylinder that they touch. Of a sphere outlines know the radius better than a small rim
+/// on it.
 pub(super) fn settled_domes(domes: &[FoundDome], arcs: &[FoundArc]) -> Vec<Dome> {
     let settled = |found: &FoundDome| {
         let (dome, gap) = (found.dome, GAP_IN_PIXELS * found.pixel);
@@ -137,7 +138,7 @@ pub(super) fn settled_domes(domes: &[FoundDome], arcs: &[FoundArc]) -> Vec<Dome>
         let radius = if is_touched {
             rim.arc.radius
         } else {
-            rim.arc.radius.hypot(along)
+            dome.radius
         };
         Some(Dome {
             center: rim.arc.center + along * axis,

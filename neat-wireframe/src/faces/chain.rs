@@ -5,16 +5,22 @@ use neat_core::LineSegment3;
 
 /// The point of a chain of two points or more at a share of its length, from 0 to 1.
 pub(super) fn point_along(chain: &[Vector3<f64>], share: f64) -> Vector3<f64> {
-    let lengths = || chain.windows(2).map(|ends| (ends[1] - ends[0]).norm());
-    let mut left = share * lengths().sum::<f64>();
+    let mut left = share * length_of_chain(chain);
     let last = chain.len() - 2;
-    for (piece, length) in lengths().enumerate() {
+    let lengths = chain.windows(2).map(|ends| (ends[1] - ends[0]).norm());
+    for (piece, length) in lengths.enumerate() {
         if left <= length || piece == last {
             return chain[piece] + (chain[piece + 1] - chain[piece]) * (left / length);
         }
         left -= length;
     }
     unreachable!("point_along: a chain of {} points", chain.len())
+}
+
+/// The length of a chain.
+pub(super) fn length_of_chain(chain: &[Vector3<f64>]) -> f64 {
+    let pieces = chain.windows(2);
+    pieces.map(|ends| (ends[1] - ends[0]).norm()).sum()
 }
 
 /// Distance of a point from the nearest of a chain.
@@ -37,6 +43,7 @@ mod tests {
         assert_eq!(point_along(&corner, 0.5), Vector3::new(2.0, 0.0, 0.0));
         assert_eq!(point_along(&corner, 0.875), Vector3::new(3.0, 0.5, 0.0));
         assert_eq!(point_along(&corner, 1.0), corner[2]);
+        assert_eq!(length_of_chain(&corner), 4.0);
         assert_eq!(
             distance_to_chain(&corner, &Vector3::new(1.0, 0.0, 2.0)),
             2.0

@@ -2,6 +2,7 @@
 //! splines whose ends are junctions.
 
 use super::bounds::Bounds;
+use super::chain::length_of_chain;
 use super::face::{CurveIndex, Step};
 use nalgebra::{Matrix3, Vector3};
 use neat_core::{CircularArc, Dome, Spline, Wireframe3d};
@@ -80,8 +81,7 @@ impl Curve {
     }
 
     pub fn length(&self) -> f64 {
-        let pieces = self.points.windows(2);
-        pieces.map(|ends| (ends[1] - ends[0]).norm()).sum()
+        length_of_chain(&self.points)
     }
 
     /// The points in the direction of a loop.

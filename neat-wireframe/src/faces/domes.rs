@@ -148,6 +148,9 @@ mod tests {
             pin.wireframe.junctions.extend([at(0.2), at(0.8)]);
             pin.wireframe.edges.push([0, 1]);
             assert!(!pin.shells().iter().any(|shell| shell.closed));
+            // One that is hardly longer than junctions are off says nothing.
+            pin.wireframe.junctions[1] = at(0.22);
+            assert!(pin.shells().iter().all(|shell| shell.closed));
         }
     }
 

@@ -1,7 +1,7 @@
 //! Faces become shells: what hangs together, with its outer side found, and closed or not.
 
 use super::bounds::Bounds;
-use super::chain::{distance_to_chain, point_along};
+use super::chain::{distance_to_chain, length_of_chain, point_along};
 use super::curves::{Curve, Curves, MeasuredGraph, TURN};
 use super::face::{CurveIndex, Face, Shell, Step};
 use super::geometry::{NO_AXIS, ShellGeometry};
@@ -14,7 +14,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Points of each curve that are asked whether they lie within a solid or on it.
 const POINTS: usize = 7;
-/// Points are on a face or an edge that are so near to it, by the extent of the shell.
+/// Points are on a face or an edge that are so near to it, by the extent of the shell. A curve alone that
+/// is no longer than that is as good as a point, and says nothing.
 const MARGIN: f64 = 0.02;
 /// Of a face, what other curves on it may take without the rest being another face: area to a
 /// twentieth.
@@ -214,11 +215,20 @@ impl<'a> OtherCurves<'a> {
         let bounds = Bounds::of(along.chain(within));
         let margin = MARGIN * bounds.extent();
         let around = bounds.widened(margin);
+        let mut at_junction: BTreeMap<usize, usize> = BTreeMap::new();
+        for end in curves.observed().filter_map(|curve| curve.ends).flatten() {
+            *at_junction.entry(end).or_default() += 1;
+        }
+        let goes_on = |ends: Option<[usize; 2]>| {
+            let mut ends = ends.into_iter().flatten();
+            ends.any(|end| at_junction[&end] > 1)
+        };
         let others = (curves.observed())
             .filter(|curve| !used.contains(&curve.index))
             .map(|curve| (curve.ends, &curve.points))
             .chain(curves.loose.iter().map(|points| (None, points)))
-            .filter(|(_, points)| Bounds::of(*points).meets(&around));
+            .filter(|(_, points)| Bounds::of(*points).meets(&around))
+            .filter(|(ends, points)| length_of_chain(points) > margin || goes_on(*ends));
         let apart = |point: &Vector3<f64>| {
             (bounding.iter()).all(|curve| distance_to_chain(&curve.points, point) > margin)
         };
