@@ -22,8 +22,7 @@ impl Dome {
     /// The circle in which it ends, around its axis.
     pub fn rim(&self) -> CircularArc {
         let (sine, cosine) = self.reach.sin_cos();
-        let side = self.axis.cross(&Vector3::ith(self.axis.iamin(), 1.0));
-        let x = side.normalize();
+        let x = across(&self.axis);
         CircularArc {
             center: self.center + self.radius * cosine * self.axis,
             axes: [x, self.axis.cross(&x)],
@@ -44,8 +43,7 @@ impl Dome {
         let cosine = (1.0 - sine * sine).sqrt();
         let toward = offset.try_normalize(0.0)?;
         let flat = self.axis - toward * toward.dot(&self.axis);
-        let x = (flat.try_normalize(1e-9))
-            .unwrap_or_else(|| toward.cross(&Vector3::ith(toward.iamin(), 1.0)).normalize());
+        let x = (flat.try_normalize(1e-9)).unwrap_or_else(|| across(&toward));
         // At angle t, cos(angle to the axis) = sine · toward·axis + cosine · |flat| · cos t.
         let ahead = self.reach.cos() - sine * toward.dot(&self.axis);
         let half = (ahead / (cosine * flat.norm())).max(-1.0).acos();
@@ -80,6 +78,11 @@ impl Dome {
             reach: self.reach,
         }
     }
+}
+
+/// A unit vector perpendicular to another one.
+fn across(axis: &Vector3<f64>) -> Vector3<f64> {
+    axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize()
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! Which faces of a CAD model are found, by area.
 //!
 //! Source: ours. A found face is a true one if its corners lie on the same surface (those of a wall
-//! between splines on the boundary of a true face that is none of plane, cylinder, cone and sphere), both have the
-//! same area, and their middles are in one place: so it is found whole, and once. Other than
+//! between splines on the boundary of a true face that is none of plane, cylinder, cone and sphere),
+//! both have the same area, and their middles are in one place: so it is found whole, and once. Other than
 //! areas by points on surfaces, which count a face with a forgotten hole in it as nearly right,
 //! this says which faces of a model are there.
 

@@ -13,7 +13,7 @@ use neat_core::{CircularArc, LineSegment3};
 
 /// Axes of two arcs are one within so many pixels, at both arcs, judged: as far as the axis of a
 /// short arc is off.
-const GAP_IN_PIXELS: f64 = 2.0;
+pub(super) const GAP_IN_PIXELS: f64 = 2.0;
 /// Arcs that are nearer to each other, in pixels, are one or lie in one plane, judged.
 const MIN_LENGTH_IN_PIXELS: f64 = 4.0;
 /// A line that is farther from an arc, in pixels, is no chord of it, judged: one that bends more is

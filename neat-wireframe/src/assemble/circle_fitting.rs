@@ -163,9 +163,22 @@ impl Images<'_> {
 
     /// Takes the edgels beside an arc, in all views.
     pub(super) fn claim_arc(&self, found: &FoundArc, taken: &mut [Vec<bool>]) {
-        let FoundArc { arc, pixel, .. } = found;
-        let parts = equal_parts(arc.angles, arc.length(), *pixel);
-        self.claim_curve(&parts, |angle| Some(arc.point_at(angle)), taken);
+        self.claim_arc_of(found.pixel, |_| Some(found.arc), taken);
+    }
+
+    /// Likewise, beside what is the arc `in_view` in each view, where a pixel is `pixel` long.
+    pub(super) fn claim_arc_of(
+        &self,
+        pixel: f64,
+        in_view: impl Fn(usize) -> Option<CircularArc> + Sync,
+        taken: &mut [Vec<bool>],
+    ) {
+        taken.par_iter_mut().enumerate().for_each(|(view, taken)| {
+            if let Some(arc) = in_view(view) {
+                let parts = equal_parts(arc.angles, arc.length(), pixel);
+                self.claim_in_view(view, &parts, |angle| Some(arc.point_at(angle)), taken);
+            }
+        });
     }
 
     /// Takes the edgels beside parts of a curve, in all views.
@@ -175,13 +188,22 @@ impl Images<'_> {
         at: impl Fn(f64) -> Option<Vector3<f64>> + Sync,
         taken: &mut [Vec<bool>],
     ) {
-        taken.par_iter_mut().enumerate().for_each(|(view, taken)| {
-            for part in parts {
-                let samples = self.samples_of_curve(view, *part, CLAIM_DENSITY.recip(), &at);
-                let samples = samples.unwrap_or_default();
-                take_beside(&self.maps[view], &samples, self.reach, taken);
-            }
-        });
+        let views = taken.par_iter_mut().enumerate();
+        views.for_each(|(view, taken)| self.claim_in_view(view, parts, &at, taken));
+    }
+
+    fn claim_in_view(
+        &self,
+        view: usize,
+        parts: &[[f64; 2]],
+        at: impl Fn(f64) -> Option<Vector3<f64>>,
+        taken: &mut [bool],
+    ) {
+        for part in parts {
+            let samples = self.samples_of_curve(view, *part, CLAIM_DENSITY.recip(), &at);
+            let samples = samples.unwrap_or_default();
+            take_beside(&self.maps[view], &samples, self.reach, taken);
+        }
     }
 
     fn pixel_of_arc(&self, arc: &CircularArc, views: impl Iterator<Item = usize>) -> f64 {

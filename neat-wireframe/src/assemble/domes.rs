@@ -3,11 +3,12 @@
 //! What many edgels agree on (`touched_spheres.rs`) is fitted to the edgels beside its outlines. It ends
 //! at a rim on the sphere, or touches the cylinder of a rim.
 
-use super::circle_fitting::{FoundArc, equal_parts};
-use super::claimed_edgels::{CLAIM_DENSITY, take_beside};
+use super::arc_tubes::GAP_IN_PIXELS;
+use super::circle_fitting::FoundArc;
 use super::curve_samples::{SPACING, distance_of_curve};
 use super::edge_samples::{Images, Sample};
 use super::line_fitting::change_by_edgels;
+use super::outlines::{ADVANTAGE, FOUND, MIN_EDGELS};
 use super::touched_spheres::{AxisLine, Rim, TouchedSphere, agreed, most_voted};
 use nalgebra::Vector2;
 use neat_core::{CircularArc, Dome, LineSegment3};
@@ -35,27 +36,20 @@ const TOUCHING_IN_PIXELS: f64 = 8.0;
 
 /// Arcs of less than half a circle say little about their axis.
 const MIN_SWEEP: f64 = PI;
-/// Circles have one axis within so many pixels, as rims of a tube have.
-const GAP_IN_PIXELS: f64 = 2.0;
 
 /// Before it is fitted to the edgels beside its outlines, a sphere ends at rims within so many times the gap.
 const FIRST_GAPS: f64 = 4.0;
 
 /// Reaches of the fits.
 const FITTING_REACHES: [f64; 4] = [4.0, 2.5, 1.5, 1.0];
-/// Fewer edgels determine no sphere.
-const MIN_EDGELS: usize = 20;
-/// A view's outline counts if so much of it has edgels.
-const FOUND: f64 = 0.6;
 /// What keeps a parameter where no edgel tells of it.
 const RIDGE: f64 = 1e-6;
 
 /// Centre and radius are chosen as they want, and each view shows something somewhere.
 const FREE_VIEWS: usize = 2;
-/// A dome is worth as much as an outline has to be, in nats …
-const LEAST: f64 = 12.0;
-/// … and so much more than another surface that lies along parts of it, which is as wrong as 1 in 20. Of 8
-/// true ones the least is worth 18 nats, a rounded edge −20.
+/// A dome is worth as much as a tube has to be, the best of many tries, and this many nats more than another
+/// surface that lies along parts of it, which is as wrong as 1 in 20. Of six true ones the least is worth 18,
+/// a rounded edge −20.
 const LEAST_OF_WHOLE: f64 = 3.0;
 
 impl FoundDome {
@@ -256,7 +250,11 @@ impl Images<'_> {
             })
         });
         let best = found.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
-        (best.gain > LEAST).then_some(best)
+        (best.gain > ADVANTAGE).then_some(best)
+    }
+
+    fn outline_of(&self, dome: &Dome, view: usize) -> Option<CircularArc> {
+        dome.outline_from(&self.views[view].camera.center_in_world)
     }
 
     /// The sphere through the edgels beside the outlines of a dome.
@@ -281,7 +279,7 @@ impl Images<'_> {
     /// radius, and what takes them away.
     fn rows_of_dome(&self, dome: &Dome, view: usize, reach: f64) -> Vec<(Vector2<f64>, f64)> {
         let camera = &self.views[view].camera;
-        let Some(outline) = dome.outline_from(&camera.center_in_world) else {
+        let Some(outline) = self.outline_of(dome, view) else {
             return Vec::new();
         };
         let samples = self.samples_of_sector(view, &outline, outline.angles, SPACING);
@@ -307,7 +305,7 @@ impl Images<'_> {
     fn gain_of_dome(&self, dome: &Dome, taken: &[Vec<bool>]) -> Option<f64> {
         let pole = dome.center + dome.radius * dome.axis;
         let in_view = |view: usize| {
-            let outline = dome.outline_from(&self.views[view].camera.center_in_world)?;
+            let outline = self.outline_of(dome, view)?;
             self.samples_of_sector(view, &outline, outline.angles, SPACING)
         };
         let found =
@@ -317,23 +315,8 @@ impl Images<'_> {
 
     /// Takes the edgels of the outlines of a dome, in all views.
     pub(super) fn claim_dome(&self, found: &FoundDome, taken: &mut [Vec<bool>]) {
-        let views = taken.par_iter_mut().enumerate();
-        views.for_each(|(view, taken)| {
-            let eye = &self.views[view].camera.center_in_world;
-            let Some(outline) = found.dome.outline_from(eye) else {
-                return;
-            };
-            for part in equal_parts(outline.angles, outline.length(), found.pixel) {
-                let density = CLAIM_DENSITY.recip();
-                let samples = self.samples_of_sector(view, &outline, part, density);
-                take_beside(
-                    &self.maps[view],
-                    &samples.unwrap_or_default(),
-                    self.reach,
-                    taken,
-                );
-            }
-        });
+        let in_view = |view: usize| self.outline_of(&found.dome, view);
+        self.claim_arc_of(found.pixel, in_view, taken);
     }
 }
 

@@ -18,8 +18,8 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) const AGREEMENT: f64 = 3.29 * std::f64::consts::SQRT_2;
 
 /// All curves, inferred ones among them, and faces with different boundaries, but for `caps`. None
-/// knows its outer side yet. A face most of whose curves are inferred, and most of their length, is a guess; `caps` have
-/// been shown.
+/// knows its outer side yet. A face most of whose curves are inferred lines, and most of their length,
+/// is a guess; caps and their rims have been shown.
 pub(super) fn candidates(curves: Curves, caps: Vec<Face>) -> (Curves, Vec<Face>) {
     let planes = coplanar_curves(&curves);
     let missing = missing_creases(&curves, &planes);

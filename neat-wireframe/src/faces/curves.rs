@@ -137,10 +137,9 @@ impl Curves {
             });
         };
         for (index, arc) in graph.arcs.iter().enumerate() {
-            let angle = |k: usize| arc.angles[0] + arc.sweep() * k as f64 / POINTS_OF_ARC as f64;
             let of = Curved {
                 ends: (!arc.is_closed()).then(|| ends_of_arc(arc)),
-                measured: (0..POINTS_OF_ARC).map(|k| arc.point_at(angle(k))).collect(),
+                measured: measured_points(arc).collect(),
                 arc: Some(*arc),
             };
             add(CurveIndex::Arc(index), arc.points(TURN), of);
@@ -215,6 +214,12 @@ struct Curved {
     /// Points by which its plane is known.
     measured: Vec<Vector3<f64>>,
     arc: Option<CircularArc>,
+}
+
+/// The points of an arc that say where it lies.
+pub(super) fn measured_points(arc: &CircularArc) -> impl Iterator<Item = Vector3<f64>> {
+    let angle = |k: usize| arc.angles[0] + arc.sweep() * k as f64 / POINTS_OF_ARC as f64;
+    (0..POINTS_OF_ARC).map(move |k| arc.point_at(angle(k)))
 }
 
 /// Where an arc begins and ends.

@@ -1,13 +1,10 @@
 //! Domes as faces: caps of spheres, within a circle of the wireframe or where they touch a cylinder.
 
 use super::candidates::AGREEMENT;
-use super::curves::{Curve, Curves, TURN};
+use super::curves::{Curve, Curves, TURN, measured_points};
 use super::face::{CurveIndex, Face, Step};
 use super::surface::Surface;
 use neat_core::{CircularArc, Dome};
-
-/// Points of a rim that say where it lies.
-const POINTS: usize = 8;
 
 /// What domes add to curves and faces.
 pub(super) struct DomeFaces {
@@ -55,13 +52,12 @@ fn is_rim(curves: &Curves, dome: &Dome, arc: &CircularArc) -> bool {
 }
 
 fn inferred_rim(curves: &Curves, dome: usize, rim: &CircularArc) -> Curve {
-    let angle = |k: usize| rim.sweep() * k as f64 / POINTS as f64;
     Curve {
         index: CurveIndex::Rim(dome),
         ends: None,
         points: rim.points(TURN),
-        measured: (0..POINTS)
-            .map(|k| (rim.point_at(angle(k)), curves.arc_covariance()))
+        measured: (measured_points(rim))
+            .map(|point| (point, curves.arc_covariance()))
             .collect(),
         arc: Some(*rim),
     }

@@ -4,9 +4,9 @@
 //! The energy is a sum over faces and curves, in nats. A face costs what images say against it
 //! ([`super::visibility`]). A curve that lacks a face costs [`MISSING_FACE`], twice if it has none;
 //! a curve between two faces of one plane is no crease and costs [`FLAT`]. An inferred line that has
-//! no face is none, and costs nothing. A cone costs [`CONE`], an acute angle up to [`ACUTE`], and a part of
-//! a sphere wins what its outlines have said for it, [`SHOWN`]. No curve has three faces, no two faces lie on each other, and none but a plane passes through
-//! another face. The minimum is found by branch and bound.
+//! no face is none, and costs nothing. A cone costs [`CONE`], an acute angle up to [`ACUTE`], and a
+//! part of a sphere wins what its outlines have said for it, [`SHOWN`]. No curve has three faces, no
+//! two faces lie on each other, and none but a plane passes through another face. The minimum is found by branch and bound.
 
 use super::curves::{Curve, Curves};
 use super::face::{CurveIndex, Face, Step};
@@ -26,7 +26,7 @@ const FLAT: f64 = 2.0 * MISSING_FACE;
 /// Coaxial rims of different radii stand on two sides of a step more often than they bound a cone.
 /// Less than a rim without a face: it decides where both would do.
 const CONE: f64 = 1.0;
-/// A dome has at least as much (`LEAST` of `assemble/domes.rs`).
+/// A dome has at least as much (`ADVANTAGE` in `assemble/domes.rs`).
 const SHOWN: f64 = 12.0;
 /// Two faces under an acute angle cost so much times its cosine: rims alone do not tell a pin with
 /// chamfers from a tube with sharp ends or from two frustums, and most things are blunt. Less than

@@ -56,8 +56,11 @@ pub(crate) fn triangles(
                 }
             }
             Surface::Sphere { .. } => {
-                let rim = face.loops.first().map(around).unwrap_or_default();
-                if let Some(cap) = cap_within(face, &rim, points) {
+                let along = |step: &Step| indices_along(step, edges, chains);
+                let mut rim = face.steps().next().map(along).unwrap_or_default();
+                let closed: Vec<_> = rim.iter().map(|index| points[*index]).collect();
+                if let Some(cap) = Cap::new(&face.surface, &closed) {
+                    rim.pop();
                     triangles = cap.triangles(&rim, points, first);
                     first += cap.inner_points().len();
                 }
@@ -101,13 +104,6 @@ pub(crate) fn points_within(
         places.into_iter().map(|(_, point)| point).collect()
     };
     faces.flat_map(within).collect()
-}
-
-/// The cap of a sphere within the points of its rim, each of them once.
-fn cap_within(face: &Face, rim: &[usize], points: &[Vector3<f64>]) -> Option<Cap> {
-    let around = rim.iter().chain(rim.first());
-    let around: Vec<Vector3<f64>> = around.map(|index| points[*index]).collect();
-    Cap::new(&face.surface, &around)
 }
 
 /// The points along a step of a loop, both ends among them.
