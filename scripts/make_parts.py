@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes scenes of everyday CAD parts with exact truth.
 
-    scripts/make_parts.py OUT [--set first|second|round] [NAME...]
+    scripts/make_parts.py OUT [--set first|second|round|third] [NAME...]
 
 Each scene is a folder of OUT: 60 grey pictures on black, cameras.json,
 gt_wireframe.json and mesh.obj, for `neat reconstruct` and
@@ -23,14 +23,19 @@ VIEWS = 60
 
 
 def main():
-    sets = {"first": shapes.FIRST, "second": shapes.SECOND, "round": shapes.ROUND}
+    sets = {
+        "first": shapes.FIRST,
+        "second": shapes.SECOND,
+        "round": shapes.ROUND,
+        "third": shapes.THIRD,
+    }
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=pathlib.Path, help="folder for the scenes")
     parser.add_argument("names", nargs="*", help="parts, all unless some are named")
     parser.add_argument("--set", choices=sets, help="one of the sets of parts alone")
     parser.add_argument("--truth", action="store_true", help="write the truth alone")
     options = parser.parse_args()
-    of_set = sets[options.set] if options.set else shapes.FIRST + shapes.SECOND + shapes.ROUND
+    of_set = sets[options.set] if options.set else sum(sets.values(), [])
     parts = {part.__name__: part for part in of_set}
     unknown = [name for name in options.names if name not in parts]
     if unknown:

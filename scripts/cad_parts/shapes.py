@@ -1,7 +1,8 @@
 """Everyday parts, by their features: plates, brackets, shafts, housings.
 
 `FIRST` are those on which the assembler was worked on, `SECOND` were looked at only once it was
-done, `ROUND` have parts of spheres, and what looks like such. Lengths are in mm; a scene scales its part to unit size.
+done, `ROUND` have parts of spheres, and what looks like such, `THIRD` pockets, sockets, slots and
+ribs. Lengths are in mm; a scene scales its part to unit size.
 """
 
 import math
@@ -541,6 +542,163 @@ def bullet():
     return p
 
 
+def pocket():
+    with BuildPart() as p:
+        Box(80, 50, 20)
+        fillet(p.edges().filter_by(Axis.Z), 8)
+        with BuildSketch(p.faces().sort_by(Axis.Z)[-1]):
+            RectangleRounded(64, 34, 6)
+        extrude(amount=-12, mode=Mode.SUBTRACT)
+        with BuildSketch(Plane.XY.offset(-2)):
+            RectangleRounded(20, 12, 3)
+        extrude(amount=6)
+    return p
+
+
+def slider():
+    with BuildPart() as p:
+        Box(90, 40, 10)
+        with BuildSketch(p.faces().sort_by(Axis.Z)[-1]):
+            with Locations((0, 8), (0, -8)):
+                SlotOverall(60, 8)
+        extrude(amount=-10, mode=Mode.SUBTRACT)
+        with Locations((38, 12, 5), (38, -12, 5), (-38, 12, 5), (-38, -12, 5)):
+            CounterBoreHole(2, 3.5, 3)
+    return p
+
+
+def sockethead():
+    with BuildPart() as p:
+        Cylinder(18, 20, align=(Align.CENTER, Align.CENTER, Align.MIN))
+        Cylinder(10, 50, align=(Align.CENTER, Align.CENTER, Align.MAX))
+        chamfer(p.edges().filter_by(GeomType.CIRCLE).sort_by(Axis.Z)[:1], 2)
+        with BuildSketch(p.faces().sort_by(Axis.Z)[-1]):
+            RegularPolygon(10, 6)
+        extrude(amount=-9, mode=Mode.SUBTRACT)
+    return p
+
+
+def gusset():
+    with BuildPart() as p:
+        Box(60, 50, 6, align=(Align.CENTER, Align.CENTER, Align.MAX))
+        with Locations((-27, 0, 0)):
+            Box(6, 50, 50, align=(Align.CENTER, Align.CENTER, Align.MIN))
+        for y in (-15, 15):
+            with BuildSketch(Plane.XZ.offset(-y)):
+                with BuildLine():
+                    Polyline((-24, 0), (20, 0), (-24, 38), close=True)
+                make_face()
+            extrude(amount=2.5, both=True)
+    return p
+
+
+def tslot():
+    with BuildPart() as p:
+        with BuildSketch():
+            Rectangle(40, 40)
+            for turn in range(4):
+                with Locations(Rot(0, 0, 90 * turn) * Pos(0, 18)):
+                    Rectangle(8, 4, mode=Mode.SUBTRACT)
+                with Locations(Rot(0, 0, 90 * turn) * Pos(0, 13)):
+                    Rectangle(18, 6, mode=Mode.SUBTRACT)
+            Circle(4, mode=Mode.SUBTRACT)
+        extrude(amount=50)
+    return p
+
+
+def steps():
+    with BuildPart() as p:
+        for k, radius in enumerate((30, 24, 18, 12)):
+            with Locations((0, 0, 10 * k)):
+                Cylinder(radius, 10, align=(Align.CENTER, Align.CENTER, Align.MIN))
+        Hole(6)
+        with Locations((0, 0, 20)):
+            Box(80, 6, 20, mode=Mode.SUBTRACT, align=(Align.CENTER, Align.CENTER, Align.MIN))
+    return p
+
+
+def yoke():
+    with BuildPart() as p:
+        Box(30, 50, 12, align=(Align.CENTER, Align.CENTER, Align.MAX))
+        for y in (-20, 20):
+            with BuildSketch(Plane.XZ.offset(-y)):
+                with BuildLine():
+                    Polyline((15, 0), (15, 20))
+                    RadiusArc((15, 20), (-15, 20), -15)
+                    Polyline((-15, 20), (-15, 0), (15, 0))
+                make_face()
+                with Locations((0, 20)):
+                    Circle(7, mode=Mode.SUBTRACT)
+            extrude(amount=5, both=True)
+        with Locations((0, 0, -12)):
+            Cylinder(9, 20, align=(Align.CENTER, Align.CENTER, Align.MAX))
+    return p
+
+
+def letter():
+    with BuildPart() as p:
+        with BuildSketch():
+            with BuildLine():
+                Polyline(
+                    (0, 0), (12, 0), (12, 22), (30, 0), (45, 0), (22, 27), (43, 55), (28, 55),
+                    (12, 33), (12, 55), (0, 55),
+                    close=True,
+                )
+            make_face()
+        extrude(amount=14)
+    return p
+
+
+def wedge():
+    with BuildPart() as p:
+        with BuildSketch(Plane.XZ):
+            with BuildLine():
+                Polyline((0, 0), (80, 0), (80, 8), (10, 35), (0, 35), close=True)
+            make_face()
+        extrude(amount=40)
+        slope = p.faces().sort_by(lambda face: face.normal_at().dot(Vector(0.36, 0, 0.93)))[-1]
+        with BuildSketch(slope):
+            with Locations((12, 0), (-14, 0)):
+                Circle(8)
+        extrude(amount=-12, mode=Mode.SUBTRACT)
+    return p
+
+
+def ribs():
+    with BuildPart() as p:
+        Box(90, 60, 5, align=(Align.CENTER, Align.CENTER, Align.MAX))
+        with BuildSketch():
+            with GridLocations(0, 18, 1, 3):
+                Rectangle(80, 3)
+            with GridLocations(26, 0, 3, 1):
+                Rectangle(3, 50)
+        extrude(amount=12)
+    return p
+
+
+def cover():
+    with BuildPart() as p:
+        with BuildSketch():
+            RegularPolygon(30, 8)
+        extrude(amount=14)
+        top = p.faces().sort_by(Axis.Z)[-1]
+        chamfer(top.edges(), 4)
+        offset(amount=-3, openings=p.faces().sort_by(Axis.Z)[:1])
+    return p
+
+
+def block():
+    with BuildPart() as p:
+        Box(60, 40, 40)
+        fillet(p.edges().filter_by(Axis.X).sort_by(Axis.Z)[-2:], 10)
+        with Locations(Plane.YZ.offset(30)):
+            with Locations((0, 0)):
+                Cylinder(9, 120, mode=Mode.SUBTRACT)
+        with Locations((0, 0, 20)):
+            Cylinder(6, 40, mode=Mode.SUBTRACT)
+    return p
+
+
 FIRST = [
     bracket,
     flange,
@@ -587,4 +745,18 @@ ROUND = [
     dimple,
     roundedge,
     bullet,
+]
+THIRD = [
+    pocket,
+    slider,
+    sockethead,
+    gusset,
+    tslot,
+    steps,
+    yoke,
+    letter,
+    wedge,
+    ribs,
+    cover,
+    block,
 ]
