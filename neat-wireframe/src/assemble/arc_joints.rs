@@ -6,7 +6,7 @@
 //! else ends on it.
 
 use super::circle_fitting::FoundArc;
-use super::corners::{Corners, MAX_GAP};
+use super::corners::{Corners, MAX_GAP, WINDOW_IN_PIXELS};
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
 use nalgebra::Vector3;
@@ -149,7 +149,7 @@ const MIN_SQUARED_SINE: f64 = 0.067;
 /// Steps from the line to the circle and back: each lowers the distance by the cosine.
 const STEPS: usize = 100;
 
-/// Moves ends of lines that meet nothing else to the arcs that they end on.
+/// Moves ends of lines that meet nothing else, and run into no arc, to the arcs that they end on.
 pub(super) fn end_on_arcs(images: &Images, corners: &mut Corners, arcs: &mut [FoundArc]) {
     let degrees = corners.degrees();
     for line in 0..corners.ends.len() {
@@ -159,6 +159,11 @@ pub(super) fn end_on_arcs(images: &Images, corners: &mut Corners, arcs: &mut [Fo
             if degrees[junction] > 1 {
                 continue;
             }
+            let mut tangencies = (arcs.iter().enumerate())
+                .filter_map(|(index, found)| tangency(&edge, found, gap, index));
+            if tangencies.any(|joint| joint.line_end == end) {
+                continue;
+            }
             let nearest = (arcs.iter().enumerate())
                 .filter_map(|(index, found)| {
                     let point = crossing(&edge, end, found, gap)?;
@@ -166,7 +171,14 @@ pub(super) fn end_on_arcs(images: &Images, corners: &mut Corners, arcs: &mut [Fo
                 })
                 .filter(|(distance, ..)| *distance <= corners.windows[line])
                 .min_by(|a, b| a.0.total_cmp(&b.0));
-            if let Some((_, index, point)) = nearest {
+            if let Some((distance, index, point)) = nearest {
+                let stretch = LineSegment3::new(edge.ends()[end], point);
+                let is_far = distance > WINDOW_IN_PIXELS * corners.pixels[line];
+                let is_within = (0.0..1.0).contains(&edge.line_parameter(&point));
+                let gain = || images.evidence(&stretch, None, f64::NEG_INFINITY).gain;
+                if is_far && (is_within || gain() < 0.0) {
+                    continue;
+                }
                 corners.junctions[junction] = point;
                 let near = ARC_END * arcs[index].pixel;
                 let arc = &mut arcs[index].arc;
@@ -295,6 +307,43 @@ mod tests {
         // Above it.
         let above = line([-0.2, middle, 0.2], [middle - 0.01, middle, 0.2]);
         assert_eq!(ends_at(above, 0.0).0, above.end);
+    }
+
+    #[test]
+    fn an_end_that_runs_into_an_arc_crosses_no_other_one() {
+        // The rim of a pocket within that of its block, which is round, too.
+        let edge = line([0.3, -0.4, 0.1], [0.3, 0.004, 0.1]);
+        let mut around = quarter();
+        around.arc.radius = 0.32;
+        let crossing = Vector3::new(0.3, (0.32_f64.powi(2) - 0.09).sqrt(), 0.1);
+        let shown = [edge.start, crossing];
+        let views = TestViews::of_edges(&cameras_on_sphere(20), &shown, &[[0, 1]]);
+        let images = views.images();
+        let end_of = |mut arcs: Vec<FoundArc>| {
+            let mut corners = find_corners(&images, &[chosen(&images, &edge)], &[]);
+            corners.windows[0] = 0.2;
+            end_on_arcs(&images, &mut corners, &mut arcs);
+            corners.edge(0).end
+        };
+        assert!((end_of(vec![around.clone()]) - crossing).norm() < 5e-3);
+        assert_eq!(end_of(vec![quarter(), around]), edge.end);
+    }
+
+    #[test]
+    fn no_end_goes_far_to_an_arc_where_images_show_nothing() {
+        let edge = line([-0.6, 0.2, 0.1], [0.12, 0.2, 0.1]);
+        let crossing = Vector3::new((0.09_f64 - 0.04).sqrt(), 0.2, 0.1);
+        let end_of = |shown: &LineSegment3| {
+            let views = TestViews::of_edges(&cameras_on_sphere(20), &shown.ends(), &[[0, 1]]);
+            let images = views.images();
+            let mut corners = find_corners(&images, &[chosen(&images, &edge)], &[]);
+            corners.windows[0] = 0.2;
+            end_on_arcs(&images, &mut corners, &mut [quarter()]);
+            corners.edge(0).end
+        };
+        assert_eq!(end_of(&edge), edge.end);
+        let whole = LineSegment3::new(edge.start, crossing);
+        assert!((end_of(&whole) - crossing).norm() < 1e-9);
     }
 
     #[test]
