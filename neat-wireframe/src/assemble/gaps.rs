@@ -1,8 +1,8 @@
 //! Gaps in lines, where the views that show a line do not show it.
 //!
-//! Pieces of one line that end a few pixels from each other are taken for one line that something
-//! hides in many views. Where edges of others end on both sides of such a gap, the line is cut there,
-//! and the light says whether anything lies between.
+//! Pieces of one line that end near each other are taken for one line that something hides in many
+//! views. Where edges of others end on both sides of such a gap, the line is cut there, and the light
+//! says whether anything lies between; of more than a few pixels edgels must not, either.
 
 use super::collinear_pieces::MAX_GAP;
 use super::edge_cutting::retain_edges;
@@ -10,6 +10,7 @@ use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
 use super::profiles::{Asked, Photographs, Response, light_across};
 use neat_core::{LineSegment3, Wireframe3d};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// The pieces end at corners, before which edgels stop by so many pixels on either side.
@@ -24,16 +25,18 @@ pub(super) fn drop_gaps(
     wireframe: &mut Wireframe3d,
     sources: &mut Vec<Option<usize>>,
 ) {
-    let short = |edge: usize| {
+    let asked = |edge: usize| {
         let [start, end] = wireframe.edges[edge].map(|end| wireframe.junctions[end]);
         let (piece, line) = (LineSegment3::new(start, end), &lines[sources[edge]?]);
         let pixel = images.pixel_size(&piece, line.evidence.views());
+        let is_short = piece.length() <= (MAX_GAP + 2.0 * BEYOND_EDGELS) * pixel;
+        let gain = || images.evidence(&piece, None, f64::NEG_INFINITY).gain;
         let views = line.evidence.views().collect();
-        let longest = (MAX_GAP + 2.0 * BEYOND_EDGELS) * pixel;
-        (piece.length() <= longest).then_some((edge, Asked { piece, views }))
+        (is_short || gain() < 0.0).then_some((edge, Asked { piece, views }))
     };
     let between = pieces_between(wireframe, sources);
-    let (edges, asked): (Vec<usize>, Vec<Asked>) = between.into_iter().filter_map(short).unzip();
+    let (edges, asked): (Vec<usize>, Vec<Asked>) =
+        between.into_par_iter().filter_map(asked).unzip();
     let lights = light_across(images, photographs, response, &asked);
     let mut kept = vec![true; wireframe.edges.len()];
     for (edge, light) in edges.into_iter().zip(lights) {
@@ -69,14 +72,16 @@ mod tests {
     use nalgebra::Vector3;
     use std::borrow::Cow;
 
-    /// The edges that are left of a line at `x` along bars, cut by two others four pixels apart.
-    fn left(x: f64) -> usize {
+    /// The edges that are left of a line at `x` along bars, cut by two others so far apart.
+    fn left(x: f64, apart: f64) -> usize {
         let cameras = cameras();
-        let junctions = [-0.2, 0.0, 0.015, 0.2].map(|y| Vector3::new(x, y, 0.0));
+        let junctions = [-0.2, 0.0, apart, 0.2].map(|y| Vector3::new(x, y, 0.0));
         let beside = [1, 2].map(|k| junctions[k] + Vector3::x());
         let junctions = [&junctions[..], &beside].concat();
         let edges = vec![[0, 1], [1, 2], [2, 3], [1, 4], [2, 5]];
-        let views = TestViews::of_edges(&cameras, &junctions, &edges);
+        // No edgel lies between.
+        let shown = [edges[0], edges[2], edges[3], edges[4]];
+        let views = TestViews::of_edges(&cameras, &junctions, &shown);
         let photographs = Photographs {
             image_of: &|view| Some(Cow::Owned(photograph(&cameras[view]))),
             pixel_center: 0.5,
@@ -120,7 +125,10 @@ mod tests {
 
     #[test]
     fn a_gap_goes_and_a_piece_of_an_edge_stays() {
-        assert_eq!(left(-0.3), 5);
-        assert_eq!(left(-0.25), 4);
+        // Four pixels, and thirty.
+        for apart in [0.015, 0.12] {
+            assert_eq!(left(-0.3, apart), 5);
+            assert_eq!(left(-0.25, apart), 4);
+        }
     }
 }
