@@ -7,8 +7,8 @@ use neat_detect::{DetectorConfig, edgel_maps};
 use neat_wireframe::assemble::{
     AssembleConfig, Assembled, Photographs, Witnesses, assemble_with_progress,
 };
-use neat_wireframe::confidence::{ConfidenceConfig, assess};
-use neat_wireframe::faces::{MeasuredGraph, find_shells, surface_points};
+use neat_wireframe::confidence::{Confidence, ConfidenceConfig, assess};
+use neat_wireframe::faces::{MeasuredGraph, Shell, completed, find_shells, surface_points};
 use neat_wireframe::kinds::{WithoutPaint, edge_kinds, without_paint};
 use neat_wireframe::paper::NeatLine;
 use neat_wireframe::validity::WireframeFlaw;
@@ -154,18 +154,36 @@ impl Draft {
             confidence = assessed(&wireframe)?;
             report.leave_out(painted, &wireframe);
         }
-        let junctions = confidence.junctions.iter();
-        let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
-        let graph = MeasuredGraph {
-            wireframe: &wireframe,
-            arcs: &self.arcs,
-            splines: &self.splines,
-            domes: &self.domes,
-            covariances: &covariances,
-        };
         let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
         let points = surface_points(&cameras, &scene.sparse_points);
-        let shells = find_shells(&graph, &views, &points);
+        let shells_of = |wireframe: &Wireframe3d, confidence: &Confidence| {
+            let junctions = confidence.junctions.iter();
+            let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
+            let graph = MeasuredGraph {
+                wireframe,
+                arcs: &self.arcs,
+                splines: &self.splines,
+                domes: &self.domes,
+                covariances: &covariances,
+            };
+            let shells = find_shells(&graph, &views, &points);
+            let completed = completed(&graph, &shells);
+            (shells, completed)
+        };
+        let (mut shells, completed) = shells_of(&wireframe, &confidence);
+        let mut inferred = vec![false; wireframe.edges.len()];
+        let (mut wireframe, mut kinds) = (wireframe, kinds);
+        if let Some(completed) = completed {
+            let whole = assessed(&completed.wireframe)?.of_completed(&completed, &confidence);
+            let (of_whole, _) = shells_of(&completed.wireframe, &whole);
+            // What was added is true as long as the solids are there.
+            if closed_faces(&of_whole) >= closed_faces(&shells) {
+                kinds = edge_kinds(&completed.wireframe, scene, &whole.edges)?;
+                inferred = completed.inferred().collect();
+                (wireframe, confidence, shells) = (completed.wireframe, whole, of_whole);
+                report.complete(&inferred, &wireframe);
+            }
+        }
         Ok(Distilled {
             wireframe,
             arcs: self.arcs,
@@ -175,10 +193,17 @@ impl Draft {
             domes: self.domes,
             confidence,
             kinds,
+            inferred,
             report,
             refined_scene,
         })
     }
+}
+
+/// How many faces bound solids.
+fn closed_faces(shells: &[Shell]) -> usize {
+    let closed = shells.iter().filter(|shell| shell.closed);
+    closed.map(|shell| shell.faces.len()).sum()
 }
 
 /// The edgels of all images.

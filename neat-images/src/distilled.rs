@@ -42,6 +42,9 @@ pub struct Distilled {
     pub confidence: Confidence,
     /// What each edge is: of the shape of things, or on it.
     pub kinds: Vec<EdgeKinds>,
+    /// Whether no image shows an edge, but solids ask for it, see
+    /// [`completed`](neat_wireframe::faces::completed).
+    pub inferred: Vec<bool>,
     /// What each step kept and removed.
     pub report: BackEndReport,
     /// The scene with its poses where the images show the wireframe, if they were moved.
@@ -70,6 +73,14 @@ impl BackEndReport {
         if let Self::Assembler { steps } = self {
             steps.painted = painted;
             (steps.junctions, steps.edges) = (left.junctions.len(), left.edges.len());
+        }
+    }
+
+    /// Counts what solids have added.
+    pub(crate) fn complete(&mut self, inferred: &[bool], whole: &Wireframe3d) {
+        if let Self::Assembler { steps } = self {
+            steps.inferred_edges = inferred.iter().filter(|inferred| **inferred).count();
+            (steps.junctions, steps.edges) = (whole.junctions.len(), whole.edges.len());
         }
     }
 
@@ -165,6 +176,9 @@ impl Distilled {
         let curved = curved_chains(&self.wireframe);
         if curved.contains(&true) {
             document.edge_fields.curved = Some(curved);
+        }
+        if self.inferred.contains(&true) {
+            document.edge_fields.inferred = Some(self.inferred.clone());
         }
         document
     }

@@ -18,7 +18,13 @@ pub(super) fn representations(
     let (mut solids, mut sheets) = (Vec::new(), Vec::new());
     for shell in &document.shells {
         let geometry = ShellGeometry::new(shell, &document.graph(&wireframe));
-        let faces = ShellWriter::new(step, &geometry).faces(shell).join(",");
+        let is_inferred = |curve: &CurveIndex| match curve {
+            CurveIndex::Edge(edge) => (document.edge_fields.inferred.as_ref())
+                .is_some_and(|inferred| inferred.get(*edge) == Some(&true)),
+            other => other.is_inferred(),
+        };
+        let mut writer = ShellWriter::new(step, &geometry, is_inferred);
+        let faces = writer.faces(shell).join(",");
         if shell.closed {
             let shell = step.add(&format!("CLOSED_SHELL('',({faces}))"));
             solids.push(step.add(&format!("MANIFOLD_SOLID_BREP('',{shell})")));
@@ -56,7 +62,11 @@ struct Corner {
 }
 
 impl<'a> ShellWriter<'a> {
-    fn new(step: &'a mut Entities, geometry: &'a ShellGeometry) -> Self {
+    fn new(
+        step: &'a mut Entities,
+        geometry: &'a ShellGeometry,
+        is_inferred: impl Fn(&CurveIndex) -> bool,
+    ) -> Self {
         let vertices: BTreeMap<usize, Corner> = (geometry.vertices.iter())
             .map(|(junction, point)| {
                 let name = step.vertex(point);
@@ -90,7 +100,7 @@ impl<'a> ShellWriter<'a> {
                 }
             };
             let names = [&corners[0].name, &corners[1].name];
-            let name = if index.is_inferred() { "inferred" } else { "" };
+            let name = if is_inferred(index) { "inferred" } else { "" };
             let edge = match (&curve.arc, &curve.spline) {
                 (Some(arc), _) => Some(step.arc_edge(name, names, arc)),
                 (None, Some(spline)) => Some(step.spline_edge(names, spline)),

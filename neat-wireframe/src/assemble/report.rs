@@ -68,6 +68,9 @@ pub struct AssembleReport {
     /// Edges that are hardly structure, and were left out once their kinds were known.
     #[serde(default)]
     pub painted: usize,
+    /// Edges that no image shows, but solids ask for.
+    #[serde(default)]
+    pub inferred_edges: usize,
     /// Junctions of the wireframe.
     pub junctions: usize,
     /// Edges of the wireframe.

@@ -28,6 +28,7 @@
 //! ```
 
 mod calibration;
+mod completed;
 mod config;
 mod covariance;
 mod decoys;

@@ -37,6 +37,8 @@ pub struct EdgeFields {
     pub curved: Option<Vec<bool>>,
     /// Views that ought to show it, or do.
     pub expected_views: Option<Vec<usize>>,
+    /// Whether no image shows it, but two faces of a solid meet there; 1 and 0 in JSON.
+    pub inferred: Option<Vec<bool>>,
     /// Probability that it exists.
     pub probability: Option<Vec<f64>>,
     /// Root mean square distance of the ends of its supporting segments from its
@@ -84,12 +86,11 @@ impl EdgeFields {
         put(&mut named, "crease", self.crease.clone());
         put(&mut named, "shadow", self.shadow.clone());
         put(&mut named, "texture", self.texture.clone());
-        let curved = self.curved.as_ref();
-        let as_number = |is: &bool| f64::from(u8::from(*is));
+        put(&mut named, "curved", self.curved.as_deref().map(from_marks));
         put(
             &mut named,
-            "curved",
-            curved.map(|all| all.iter().map(as_number).collect()),
+            "inferred",
+            self.inferred.as_deref().map(from_marks),
         );
         put(
             &mut named,
@@ -136,12 +137,12 @@ impl From<NamedNumbers> for JunctionFields {
 
 impl From<NamedNumbers> for EdgeFields {
     fn from(mut named: NamedNumbers) -> Self {
-        let curved = take_counts(&mut named, "curved");
         Self {
             boundary: named.remove("boundary"),
             crease: named.remove("crease"),
-            curved: curved.map(|all| all.into_iter().map(|count| count > 0).collect()),
+            curved: take_marks(&mut named, "curved"),
             expected_views: take_counts(&mut named, "expected_views"),
+            inferred: take_marks(&mut named, "inferred"),
             probability: named.remove("probability"),
             residual_in_pixels: named.remove("residual_in_pixels"),
             shadow: named.remove("shadow"),
@@ -174,11 +175,24 @@ fn from_counts(counts: &[usize]) -> Vec<f64> {
     counts.iter().map(|count| *count as f64).collect()
 }
 
-/// Takes the values of this name if all are counts; of `curved`, if all are 0 or 1.
+fn from_marks(marks: &[bool]) -> Vec<f64> {
+    marks.iter().map(|is| f64::from(u8::from(*is))).collect()
+}
+
+/// Takes the values of this name if all are counts.
 fn take_counts(named: &mut NamedNumbers, name: &str) -> Option<Vec<usize>> {
     /// All whole numbers up to here are numbers of `f64`.
     const LARGEST: f64 = 9_007_199_254_740_992.0;
-    let largest = if name == "curved" { 1.0 } else { LARGEST };
+    take_up_to(named, name, LARGEST)
+}
+
+/// Takes the values of this name if all are 0 or 1.
+fn take_marks(named: &mut NamedNumbers, name: &str) -> Option<Vec<bool>> {
+    let counts = take_up_to(named, name, 1.0)?;
+    Some(counts.into_iter().map(|count| count > 0).collect())
+}
+
+fn take_up_to(named: &mut NamedNumbers, name: &str, largest: f64) -> Option<Vec<usize>> {
     let is_count = |x: &f64| x.is_sign_positive() && x.fract() == 0.0 && *x <= largest;
     named.get(name)?.iter().all(is_count).then_some(())?;
     let values = named.remove(name)?;
@@ -191,9 +205,10 @@ mod tests {
 
     #[test]
     fn facts_have_types_and_the_rest_is_kept() {
-        let text = r#"{"curved":[1.0,0.0],"probability":[0.5,0.25],"supporting_views":[3.0,0.0],"votes":[7.5,-1.0]}"#;
+        let text = r#"{"curved":[1.0,0.0],"inferred":[0.0,1.0],"probability":[0.5,0.25],"supporting_views":[3.0,0.0],"votes":[7.5,-1.0]}"#;
         let fields: EdgeFields = serde_json::from_str(text).unwrap();
         assert_eq!(fields.curved, Some(vec![true, false]));
+        assert_eq!(fields.inferred, Some(vec![false, true]));
         assert_eq!(fields.supporting_views, Some(vec![3, 0]));
         assert_eq!(fields.expected_views, None);
         assert_eq!(fields.other.keys().collect::<Vec<_>>(), ["votes"]);
@@ -204,6 +219,7 @@ mod tests {
     fn what_is_no_count_stays_a_number() {
         for text in [
             r#"{"curved":[2.0]}"#,
+            r#"{"inferred":[2.0]}"#,
             r#"{"expected_views":[1.5]}"#,
             r#"{"supporting_views":[-1.0]}"#,
         ] {

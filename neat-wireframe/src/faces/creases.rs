@@ -9,6 +9,7 @@
 //! between. Like any inferred line it costs nothing by itself, but wants two faces
 //! (`selection.rs`).
 
+use super::bounds::Bounds;
 use super::curves::{Curve, Curves, sorted};
 use super::face::CurveIndex;
 use super::planes::CoplanarCurves;
@@ -23,39 +24,38 @@ const MIN_SINE: f64 = 0.03;
 /// Corners that are nearer to each other, in standard deviations of an arc, are one; what lies
 /// beside a line within so many of a junction lies on it.
 const REACH: f64 = 4.0;
+/// At a corner of a solid at least so many curves end.
+const CURVES_OF_CORNER: usize = 3;
 
-/// The lines between the ends of edges that lie on one line and face each other.
-pub(super) fn facing_ends(curves: &Curves) -> Vec<Curve> {
-    let corners = Corners::new(curves);
+/// The lines from the ends of edges that lead to nowhere to the nearest junction ahead of each on its
+/// line, if that lacks an edge: an end that faces it, or a corner that it stops short of. Those first
+/// that lead to where only one curve ends, and go on by the least part of their edge.
+pub(super) fn continued_ends(curves: &Curves) -> Vec<Curve> {
+    let mut corners = Corners::new(curves);
+    let reach = REACH * curves.arc_sigma();
     let pieces: Vec<[usize; 2]> = (curves.observed())
         .filter_map(|curve| corners.free_end(curve))
         .collect();
-    let at = |junction: usize| corners.points[&junction];
-    let reach = REACH * curves.junction_sigma();
-    // How far two ends are apart that face each other.
-    let gap = |[a, b]: [usize; 2], [c, d]: [usize; 2]| {
-        let whole = LineSegment3::new(at(a), at(c));
-        let places = [b, d].map(|end| whole.line_parameter(&at(end)));
-        let in_order = 0.0 < places[0] && places[0] < places[1] && places[1] < 1.0;
-        let on_line = [b, d]
-            .iter()
-            .all(|end| whole.distance_to_point(&at(*end)) <= reach);
-        (in_order && on_line).then(|| (at(b) - at(d)).norm())
-    };
-    let nearest = |one: usize| {
-        let others = (0..pieces.len()).filter(|other| *other != one);
-        let facing = others.filter_map(|other| Some((gap(pieces[one], pieces[other])?, other)));
-        facing
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, other)| other)
-    };
-    let nearest: Vec<Option<usize>> = (0..pieces.len()).into_par_iter().map(nearest).collect();
-    let mutual = (0..pieces.len()).filter_map(|one| {
-        let other = nearest[one].filter(|other| *other > one && nearest[*other] == Some(one))?;
-        let [a, b] = [one, other].map(|piece| pieces[piece][1]);
-        Some(inferred_line(curves, [(a, at(a)), (b, at(b))]))
-    });
-    mutual.collect()
+    let mut continued: Vec<(usize, f64, [usize; 2])> = (pieces.par_iter())
+        .filter_map(|piece| {
+            let (part, next) = corners.ahead(*piece, reach)?;
+            Some((corners.counts[&next], part, [piece[1], next]))
+        })
+        .collect();
+    continued.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+    let mut lines = Vec::new();
+    for (_, _, [end, next]) in continued {
+        if corners.counts[&end] == 1 && corners.counts[&next] < CURVES_OF_CORNER {
+            lines.push(inferred_line(
+                curves,
+                [end, next].map(|junction| (junction, corners.points[&junction])),
+            ));
+            for junction in [end, next] {
+                *corners.counts.entry(junction).or_default() += 1;
+            }
+        }
+    }
+    lines
 }
 
 /// What planes have with inferred creases.
@@ -75,7 +75,7 @@ pub(super) struct Change {
 /// The creases that are missing between planes, by their places.
 pub(super) fn missing_creases(curves: &Curves, planes: &[CoplanarCurves]) -> MissingCreases {
     let corners = Corners::new(curves);
-    let open: Vec<BTreeSet<usize>> = (planes.iter())
+    let open: Vec<OpenCorners> = (planes.iter())
         .map(|plane| corners.open(curves, plane))
         .collect();
     let mut changes = vec![Change::default(); planes.len()];
@@ -86,7 +86,7 @@ pub(super) fn missing_creases(curves: &Curves, planes: &[CoplanarCurves]) -> Mis
             if direction.norm() < MIN_SINE {
                 continue;
             }
-            let common: Vec<usize> = open[first].intersection(&open[second]).copied().collect();
+            let common = corners.on_both([one, other], [&open[first], &open[second]], curves);
             if common.len() < 2 {
                 continue;
             }
@@ -118,12 +118,22 @@ pub(super) fn missing_creases(curves: &Curves, planes: &[CoplanarCurves]) -> Mis
     }
 }
 
+/// Where a plane lacks a curve.
+struct OpenCorners {
+    /// Where one of its curves ends and none goes on.
+    of_curves: BTreeSet<usize>,
+    /// Junctions of others in it that lack a curve.
+    of_others: BTreeSet<usize>,
+}
+
 /// The ends of curves.
 struct Corners {
     points: BTreeMap<usize, Vector3<f64>>,
     /// How many curves end at each.
     counts: BTreeMap<usize, usize>,
     joined: BTreeSet<[usize; 2]>,
+    /// The direction of the only curve that ends at a junction, for straight edges.
+    leading_to: BTreeMap<usize, Vector3<f64>>,
 }
 
 impl Corners {
@@ -142,11 +152,42 @@ impl Corners {
             }
             joined.insert(sorted([start, end]));
         }
-        Self {
+        let mut corners = Self {
             points,
             counts,
             joined,
-        }
+            leading_to: BTreeMap::new(),
+        };
+        let leading = curves.all.iter().filter_map(|curve| {
+            let [start, end] = corners.free_end(curve)?;
+            let along = corners.points[&end] - corners.points[&start];
+            Some((end, along.normalize()))
+        });
+        corners.leading_to = leading.collect();
+        corners
+    }
+
+    /// The nearest junction on the line of an edge beyond its second end, and how far that is, as a
+    /// part of the edge. It is on the line within a reach beside it; one at which an edge ends that
+    /// leads to nowhere, within another along that edge.
+    fn ahead(&self, [start, end]: [usize; 2], reach: f64) -> Option<(f64, usize)> {
+        let [from, to] = [start, end].map(|junction| self.points[&junction]);
+        let others = (self.points.iter()).filter(|(junction, _)| {
+            ![start, end].contains(junction) && !self.joined.contains(&sorted([start, **junction]))
+        });
+        let beyond = others.filter(|(junction, point)| {
+            let aim = match self.leading_to.get(junction) {
+                Some(other) => nearest_on(&LineSegment3::new(from, to), point, other, reach),
+                None => **point,
+            };
+            let whole = LineSegment3::new(from, aim);
+            (0.0..1.0).contains(&whole.line_parameter(&to))
+                && whole.distance_to_point(&to) <= reach
+                && LineSegment3::new(from, to).distance_to_line(&aim) <= reach
+        });
+        let part = |point: &Vector3<f64>| (point - to).norm() / (to - from).norm();
+        (beyond.map(|(junction, point)| (part(point), *junction)))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// The end of a straight edge at which nothing else ends, after the other one.
@@ -161,8 +202,9 @@ impl Corners {
     }
 
     /// The junctions of a plane at which only one of its curves ends, but for edges that lead from
-    /// there to nowhere.
-    fn open(&self, curves: &Curves, plane: &CoplanarCurves) -> BTreeSet<usize> {
+    /// there to nowhere; and those that lack an edge and lie in it, no farther from its curves than
+    /// these are from each other.
+    fn open(&self, curves: &Curves, plane: &CoplanarCurves) -> OpenCorners {
         let mut in_plane: BTreeMap<usize, usize> = BTreeMap::new();
         for curve in plane.curves.iter().map(|place| &curves.all[*place]) {
             let leads_away = self.free_end(curve).map(|[from, _]| from);
@@ -171,9 +213,75 @@ impl Corners {
                 *count += usize::from(leads_away != Some(end));
             }
         }
-        let open = in_plane.into_iter().filter(|(_, count)| *count < 2);
-        open.map(|(junction, _)| junction).collect()
+        let of_plane = plane.curves.iter().map(|place| &curves.all[*place].points);
+        let around = Bounds::of(of_plane.flatten());
+        let around = around.widened(around.extent());
+        let reach = REACH * curves.arc_sigma();
+        let lacking = self.points.iter().filter(|(junction, point)| {
+            self.counts[junction] < CURVES_OF_CORNER
+                && !in_plane.contains_key(junction)
+                && (plane.normal.dot(point) - plane.offset).abs() <= reach
+                && around.contain(point)
+        });
+        let lacking = lacking.map(|(junction, _)| *junction);
+        let open = in_plane.iter().filter(|(_, count)| **count < 2);
+        OpenCorners {
+            of_curves: open.map(|(junction, _)| *junction).collect(),
+            of_others: lacking.collect(),
+        }
     }
+
+    /// The corners that two planes lack on the line in which they meet, of which one at least has
+    /// curves of both.
+    fn on_both(
+        &self,
+        planes: [&CoplanarCurves; 2],
+        open: [&OpenCorners; 2],
+        curves: &Curves,
+    ) -> Vec<usize> {
+        let [one, other] = open;
+        let of_curves: Vec<usize> =
+            (one.of_curves.intersection(&other.of_curves).copied()).collect();
+        let Some(first) = of_curves.first().map(|junction| self.points[junction]) else {
+            return of_curves;
+        };
+        let direction = planes[0].normal.cross(&planes[1].normal).normalize();
+        let reach = REACH * curves.arc_sigma();
+        let is_own = |junction: &usize| {
+            let from_first = self.points[junction] - first;
+            let beside = from_first.cross(&direction).norm();
+            let apart = of_curves.iter().all(|other| {
+                direction
+                    .dot(&(self.points[junction] - self.points[other]))
+                    .abs()
+                    > reach
+            });
+            beside <= reach && apart
+        };
+        let all = |open: &OpenCorners| &open.of_curves | &open.of_others;
+        let mut common: Vec<usize> = (all(one).intersection(&all(other)).copied())
+            .filter(|junction| of_curves.contains(junction) || is_own(junction))
+            .collect();
+        common.sort_unstable();
+        common
+    }
+}
+
+/// The point on a line through `end` that is nearest to another line, at most so far from the end.
+fn nearest_on(
+    other: &LineSegment3,
+    end: &Vector3<f64>,
+    direction: &Vector3<f64>,
+    most: f64,
+) -> Vector3<f64> {
+    let along = (other.end - other.start).normalize();
+    let offset = other.start - end;
+    let cosine = direction.dot(&along);
+    let squared_sine = 1.0 - cosine * cosine;
+    let place = (offset.dot(direction) - cosine * offset.dot(&along)) / squared_sine;
+    // Parallel ones are everywhere as near.
+    let place = if place.is_finite() { place } else { 0.0 };
+    end + place.clamp(-most, most) * direction
 }
 
 /// The line in which two planes meet.

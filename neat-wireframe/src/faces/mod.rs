@@ -41,6 +41,7 @@ mod candidates;
 mod cap;
 mod cells;
 mod chain;
+mod completion;
 mod creases;
 mod curves;
 mod domes;
@@ -75,12 +76,15 @@ mod visibility;
 mod walls;
 
 #[cfg(test)]
+mod completion_tests;
+#[cfg(test)]
 mod round_tests;
 #[cfg(test)]
 mod sheet_tests;
 #[cfg(test)]
 mod tests;
 
+pub use completion::{Completed, completed};
 pub use curves::MeasuredGraph;
 pub(crate) use curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 pub use face::{CurveIndex, Face, Shell, Step};
@@ -120,11 +124,12 @@ pub fn find_shells(
     points: &[SurfacePoint],
 ) -> Vec<Shell> {
     let observed = Curves::new(graph);
-    let mut inferred = rulings::missing_rulings(&observed);
-    inferred.extend(creases::facing_ends(&observed));
-    let domes = domes::domes(&observed, graph.domes);
+    let rulings = rulings::missing_rulings(&observed);
+    let curves = observed.with_inferred(rulings);
+    let mut inferred = creases::continued_ends(&curves);
+    let domes = domes::domes(&curves, graph.domes);
     inferred.extend(domes.rims);
-    let (curves, faces) = candidates::candidates(observed.with_inferred(inferred), domes.caps);
+    let (curves, faces) = candidates::candidates(curves.with_inferred(inferred), domes.caps);
     let _span = tracing::debug_span!("find_shells", faces = faces.len()).entered();
     let detected = DetectedView::all(views);
     let sightings = Sightings::new(&curves, &detected);

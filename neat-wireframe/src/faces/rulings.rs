@@ -11,6 +11,7 @@ use super::curves::{Curve, Curves, sorted};
 use super::face::CurveIndex;
 use super::surface::Surface;
 use nalgebra::Vector3;
+use neat_core::LineSegment3;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Sine of the angle by which a curve that goes on may turn: 10°.
@@ -44,7 +45,34 @@ pub(super) fn missing_rulings(curves: &Curves) -> Vec<Curve> {
             }
         }
     }
-    lines.into_values().collect()
+    shortest(lines.into_values().collect(), REACH * curves.arc_sigma())
+}
+
+/// Those on which no other one ends that begins with them: three rims of one cylinder are joined one
+/// after the other.
+fn shortest(lines: Vec<Curve>, reach: f64) -> Vec<Curve> {
+    let ends = |line: &Curve| line.ends.unwrap_or_default();
+    let mut of_end: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (place, line) in lines.iter().enumerate() {
+        for end in ends(line) {
+            of_end.entry(end).or_default().push(place);
+        }
+    }
+    let is_passed = |line: &Curve| {
+        let whole = LineSegment3::new(line.points[0], line.points[1]);
+        let beside = ends(line).into_iter().flat_map(|end| &of_end[&end]);
+        beside.map(|place| &lines[*place]).any(|other| {
+            let new =
+                (other.points.iter().zip(ends(other))).find(|(_, end)| !ends(line).contains(end));
+            new.is_some_and(|(point, _)| {
+                (0.0..1.0).contains(&whole.line_parameter(point))
+                    && whole.distance_to_point(point) <= reach
+            })
+        })
+    };
+    let passed: Vec<bool> = lines.iter().map(is_passed).collect();
+    let kept = lines.into_iter().zip(passed).filter(|(_, passed)| !passed);
+    kept.map(|(line, _)| line).collect()
 }
 
 /// A junction and where it is.
