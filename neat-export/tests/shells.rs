@@ -422,6 +422,19 @@ fn inferred_lines_bound_faces_of_solids_and_are_no_edges() {
 }
 
 #[test]
+fn edges_that_no_image_shows_say_so_too() {
+    let mut document = rounded();
+    let mut inferred = vec![false; document.edges.len()];
+    inferred[2] = true;
+    document.edge_fields.inferred = Some(inferred);
+    let step = exported(&document, Format::Step, EdgeFilter::default());
+    assert_eq!(step.matches("EDGE_CURVE('inferred',").count(), 3);
+    let json = exported(&document, Format::Json, EdgeFilter::default());
+    let again: WireframeDocument = serde_json::from_str(&json).unwrap();
+    assert_eq!(again.edge_fields, document.edge_fields);
+}
+
+#[test]
 fn inferred_lines_follow_their_junctions_through_a_filter() {
     let mut document = rounded();
     document.junctions.insert(0, Vector3::new(5.0, 5.0, 5.0));
