@@ -46,7 +46,7 @@ pub fn completed(graph: &MeasuredGraph, shells: &[Shell]) -> Option<Completed> {
     let closed: Vec<&Shell> = shells.iter().filter(|shell| shell.closed).collect();
     let counts = curves_at(&curves, &closed);
     let whole: Vec<WholeEdge> = (closed.iter())
-        .flat_map(|shell| whole_edges(graph, shell, &counts))
+        .flat_map(|shell| whole_edges(graph, &curves, shell, &counts))
         .collect();
     if whole.is_empty() {
         return None;
@@ -129,6 +129,7 @@ fn curves_at(curves: &Curves, closed: &[&Shell]) -> BTreeMap<usize, usize> {
 /// The edges of a closed shell that are inferred, or of which a piece is.
 fn whole_edges(
     graph: &MeasuredGraph,
+    curves: &Curves,
     shell: &Shell,
     counts: &BTreeMap<usize, usize>,
 ) -> Vec<WholeEdge> {
@@ -136,14 +137,13 @@ fn whole_edges(
     if lines.iter().all(|line| line.edge.is_some()) {
         return Vec::new();
     }
-    let leaving = |place: usize, junction: usize| {
-        let other = lines[place].ends.iter().find(|end| **end != junction);
+    let reach = REACH * curves.arc_sigma();
+    let goes_on = |[one, other]: [usize; 2], junction: usize| {
+        let far = [one, other].map(|place| lines[place].ends.iter().find(|end| **end != junction));
         let points = &graph.wireframe.junctions;
-        other.map(|other| (points[*other] - points[junction]).normalize())
-    };
-    let go_on = |[one, other]: [usize; 2], junction: usize| {
-        let directions = leaving(one, junction).zip(leaving(other, junction));
-        directions.is_some_and(|(a, b)| a.dot(&b) < -SMOOTH)
+        Option::zip(far[0], far[1]).is_some_and(|(a, b)| {
+            LineSegment3::new(points[*a], points[*b]).distance_to_point(&points[junction]) <= reach
+        })
     };
     let mut at_junction: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
     for (place, line) in lines.iter().enumerate() {
@@ -158,7 +158,7 @@ fn whole_edges(
             && counts[junction] == 2
             && lines[one].faces == lines[other].faces
             && (lines[one].edge.is_none() || lines[other].edge.is_none())
-            && go_on([one, other], *junction)
+            && goes_on([one, other], *junction)
         {
             joined.push(vec![one, other]);
         }
