@@ -8,8 +8,10 @@ use neat_wireframe::assemble::{
     AssembleConfig, Assembled, Photographs, Witnesses, assemble_with_progress,
 };
 use neat_wireframe::confidence::{Confidence, ConfidenceConfig, assess};
-use neat_wireframe::faces::{MeasuredGraph, Shell, completed, find_shells, surface_points};
-use neat_wireframe::kinds::{WithoutPaint, edge_kinds, without_paint};
+use neat_wireframe::faces::{
+    MeasuredGraph, Shell, completed, creases_of_solids, find_shells, surface_points,
+};
+use neat_wireframe::kinds::{EdgeKinds, WithoutPaint, edge_kinds, without_paint};
 use neat_wireframe::paper::NeatLine;
 use neat_wireframe::validity::WireframeFlaw;
 use neat_wireframe::{SignedDistance, ViewObservation};
@@ -183,6 +185,10 @@ impl Draft {
                 (wireframe, confidence, shells) = (completed.wireframe, whole, of_whole);
                 report.complete(&inferred, &wireframe);
             }
+        }
+        // The light on them says less than two faces that meet.
+        for edge in creases_of_solids(&wireframe, &shells) {
+            kinds[edge] = EdgeKinds::CREASE;
         }
         Ok(Distilled {
             wireframe,

@@ -93,6 +93,16 @@ pub fn completed(graph: &MeasuredGraph, shells: &[Shell]) -> Option<Completed> {
     })
 }
 
+/// The edges at which two faces of a closed shell meet at an angle, whatever images say of their light.
+pub fn creases_of_solids(wireframe: &Wireframe3d, shells: &[Shell]) -> BTreeSet<usize> {
+    let closed = shells.iter().filter(|shell| shell.closed);
+    let lines = closed.flat_map(|shell| lines(wireframe, shell));
+    lines
+        .filter(|line| line.is_crease)
+        .filter_map(|line| line.edge)
+        .collect()
+}
+
 /// An edge of which at least a piece is inferred.
 struct WholeEdge {
     ends: [usize; 2],
@@ -108,6 +118,8 @@ struct Line {
     /// The edge, if it is one, and no inferred line.
     edge: Option<usize>,
     faces: [usize; 2],
+    /// Whether these are known to meet at an angle.
+    is_crease: bool,
 }
 
 /// How many curves end at each junction: those that images show, and those that closed shells have
@@ -133,7 +145,7 @@ fn whole_edges(
     shell: &Shell,
     counts: &BTreeMap<usize, usize>,
 ) -> Vec<WholeEdge> {
-    let lines = lines(graph, shell);
+    let lines = lines(graph.wireframe, shell);
     if lines.iter().all(|line| line.edge.is_some()) {
         return Vec::new();
     }
@@ -188,7 +200,7 @@ fn whole_edges(
 }
 
 /// The straight curves of a closed shell at which its faces form an edge.
-fn lines(graph: &MeasuredGraph, shell: &Shell) -> Vec<Line> {
+fn lines(wireframe: &Wireframe3d, shell: &Shell) -> Vec<Line> {
     let mut faces_of: BTreeMap<CurveIndex, Vec<usize>> = BTreeMap::new();
     for (place, face) in shell.faces.iter().enumerate() {
         for step in face.steps() {
@@ -197,18 +209,23 @@ fn lines(graph: &MeasuredGraph, shell: &Shell) -> Vec<Line> {
     }
     let line = |(curve, faces): (CurveIndex, Vec<usize>)| {
         let (ends, edge) = match curve {
-            CurveIndex::Edge(edge) => (graph.wireframe.edges[edge], Some(edge)),
+            CurveIndex::Edge(edge) => (wireframe.edges[edge], Some(edge)),
             CurveIndex::Smooth(ends) => (ends, None),
             _ => return None,
         };
         let faces: [usize; 2] = faces.try_into().ok()?;
-        let [from, to] = ends.map(|end| graph.wireframe.junctions[end]);
+        let [from, to] = ends.map(|end| wireframe.junctions[end]);
         let middle = 0.5 * (from + to);
         let normals = faces.map(|face| shell.faces[face].surface.normal_at(&middle));
         // A patch or a wall does not say how it lies there.
         let is_known = normals.iter().all(|normal| *normal != Vector3::zeros());
-        let is_edge = is_known && normals[0].dot(&normals[1]) <= SMOOTH;
-        (edge.is_some() || is_edge).then_some(Line { ends, edge, faces })
+        let is_crease = is_known && normals[0].dot(&normals[1]) <= SMOOTH;
+        (edge.is_some() || is_crease).then_some(Line {
+            ends,
+            edge,
+            faces,
+            is_crease,
+        })
     };
     faces_of.into_iter().filter_map(line).collect()
 }

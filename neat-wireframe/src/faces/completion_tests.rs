@@ -108,6 +108,8 @@ fn what_a_solid_has_the_wireframe_gets() {
         let again = MeasuredGraph::of(&whole.wireframe);
         let shells = find_shells(&again, &[], &[]);
         assert!(shells[0].closed && completed(&again, &shells).is_none());
+        let creases = creases_of_solids(&whole.wireframe, &shells);
+        assert!(creases.into_iter().eq(0..12));
     }
 }
 
@@ -122,6 +124,21 @@ fn sheets_and_smooth_lines_add_nothing() {
         assert!(!shells.is_empty());
         assert_eq!(completed(&model.graph(), &shells), None);
     }
+    // The sides of a rounded block that touch the round one, whether lines there are edges or not.
+    let mut yoke = yoke();
+    let is_up = |a: &Vector3<f64>, b: &Vector3<f64>| (a - b).x.abs() > 0.1 && a.y == 0.6;
+    let junctions = &yoke.wireframe.junctions;
+    let ends = (0..junctions.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
+    let smooth: Vec<[usize; 2]> = ends
+        .filter(|[a, b]| is_up(&junctions[*a], &junctions[*b]))
+        .filter(|[a, b]| (junctions[*a] - junctions[*b]).norm() < 0.25)
+        .collect();
+    let before = yoke.wireframe.edges.len();
+    yoke.wireframe.edges.extend(&smooth);
+    let shells = yoke.shells();
+    assert!(shells[0].closed && smooth.len() == 4);
+    let creases = creases_of_solids(&yoke.wireframe, &shells);
+    assert!(creases.into_iter().eq(0..before));
 }
 
 #[test]

@@ -84,7 +84,7 @@ mod sheet_tests;
 #[cfg(test)]
 mod tests;
 
-pub use completion::{Completed, completed};
+pub use completion::{Completed, completed, creases_of_solids};
 pub use curves::MeasuredGraph;
 pub(crate) use curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 pub use face::{CurveIndex, Face, Shell, Step};

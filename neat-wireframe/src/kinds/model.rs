@@ -79,6 +79,14 @@ pub struct EdgeKinds {
 }
 
 impl EdgeKinds {
+    /// Of an edge at which two faces are known to meet.
+    pub const CREASE: Self = Self {
+        crease: 1.0,
+        boundary: 0.0,
+        texture: 0.0,
+        shadow: 0.0,
+    };
+
     /// Probability that the edge belongs to the shape of things: a crease or a boundary.
     pub fn structure(&self) -> f64 {
         self.crease + self.boundary
