@@ -27,9 +27,8 @@ impl Confidence {
         // From those that images show on to those that join only others that are inferred.
         loop {
             let joined = |place: &usize| {
-                let ends = completed.wireframe.edges[*place];
-                let of_ends = ends.map(|end| least[end]);
-                (of_ends[0].min(of_ends[1]) < f64::INFINITY).then(|| of_ends[0].min(of_ends[1]))
+                let [a, b] = completed.wireframe.edges[*place].map(|end| least[end]);
+                Some(a.min(b)).filter(|least| least.is_finite())
             };
             let known: Vec<(usize, f64)> = (unknown.iter())
                 .filter_map(|place| Some((*place, joined(place)?)))

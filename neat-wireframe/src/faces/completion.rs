@@ -52,7 +52,7 @@ pub fn completed(graph: &MeasuredGraph, shells: &[Shell]) -> Option<Completed> {
         return None;
     }
     let mut junctions = graph.wireframe.junctions.clone();
-    let mut sources: BTreeMap<[usize; 2], Vec<usize>> = BTreeMap::new();
+    let mut sources: BTreeMap<[usize; 2], BTreeSet<usize>> = BTreeMap::new();
     for edge in &whole {
         for (end, corner) in edge.ends.iter().zip(edge.corners) {
             junctions[*end] = corner;
@@ -64,12 +64,12 @@ pub fn completed(graph: &MeasuredGraph, shells: &[Shell]) -> Option<Completed> {
         sources
             .entry(sorted(whole[edge].ends))
             .or_default()
-            .push(piece);
+            .insert(piece);
     }
     let gone: BTreeSet<usize> = sources.values().flatten().copied().collect();
     for (index, ends) in graph.wireframe.edges.iter().enumerate() {
         if !gone.contains(&index) {
-            sources.entry(sorted(*ends)).or_default().push(index);
+            sources.entry(sorted(*ends)).or_default().insert(index);
         }
     }
     let of_curves = curves.observed().filter(|curve| !curve.is_straight());
@@ -80,12 +80,9 @@ pub fn completed(graph: &MeasuredGraph, shells: &[Shell]) -> Option<Completed> {
     let stays = |junction: &usize| used.contains(junction) || !had_one.contains(junction);
     let kept: Vec<usize> = (0..junctions.len()).filter(stays).collect();
     let renamed = |ends: [usize; 2]| ends.map(|end| kept.partition_point(|other| *other < end));
-    let (edges, mut sources): (Vec<[usize; 2]>, Vec<Vec<usize>>) = (sources.into_iter())
-        .map(|(ends, sources)| (renamed(ends), sources))
+    let (edges, sources): (Vec<[usize; 2]>, Vec<Vec<usize>>) = (sources.into_iter())
+        .map(|(ends, sources)| (renamed(ends), sources.into_iter().collect()))
         .unzip();
-    sources
-        .iter_mut()
-        .for_each(|sources| sources.sort_unstable());
     let junctions = kept.iter().map(|junction| junctions[*junction]).collect();
     Some(Completed {
         wireframe: Wireframe3d { junctions, edges },

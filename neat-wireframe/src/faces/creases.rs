@@ -5,8 +5,8 @@
 //! piece of it, two corners are left at which a curve of either plane ends and none goes on. Between
 //! two such corners, one after the other on the line in which the planes meet, an edge is inferred.
 //! An edge that leads to such a corner and stops short of it is gone on with; one that runs past it
-//! ends there. Two edges on one line that end facing each other are pieces of one, whatever lies
-//! between. Like any inferred line it costs nothing by itself, but wants two faces
+//! ends there. An edge that ends at nothing goes on to the next junction on its line that lacks an edge,
+//! whatever lies between. Like any inferred line it costs nothing by itself, but wants two faces
 //! (`selection.rs`).
 
 use super::bounds::Bounds;
@@ -259,11 +259,9 @@ impl Corners {
             beside <= reach && apart
         };
         let all = |open: &OpenCorners| &open.of_curves | &open.of_others;
-        let mut common: Vec<usize> = (all(one).intersection(&all(other)).copied())
+        (all(one).intersection(&all(other)).copied())
             .filter(|junction| of_curves.contains(junction) || is_own(junction))
-            .collect();
-        common.sort_unstable();
-        common
+            .collect()
     }
 }
 
