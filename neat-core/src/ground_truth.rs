@@ -2,7 +2,8 @@
 //!
 //! Ground truth (`gt_wireframe.json`) calls its edges `lines` and may hold
 //! `curves`: `{"junctions": [[x, y, z], …], "lines": [[i, j], …], "curves":
-//! [{"type": "Circle", "points": [[x, y, z], …]}, …]}`. Our results
+//! [{"type": "Circle", "points": [[x, y, z], …]}, …]}`, and `faces`, which are written here and
+//! read by `neat-eval`. Our results
 //! (`wireframe.json`) call them `edges`. Both are read by the same functions;
 //! other keys are ignored.
 
@@ -30,6 +31,59 @@ pub struct Curve {
     pub points: Vec<Vector3<f64>>,
 }
 
+/// A face of a CAD model.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Face {
+    /// What it is a part of.
+    #[serde(flatten)]
+    pub surface: Surface,
+    /// Its area.
+    pub area: f64,
+    /// The sharp edges around it.
+    pub edges: Vec<FaceEdge>,
+}
+
+/// A sharp edge beside a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(tag = "kind", content = "index", rename_all = "snake_case")]
+pub enum FaceEdge {
+    /// The index of a straight edge.
+    Line(usize),
+    /// The index of a curve.
+    Curve(usize),
+}
+
+/// What faces of CAD models are parts of, in world units.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+pub enum Surface {
+    /// A plane, with its unit normal away from the solid.
+    Plane {
+        /// The normal.
+        normal: Vector3<f64>,
+        /// The product of the normal with any point of it.
+        offset: f64,
+    },
+    /// A cylinder.
+    Cylinder {
+        /// A point of the axis.
+        axis_point: Vector3<f64>,
+        /// The unit axis.
+        axis: Vector3<f64>,
+        /// The radius.
+        radius: f64,
+    },
+    /// A cone.
+    Cone {
+        /// Where the radius is 0.
+        apex: Vector3<f64>,
+        /// The unit axis, from the apex into the cone.
+        axis: Vector3<f64>,
+        /// The angle between axis and surface, in radians.
+        half_angle: f64,
+    },
+}
+
 #[derive(Deserialize)]
 struct ReadJson {
     junctions: Vec<Vector3<f64>>,
@@ -44,6 +98,8 @@ struct GroundTruthJson<'a> {
     junctions: &'a [Vector3<f64>],
     lines: &'a [[usize; 2]],
     curves: &'a [Curve],
+    #[serde(skip_serializing_if = "<[Face]>::is_empty")]
+    faces: &'a [Face],
 }
 
 const REMEDY: &str = "give a file with `junctions` and `lines` or `edges`";
@@ -88,12 +144,17 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GroundTruth, SceneError> {
     })
 }
 
-/// Writes ground truth.
+/// Writes ground truth, with the faces between its edges where they are known.
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write_ground_truth(path: &Path, truth: &GroundTruth) -> Result<(), SceneError> {
+pub fn write_ground_truth(
+    path: &Path,
+    truth: &GroundTruth,
+    faces: &[Face],
+) -> Result<(), SceneError> {
     let json = GroundTruthJson {
+        faces,
         junctions: &truth.wireframe.junctions,
         lines: &truth.wireframe.edges,
         curves: &truth.curves,
@@ -156,7 +217,7 @@ mod tests {
             };
             let dir = tempfile::tempdir().unwrap();
             let path = dir.path().join("a.json");
-            write_ground_truth(&path, &truth).unwrap();
+            write_ground_truth(&path, &truth, &[]).unwrap();
             prop_assert_eq!(&read_ground_truth(&path).unwrap(), &truth);
             write_wireframe(&path, &truth.wireframe).unwrap();
             prop_assert_eq!(read_wireframe(&path).unwrap(), truth.wireframe);

@@ -117,7 +117,7 @@ fn surface_samples(solid: &Frustum, spacing: f64) -> Vec<Vec3> {
 
 #[test]
 fn solids_are_closed_creased_and_within_their_ball() {
-    for solid in Solid::ALL.map(Solid::frustum) {
+    for solid in Solid::POLYHEDRA.map(Solid::frustum) {
         let wireframe = solid.wireframe();
         let euler = wireframe.junctions.len() + solid.faces().len() - wireframe.edges.len();
         assert_eq!(euler, 2);
@@ -146,7 +146,7 @@ fn solids_are_closed_creased_and_within_their_ball() {
 
 #[test]
 fn faces_are_flat_and_look_outwards() {
-    for solid in Solid::ALL.map(Solid::frustum) {
+    for solid in Solid::POLYHEDRA.map(Solid::frustum) {
         for face in solid.faces() {
             assert!((face.normal.norm() - 1.0).abs() < 1e-12);
             for corner in &face.outline {
@@ -163,7 +163,7 @@ fn faces_are_flat_and_look_outwards() {
 fn sdf_agrees_with_a_densely_sampled_surface_and_with_ray_parity() {
     let spacing = 0.02;
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    for solid in Solid::ALL.map(Solid::frustum) {
+    for solid in Solid::POLYHEDRA.map(Solid::frustum) {
         let samples = surface_samples(&solid, spacing);
         let mut inside_count = 0;
         for _ in 0..200 {
@@ -191,7 +191,7 @@ fn sdf_agrees_with_a_densely_sampled_surface_and_with_ray_parity() {
 fn the_gradient_is_the_derivative_and_has_unit_length() {
     let h = 1e-6;
     let mut rng = ChaCha8Rng::seed_from_u64(2);
-    for solid in Solid::ALL.map(Solid::frustum) {
+    for solid in Solid::POLYHEDRA.map(Solid::frustum) {
         let mut smooth = 0;
         for _ in 0..500 {
             let point = random_point(&mut rng, 0.8);
@@ -210,7 +210,7 @@ fn the_gradient_is_the_derivative_and_has_unit_length() {
 
 #[test]
 fn sdf_vanishes_on_the_wireframe_and_has_the_normal_on_faces() {
-    for solid in Solid::ALL.map(Solid::frustum) {
+    for solid in Solid::POLYHEDRA.map(Solid::frustum) {
         for edge in solid.wireframe().segments() {
             for i in 0..=10 {
                 assert!(solid.sdf(&edge.point_at(f64::from(i) / 10.0)).abs() < 1e-12);
@@ -258,7 +258,7 @@ fn cameras_surround_the_object_and_look_at_it() {
 #[test]
 fn visible_parts_end_on_projected_edges_or_at_projected_junctions() {
     let mut occluded_ends = 0;
-    for solid in Solid::ALL {
+    for solid in Solid::POLYHEDRA {
         let SyntheticData {
             scene,
             truth,
@@ -307,7 +307,7 @@ fn visible_by_ray_casting(solid: &Frustum, camera: &Camera, point: &Vec3) -> boo
 
 #[test]
 fn occlusion_agrees_with_ray_casting_along_every_edge() {
-    for kind in Solid::ALL {
+    for kind in Solid::POLYHEDRA {
         let (mut seen, mut hidden) = (0, 0);
         let SyntheticData { scene, solid, .. } = data(&small(kind));
         for view in &scene.views {
@@ -338,7 +338,7 @@ fn occlusion_agrees_with_ray_casting_along_every_edge() {
 #[test]
 fn images_agree_with_ray_casting_at_random_pixels() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    for kind in Solid::ALL {
+    for kind in Solid::POLYHEDRA {
         let SyntheticData { scene, solid, .. } = data(&small(kind));
         let (mut empty, mut covered) = (0, 0);
         for view in &scene.views {
@@ -398,7 +398,7 @@ fn color_of_face(solid: &Frustum, face: &PlanarFace, shading: bool) -> Vec3 {
 
 #[test]
 fn neighbouring_faces_differ_visibly() {
-    for solid in Solid::ALL.map(Solid::frustum) {
+    for solid in Solid::POLYHEDRA.map(Solid::frustum) {
         for shading in [true, false] {
             let colors: Vec<Vec3> = solid
                 .faces()
@@ -418,7 +418,7 @@ fn neighbouring_faces_differ_visibly() {
 
 #[test]
 fn a_perfect_detector_draws_the_visible_parts_and_shares_junctions() {
-    for kind in Solid::ALL {
+    for kind in Solid::POLYHEDRA {
         let SyntheticData {
             scene, view_truths, ..
         } = data(&perfect(kind));
@@ -600,7 +600,7 @@ fn impossible_configurations_are_named() {
 
 #[test]
 fn configurations_name_solids_in_kebab_case_and_refuse_unknown_fields() {
-    for solid in Solid::ALL {
+    for solid in Solid::POLYHEDRA {
         let json = format!(r#"{{"solid": "{}", "views": 7}}"#, solid.name());
         let config: SyntheticScene = serde_json::from_str(&json).expect("the name is known");
         assert_eq!((config.solid, config.views), (solid, 7));

@@ -29,7 +29,7 @@ pub struct Demo {
 }
 
 /// Generates a synthetic scene and writes it in the ABC layout, with the true
-/// wireframe as `gt_wireframe.json`.
+/// wireframe, its curves and its faces as `gt_wireframe.json`.
 ///
 /// # Errors
 /// If the scene is impossible, or the folder is not empty or cannot be written.
@@ -44,10 +44,10 @@ pub fn synthesise(config: &SyntheticScene, dir: &Path) -> Result<GroundTruth, La
     let data = generate_on_demand(config)?;
     let truth = GroundTruth {
         wireframe: data.truth,
-        curves: Vec::new(),
+        curves: data.solid.curves(),
     };
     abc::write_scene(&data.scene, dir)?;
-    write_ground_truth(&dir.join(GROUND_TRUTH), &truth)?;
+    write_ground_truth(&dir.join(GROUND_TRUTH), &truth, &data.solid.true_faces())?;
     Ok(truth)
 }
 

@@ -4,6 +4,7 @@ use crate::error::CliError;
 use crate::output;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use neat_core::ground_truth::GroundTruth;
 use neat_core::synthetic::{Solid, SyntheticScene};
 use neat_lab::demo::{GROUND_TRUTH, synthesise};
 use std::path::PathBuf;
@@ -11,12 +12,14 @@ use std::path::PathBuf;
 /// Write a synthetic scene with its true wireframe
 ///
 /// SCENE then holds images/, hawp/ (what a detector would see), cameras.npz and
-/// gt_wireframe.json, in the layout of the published ABC objects.
+/// gt_wireframe.json, in the layout of the published ABC objects. Solids with arcs have
+/// them among the true curves; the imitated detector sees straight edges only.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
   neat synth --out SCENE
   neat synth --out SCENE --solid stair-prism --views 30 --image-size 256
+  neat synth --out SCENE --solid drilled-plate                               lines, arcs and holes
   neat synth --out SCENE --noise 0 --detection-rate 1 --false-segments 0    a perfect detector")]
 pub struct SynthArgs {
     /// Folder for the scene; it must be new or empty
@@ -86,12 +89,16 @@ fn solid_parser() -> impl TypedValueParser<Value = Solid> {
 impl SynthArgs {
     pub fn run(self) -> Result<(), CliError> {
         let config = self.scene.config(self.seed);
-        let truth = synthesise(&config, &self.out)?.wireframe;
+        let GroundTruth { wireframe, curves } = synthesise(&config, &self.out)?;
+        let curves = match curves.len() {
+            0 => String::new(),
+            count => format!(", {count} curves"),
+        };
         output::print(&format!(
-            "{} with {} junctions and {} edges in {} views: {}\ntrue wireframe: {}",
+            "{} with {} junctions and {} edges{curves} in {} views: {}\ntrue wireframe: {}",
             config.solid.name(),
-            truth.junctions.len(),
-            truth.edges.len(),
+            wireframe.junctions.len(),
+            wireframe.edges.len(),
             config.views,
             self.out.display(),
             self.out.join(GROUND_TRUTH).display(),

@@ -10,17 +10,20 @@
 mod detection;
 mod frustum;
 mod planar_face;
-mod polygon;
+mod profile;
 mod random;
 mod rendering;
+mod round_face;
 mod scene;
 mod solid;
+mod true_faces;
 mod viewpoints;
 mod visible_edges;
 
 pub use frustum::Frustum;
 pub use planar_face::PlanarFace;
 pub use rendering::render;
+pub use round_face::RoundFace;
 pub use scene::{
     SyntheticData, SyntheticError, SyntheticScene, ViewTruth, generate, generate_on_demand,
 };

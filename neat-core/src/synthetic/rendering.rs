@@ -1,8 +1,8 @@
 //! Ray-traced images of solids.
 
 use super::frustum::bounds_in_image;
-use super::{Frustum, PlanarFace};
-use crate::Camera;
+use super::{Frustum, PlanarFace, RoundFace};
+use crate::{Camera, Ray};
 use image::RgbImage;
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
@@ -13,6 +13,8 @@ use std::ops::Range;
 const AMBIENT: f64 = 0.45;
 /// Directional lights: direction towards the light (not normalised), strength.
 const LIGHTS: [([f64; 3], f64); 2] = [([0.4, 0.5, 0.8], 0.35), ([-0.7, 0.2, -0.5], 0.2)];
+/// Albedos of bottom and top: greys.
+const END_ALBEDOS: [f64; 2] = [0.65, 1.0];
 /// Offsets of the four samples in a pixel, in pixels from its corner.
 const SAMPLES: [[f64; 2]; 4] = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]];
 
@@ -24,11 +26,14 @@ const SAMPLES: [[f64; 2]; 4] = [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75,
 /// two lights fixed in the world, without it they show their albedo.
 pub fn render(solid: &Frustum, camera: &Camera, shading: bool) -> RgbImage {
     let mut image = RgbImage::new(camera.width, camera.height);
-    let colors = face_colors(solid, shading);
     // The back of a face is never seen: the solid itself stands before it.
-    let front_faces: Vec<SeenFace> = (solid.faces().iter().zip(colors))
-        .filter(|(face, _)| face.plane_distance(&camera.center_in_world) > 0.0)
-        .map(|(face, color)| SeenFace::new(face, color, camera))
+    let front_faces: Vec<SeenFace> = painted_faces(solid, shading)
+        .into_iter()
+        .filter(|face| match face.shape {
+            Shape::Planar(plane) => plane.plane_distance(&camera.center_in_world) > 0.0,
+            Shape::Round(_) => true,
+        })
+        .map(|face| SeenFace::new(face, camera))
         .collect();
     image
         .par_chunks_exact_mut(3 * camera.width.max(1) as usize)
@@ -54,25 +59,64 @@ pub fn render(solid: &Frustum, camera: &Camera, shading: bool) -> RgbImage {
     image
 }
 
-/// A face, its colour, and the pixels that may show it.
+#[derive(Clone, Copy)]
+enum Shape<'f> {
+    Planar(&'f PlanarFace),
+    Round(&'f RoundFace),
+}
+
+/// A face and its colour.
+#[derive(Clone, Copy)]
+struct PaintedFace<'f> {
+    shape: Shape<'f>,
+    albedo: Vector3<f64>,
+    shading: bool,
+}
+
+impl PaintedFace<'_> {
+    /// How far along a ray it is, and its colour there, channels in [0, 1].
+    fn along(&self, ray: &Ray) -> Option<(f64, Vector3<f64>)> {
+        let (distance, normal) = match self.shape {
+            Shape::Planar(face) => (face.intersect(ray)?, face.normal),
+            Shape::Round(face) => {
+                let distance = face.intersect(ray)?;
+                let point = ray.origin + ray.direction * distance;
+                (distance, face.normal_beside(&point))
+            }
+        };
+        let light = if self.shading {
+            irradiance(&normal)
+        } else {
+            1.0
+        };
+        Some((distance, self.albedo * light))
+    }
+
+    fn hull(&self) -> Vec<Vector3<f64>> {
+        match self.shape {
+            Shape::Planar(face) => face.hull(),
+            Shape::Round(face) => face.hull(),
+        }
+    }
+}
+
+/// A face and the pixels that may show it.
 struct SeenFace<'f> {
-    face: &'f PlanarFace,
-    color: Vector3<f64>,
+    face: PaintedFace<'f>,
     columns: Range<usize>,
     rows: Range<usize>,
 }
 
 impl<'f> SeenFace<'f> {
-    fn new(face: &'f PlanarFace, color: Vector3<f64>, camera: &Camera) -> Self {
+    fn new(face: PaintedFace<'f>, camera: &Camera) -> Self {
         let everywhere = [Vector2::zeros(), Vector2::from_element(f64::INFINITY)];
-        let [lower, upper] = bounds_in_image(&face.outline, camera).unwrap_or(everywhere);
+        let [lower, upper] = bounds_in_image(&face.hull(), camera).unwrap_or(everywhere);
         // Float-to-integer casts saturate, so bounds beyond the image clip to it.
         let within = |axis: usize, size: u32| {
             lower[axis] as usize..(upper[axis].ceil() as usize).min(size as usize)
         };
         Self {
             face,
-            color,
             columns: within(0, camera.width),
             rows: within(1, camera.height),
         }
@@ -89,24 +133,29 @@ fn trace(
     let ray = camera.ray_through(point_in_image);
     (faces.iter())
         .filter(|seen| seen.columns.contains(&column))
-        .filter_map(|seen| Some((seen.face.intersect(&ray)?, seen.color)))
+        .filter_map(|seen| seen.face.along(&ray))
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map_or(Vector3::zeros(), |(_, color)| color)
 }
 
-/// Colour of every face, channels in [0, 1].
-fn face_colors(solid: &Frustum, shading: bool) -> Vec<Vector3<f64>> {
-    solid
-        .faces()
-        .iter()
-        .enumerate()
-        .map(|(index, face)| {
-            let light = if shading {
-                irradiance(&face.normal)
-            } else {
-                1.0
-            };
-            albedo(index, solid.faces().len()) * light
+/// Every face with its albedo: sides that go on smoothly share theirs.
+fn painted_faces(solid: &Frustum, shading: bool) -> Vec<PaintedFace<'_>> {
+    let (planes, rounds) = (solid.faces(), solid.round_faces());
+    let (straight, ends) = planes.split_at(planes.len() - 2);
+    let sides = (straight.iter().map(Shape::Planar)).chain(rounds.iter().map(Shape::Round));
+    let surfaces = solid.surfaces();
+    let count = surfaces.iter().max().map_or(0, |last| last + 1);
+    let of_sides = surfaces.iter().map(|surface| side_albedo(*surface, count));
+    (sides.zip(of_sides))
+        .chain(
+            ends.iter()
+                .map(Shape::Planar)
+                .zip(END_ALBEDOS.map(Vector3::from_element)),
+        )
+        .map(|(shape, albedo)| PaintedFace {
+            shape,
+            albedo,
+            shading,
         })
         .collect()
 }
@@ -119,18 +168,10 @@ fn irradiance(normal: &Vector3<f64>) -> f64 {
     })
 }
 
-/// Albedo of a face: hues around the colour circle for the sides of a frustum,
-/// two greys for its bottom and top, so that neighbours always differ.
-fn albedo(face: usize, face_count: usize) -> Vector3<f64> {
-    let sides = face_count - 2;
-    if face == sides {
-        return Vector3::from_element(0.65);
-    }
-    if face > sides {
-        return Vector3::from_element(1.0);
-    }
+/// Albedo of a side: hues around the colour circle, so that neighbours always differ.
+fn side_albedo(surface: usize, count: usize) -> Vector3<f64> {
     let (saturation, value) = (0.6, 0.95);
-    let hue = 6.0 * face as f64 / sides as f64; // in sixths of the circle
+    let hue = 6.0 * surface as f64 / count as f64; // in sixths of the circle
     Vector3::new(5.0, 3.0, 1.0).map(|channel| {
         let k = (channel + hue) % 6.0;
         value - value * saturation * k.min(4.0 - k).clamp(0.0, 1.0)
@@ -140,18 +181,22 @@ fn albedo(face: usize, face_count: usize) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Ray;
     use crate::synthetic::{Solid, viewpoints};
 
     #[test]
     fn faces_are_seen_wherever_rays_meet_them() {
         // From afar, and from so near that corners lie behind the camera.
-        for (solid, distance) in [(Solid::LPrism, 2.5), (Solid::StairPrism, 0.8)] {
+        for (solid, distance) in [
+            (Solid::LPrism, 2.5),
+            (Solid::StairPrism, 0.8),
+            (Solid::DrilledPlate, 0.8),
+            (Solid::TruncatedCone, 2.5),
+        ] {
             let solid = solid.frustum();
-            let colors = face_colors(&solid, true);
+            let faces = painted_faces(&solid, true);
             let seen_along = |ray: &Ray| {
-                (solid.faces().iter().zip(&colors))
-                    .filter_map(|(face, color)| Some((face.intersect(ray)?, *color)))
+                (faces.iter())
+                    .filter_map(|face| face.along(ray))
                     .min_by(|a, b| a.0.total_cmp(&b.0))
                     .map_or(Vector3::zeros(), |(_, color)| color)
             };

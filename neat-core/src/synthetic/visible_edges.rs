@@ -1,7 +1,8 @@
 //! Exact hidden-line removal.
 
 use super::Frustum;
-use crate::{Camera, LineSegment2, Ray};
+use super::round_face::real_roots;
+use crate::{Camera, CircularArc, LineSegment2, LineSegment3, Ray};
 use nalgebra::Vector3;
 
 /// A stretch of an edge that a camera sees.
@@ -18,15 +19,18 @@ pub struct VisiblePart {
     pub segment: LineSegment2,
 }
 
+/// Nearer to a point by this share of its distance, a round face that holds the point does not hide it.
+const AT_THE_POINT: f64 = 1e-9;
 /// Pieces of an edge shorter than this share of it are rounding.
 const MIN_PIECE: f64 = 1e-9;
 
-/// The visible parts of all edges, by edge and then along the edge. The camera
+/// The visible parts of all straight edges, by edge and then along the edge. The camera
 /// must be outside the solid, with all of it in front.
 ///
 /// Nothing is sampled: seen from the camera, an edge can appear or disappear
-/// only where it meets the plane of a face, or the plane through the camera and
-/// another edge. Between two such cuts one test decides.
+/// only where it meets the plane of a face, the plane through the camera and
+/// another edge or a line in which a round face turns away, or the cone through the camera and
+/// an arc. Between two such cuts one test decides.
 pub fn visible_parts(solid: &Frustum, camera: &Camera) -> Vec<VisiblePart> {
     let wireframe = solid.wireframe();
     (0..wireframe.edges.len())
@@ -93,9 +97,18 @@ fn cuts(solid: &Frustum, camera: &Camera, edge: usize) -> Vec<f64> {
         let normal = (other.start - center).cross(&(other.end - center));
         (center, normal)
     });
+    let turning_planes = (solid.round_faces().iter())
+        .flat_map(|face| face.tangent_planes(&center))
+        .map(|normal| (center, normal));
+    let shadow_cones = solid
+        .arcs()
+        .iter()
+        .flat_map(|arc| cone_cuts(arc, &center, &segment));
     let mut cuts: Vec<f64> = face_planes
         .chain(shadow_planes)
+        .chain(turning_planes)
         .map(|(point, normal)| (point - segment.start).dot(&normal) / direction.dot(&normal))
+        .chain(shadow_cones)
         .filter(|t| (MIN_PIECE..1.0 - MIN_PIECE).contains(t))
         .chain([0.0, 1.0])
         .collect();
@@ -104,7 +117,24 @@ fn cuts(solid: &Frustum, camera: &Camera, edge: usize) -> Vec<f64> {
     cuts
 }
 
-/// Whether a face that does not carry the edge stands between camera and point.
+/// The parameters at which the line of a segment meets the cone through an eye and a circle.
+fn cone_cuts(arc: &CircularArc, eye: &Vector3<f64>, segment: &LineSegment3) -> Vec<f64> {
+    let (normal, to_center) = (arc.normal(), arc.center - eye);
+    let rise = to_center.dot(&normal);
+    // A direction d from the eye meets the plane of the circle at d · rise / (d · normal), which is as far
+    // from its centre as its radius. Of start and direction of the segment, times d · normal:
+    let [at, along] = [segment.start - eye, segment.end - segment.start].map(|d| {
+        let height = d.dot(&normal);
+        (d * rise - to_center * height, arc.radius * height)
+    });
+    real_roots(
+        along.0.norm_squared() - along.1 * along.1,
+        at.0.dot(&along.0) - at.1 * along.1,
+        at.0.norm_squared() - at.1 * at.1,
+    )
+}
+
+/// Whether a face that does not carry the edge, or a round one before it, stands between camera and point.
 fn is_hidden(solid: &Frustum, camera: &Camera, edge: usize, point: &Vector3<f64>) -> bool {
     let offset = point - camera.center_in_world;
     let distance = offset.norm();
@@ -112,10 +142,12 @@ fn is_hidden(solid: &Frustum, camera: &Camera, edge: usize, point: &Vector3<f64>
         origin: camera.center_in_world,
         direction: offset / distance,
     };
-    solid
-        .faces()
-        .iter()
+    let hides = |crossing: f64| crossing < distance * (1.0 - AT_THE_POINT);
+    let flat = (solid.faces().iter())
         .filter(|face| !face.contains_edge(&solid.wireframe().edges[edge]))
-        .filter_map(|face| face.intersect(&ray))
-        .any(|crossing| crossing < distance)
+        .any(|face| {
+            face.intersect(&ray)
+                .is_some_and(|crossing| crossing < distance)
+        });
+    flat || (solid.round_faces().iter()).any(|face| face.intersect(&ray).is_some_and(hides))
 }
