@@ -6,7 +6,7 @@
 //! of the pieces between junctions those are left out that hardly any edgel shows. A circle without
 //! a junction on it is closed if the rest of it is shown.
 
-use super::arc_joints::wrapped;
+use super::arc_joints::{OF_WHOLE, wrapped};
 use super::circle_fitting::{FoundArc, SECTOR_IN_PIXELS};
 use super::corners::{MAX_GAP, WINDOW_IN_PIXELS};
 use super::curved_edges::CurvedEdge;
@@ -26,11 +26,6 @@ const AT_JUNCTION: f64 = 5.0;
 /// Arcs of a smaller radius, in pixels, stay as they are: any short edge beside them would be a
 /// chord.
 pub(super) const MIN_RADIUS: f64 = SECTOR_IN_PIXELS;
-/// A piece of a circle is there if images say this much for it, by length, of what they say for
-/// the piece that they show best. Of a circle with eight scallops (`knob`) those that are there say
-/// .5 of it and more, those across scallops .02 at most.
-const OF_WHOLE: f64 = 0.1;
-
 /// Ends the arcs at the junctions of edges, straight and curved ones. Edges that are parts of arcs
 /// are taken away; `sources` belong to the straight ones.
 pub(super) fn end_at_junctions(

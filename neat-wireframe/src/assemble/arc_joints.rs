@@ -18,6 +18,11 @@ use std::f64::consts::{PI, TAU};
 /// touch, judged: each may stop short or go on by one.
 const WITHIN: f64 = 2.0;
 
+/// A piece of a circle is there if images say this much for it, by length, of what they say for
+/// the piece that they show best. Of a circle with eight scallops (`knob`) those that are there say
+/// .5 of it and more, those across scallops .02 at most.
+pub(super) const OF_WHOLE: f64 = 0.1;
+
 /// A tangency of an end of a line with an end of an arc.
 struct Joint {
     /// Of all tangencies of this end the nearest counts.
@@ -33,12 +38,7 @@ pub(super) fn join_tangents(images: &Images, lines: &mut [ChosenLine], arcs: &mu
     let joints: Vec<Vec<Joint>> = (lines.par_iter())
         .map(|chosen| {
             let joint = |(index, found): (usize, &FoundArc)| {
-                tangency(
-                    &chosen.line,
-                    found,
-                    MAX_GAP * images.reach * found.pixel,
-                    index,
-                )
+                tangency(images, &chosen.line, found, index)
             };
             arcs.iter().enumerate().filter_map(joint).collect()
         })
@@ -114,31 +114,63 @@ fn touch(line: &LineSegment3, arc: &CircularArc, gap: f64) -> Option<Touch> {
         .then_some(touch)
 }
 
-/// The tangency of a line with an arc, where they are at most `gap` apart.
-fn tangency(line: &LineSegment3, found: &FoundArc, gap: f64, index: usize) -> Option<Joint> {
+/// The tangency of a line with an end of an arc.
+fn tangency(
+    images: &Images,
+    line: &LineSegment3,
+    found: &FoundArc,
+    index: usize,
+) -> Option<Joint> {
     let arc = &found.arc;
+    let gap = MAX_GAP * images.reach * found.pixel;
     let Touch {
         point,
         line_end,
         distance,
         within,
     } = touch(line, arc, gap).filter(|_| !arc.is_closed())?;
+    if distance > within {
+        return None;
+    }
     let outward = (line.end - line.start) * [-1.0, 1.0][line_end];
-    let at_end = |end: usize| {
-        let off = arc.radius * wrapped(arc.angle_of(&point) - arc.angles[end]).abs();
-        let into = arc.tangent_at(arc.angles[end]) * [1.0, -1.0][end];
-        (off, end, into.dot(&outward) > 0.0)
+    // By how much the arc ends before the point, and goes on beyond it.
+    let by = |end: usize| {
+        [-1.0, 1.0][end] * arc.radius * wrapped(arc.angle_of(&point) - arc.angles[end])
     };
-    let nearer = |a: &(f64, usize, bool), b: &(f64, usize, bool)| a.0.total_cmp(&b.0);
-    let (from_arc_end, arc_end, goes_on) = [at_end(0), at_end(1)].into_iter().min_by(nearer)?;
-    let distance = distance.max(from_arc_end);
-    (goes_on && distance <= within).then_some(Joint {
+    let ends = [0, 1].map(|end| (by(end), end));
+    let (by, arc_end) = (ends.into_iter()).min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
+    let into = arc.tangent_at(arc.angle_of(&point)) * [1.0, -1.0][arc_end];
+    let distance = if by.abs() <= within {
+        distance.max(by.abs())
+    } else if hardly_goes_on(images, found, arc_end, [-by, within].map(|by| by / arc.radius)) {
+        distance
+    } else {
+        return None;
+    };
+    (into.dot(&outward) > 0.0).then_some(Joint {
         distance,
         line_end,
         arc: index,
         arc_end,
         point,
     })
+}
+
+/// Whether images hardly show the last part of an arc, but for its first stretch, beside which a line
+/// may lie, against the rest of it. Both are angles.
+fn hardly_goes_on(images: &Images, found: &FoundArc, end: usize, [last, beside]: [f64; 2]) -> bool {
+    let [from, to] = found.arc.angles;
+    let (beyond, before) = match end {
+        0 => ([from, from + last - beside], [from + last, to]),
+        _ => ([to - last + beside, to], [from, to - last]),
+    };
+    if last <= beside || before[1] <= before[0] {
+        return false;
+    }
+    let rate = |angles: [f64; 2]| {
+        images.gain_along(&found.arc, angles, found.pixel, None) / (angles[1] - angles[0])
+    };
+    rate(beyond) < OF_WHOLE * rate(before)
 }
 
 /// An end of an arc within so many pixels of where a line meets it is there, as for 2D segments.
@@ -160,7 +192,7 @@ pub(super) fn end_on_arcs(images: &Images, corners: &mut Corners, arcs: &mut [Fo
                 continue;
             }
             let mut tangencies = (arcs.iter().enumerate())
-                .filter_map(|(index, found)| tangency(&edge, found, gap, index));
+                .filter_map(|(index, found)| tangency(images, &edge, found, index));
             if tangencies.any(|joint| joint.line_end == end) {
                 continue;
             }
