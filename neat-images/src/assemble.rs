@@ -1,20 +1,15 @@
-//! From the images of a scene to its wireframe: edgels, the assembler, and how sure it is.
+//! From the images of a scene to its wireframe: edgels, and the assembler.
 
-use crate::distilled::{BackEndReport, Distilled};
+use crate::distilled::BackEndReport;
 use nalgebra::Matrix4;
 use neat_core::{Camera, CircularArc, Dome, EdgelMap, Scene, SceneError, Spline, Wireframe3d};
 use neat_detect::{DetectorConfig, edgel_maps};
+use neat_wireframe::ViewObservation;
 use neat_wireframe::assemble::{
     AssembleConfig, Assembled, Photographs, Witnesses, assemble_with_progress,
 };
-use neat_wireframe::confidence::{Confidence, ConfidenceConfig, assess};
-use neat_wireframe::faces::{
-    MeasuredGraph, Shell, completed, creases_of_solids, find_shells, surface_points,
-};
-use neat_wireframe::kinds::{EdgeKinds, WithoutPaint, edge_kinds, without_paint};
 use neat_wireframe::paper::NeatLine;
 use neat_wireframe::validity::WireframeFlaw;
-use neat_wireframe::{SignedDistance, ViewObservation};
 use std::cell::OnceCell;
 use std::ops::ControlFlow;
 
@@ -119,97 +114,6 @@ impl Draft {
             refined_cameras: built.refined_cameras,
         }
     }
-
-    /// Asks the images, and the surface that may hide things where one is given, how sure
-    /// everything is and what each edge is; what is hardly structure goes.
-    ///
-    /// # Errors
-    /// If an image lies in a file that cannot be read, or the wireframe is not valid.
-    pub fn assess(
-        self,
-        scene: &Scene,
-        min_segment_score: f64,
-        hiding: Option<&dyn SignedDistance>,
-        scene_radius: f64,
-        config: &ConfidenceConfig,
-    ) -> Result<Distilled, AssembleError> {
-        let refined_scene =
-            (self.refined_cameras).map(|cameras| scene.clone().with_cameras(&cameras));
-        // The images are asked from where they show the wireframe.
-        let scene = refined_scene.as_ref().unwrap_or(scene);
-        let views = ViewObservation::from_scene(scene, min_segment_score);
-        let assessed = |wireframe: &_| assess(wireframe, &views, hiding, scene_radius, config);
-        let mut confidence = assessed(&self.wireframe)?;
-        let kinds = edge_kinds(&self.wireframe, scene, &confidence.edges)?;
-        let WithoutPaint {
-            wireframe,
-            kinds,
-            painted,
-        } = without_paint(
-            &self.wireframe,
-            (&self.arcs, &self.splines),
-            &kinds,
-            self.min_structure,
-        );
-        let mut report = self.report;
-        if painted > 0 {
-            confidence = assessed(&wireframe)?;
-            report.leave_out(painted, &wireframe);
-        }
-        let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
-        let points = surface_points(&cameras, &scene.sparse_points);
-        let shells_of = |wireframe: &Wireframe3d, confidence: &Confidence| {
-            let junctions = confidence.junctions.iter();
-            let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
-            let graph = MeasuredGraph {
-                wireframe,
-                arcs: &self.arcs,
-                splines: &self.splines,
-                domes: &self.domes,
-                covariances: &covariances,
-            };
-            let shells = find_shells(&graph, &views, &points);
-            let completed = completed(&graph, &shells);
-            (shells, completed)
-        };
-        let (mut shells, completed) = shells_of(&wireframe, &confidence);
-        let mut inferred = vec![false; wireframe.edges.len()];
-        let (mut wireframe, mut kinds) = (wireframe, kinds);
-        if let Some(completed) = completed {
-            let whole = assessed(&completed.wireframe)?.of_completed(&completed, &confidence);
-            let (of_whole, _) = shells_of(&completed.wireframe, &whole);
-            // What was added is true as long as the solids are there.
-            if closed_faces(&of_whole) >= closed_faces(&shells) {
-                kinds = edge_kinds(&completed.wireframe, scene, &whole.edges)?;
-                inferred = completed.inferred().collect();
-                (wireframe, confidence, shells) = (completed.wireframe, whole, of_whole);
-                report.complete(&inferred, &wireframe);
-            }
-        }
-        // The light on them says less than two faces that meet.
-        for edge in creases_of_solids(&wireframe, &shells) {
-            kinds[edge] = EdgeKinds::CREASE;
-        }
-        Ok(Distilled {
-            wireframe,
-            arcs: self.arcs,
-            shells,
-            arc_covariances: self.arc_covariances,
-            splines: self.splines,
-            domes: self.domes,
-            confidence,
-            kinds,
-            inferred,
-            report,
-            refined_scene,
-        })
-    }
-}
-
-/// How many faces bound solids.
-fn closed_faces(shells: &[Shell]) -> usize {
-    let closed = shells.iter().filter(|shell| shell.closed);
-    closed.map(|shell| shell.faces.len()).sum()
 }
 
 /// The edgels of all images.

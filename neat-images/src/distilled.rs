@@ -71,7 +71,7 @@ impl BackEndReport {
     /// Counts what went once the kinds of edges were known, and what is left.
     pub(crate) fn leave_out(&mut self, painted: usize, left: &Wireframe3d) {
         if let Self::Assembler { steps } = self {
-            steps.painted = painted;
+            steps.painted += painted;
             (steps.junctions, steps.edges) = (left.junctions.len(), left.edges.len());
         }
     }

@@ -32,6 +32,7 @@
 #![forbid(unsafe_code)]
 
 pub mod assemble;
+mod assess;
 pub mod config;
 pub mod detection;
 pub mod distilled;

@@ -65,6 +65,55 @@ impl Ends {
     }
 }
 
+/// What the sides of a profile sweep.
+struct Sides {
+    /// The straight edges of the bottom.
+    edges: Vec<[usize; 2]>,
+    /// Those between bottom and top.
+    uprights: Vec<[usize; 2]>,
+    faces: Vec<PlanarFace>,
+    round_faces: Vec<RoundFace>,
+    /// As [`Frustum::surfaces`].
+    surfaces: Vec<usize>,
+}
+
+impl Sides {
+    fn new(profile: &Profile, ends: &Ends, junctions: &[Vector3<f64>]) -> Self {
+        let n = junctions.len() / 2;
+        let (mut edges, mut uprights) = (Vec::new(), Vec::new());
+        let (mut faces, mut round_faces) = (Vec::new(), Vec::new());
+        let (mut of_planes, mut of_rounds) = (Vec::new(), Vec::new());
+        let (mut first, mut surfaces) = (0, 0);
+        for sides in &profile.loops {
+            let surface_of = smooth_groups(sides);
+            for (i, side) in sides.iter().enumerate() {
+                let [a, b] = [first + i, first + (i + 1) % sides.len()];
+                if let Some(face) = ends.round_face(side) {
+                    round_faces.push(face);
+                    of_rounds.push(surfaces + surface_of[i]);
+                } else {
+                    edges.push([a, b]);
+                    faces.push(PlanarFace::polygon(vec![a, b, n + b, n + a], junctions));
+                    of_planes.push(surfaces + surface_of[i]);
+                }
+                if corners_of(sides) > 0 && !goes_on_smoothly(before(sides, i), side) {
+                    uprights.push([a, n + a]);
+                }
+            }
+            surfaces += surface_of.iter().max().map_or(0, |last| last + 1);
+            first += corners_of(sides);
+        }
+        of_planes.extend(of_rounds);
+        Self {
+            edges,
+            uprights,
+            faces,
+            round_faces,
+            surfaces: of_planes,
+        }
+    }
+}
+
 impl Frustum {
     /// The frustum over `profile` at z = -`half_height`, scaled by `top_scale` > 0 about the
     /// z axis at z = `half_height`, and then rotated into the world. Where the scale is not 1,
@@ -80,55 +129,28 @@ impl Frustum {
             heights: [-half_height, half_height],
             world_from_solid,
         };
-        // Of each loop the corners; a circle has none.
-        let corners: Vec<usize> = (profile.loops.iter())
-            .map(|sides| if sides.len() == 1 { 0 } else { sides.len() })
-            .collect();
-        let n: usize = corners.iter().sum();
-        let with_corners = || profile.loops.iter().filter(|sides| sides.len() > 1);
+        let n: usize = profile.loops.iter().map(|sides| corners_of(sides)).sum();
+        let with_corners = || profile.loops.iter().filter(|sides| corners_of(sides) > 0);
         let junctions: Vec<_> = (0..2)
             .flat_map(|end| with_corners().flatten().map(move |side| (end, side.start)))
             .map(|(end, start)| ends.point(end, &start))
             .collect();
-
-        let mut wireframe = Wireframe3d {
-            junctions,
-            edges: Vec::new(),
-        };
-        let mut uprights = Vec::new();
-        let (mut faces, mut round_faces) = (Vec::new(), Vec::new());
-        let (mut of_planes, mut of_rounds) = (Vec::new(), Vec::new());
-        let mut first = 0;
-        let mut surfaces = 0;
-        for (sides, count) in profile.loops.iter().zip(&corners) {
-            let surface_of = smooth_groups(sides);
-            for (i, side) in sides.iter().enumerate() {
-                let [a, b] = [first + i, first + (i + 1) % sides.len()];
-                if let Some(face) = ends.round_face(side) {
-                    round_faces.push(face);
-                    of_rounds.push(surfaces + surface_of[i]);
-                } else {
-                    wireframe.edges.push([a, b]);
-                    let corners = vec![a, b, n + b, n + a];
-                    faces.push(PlanarFace::polygon(corners, &wireframe.junctions));
-                    of_planes.push(surfaces + surface_of[i]);
-                }
-                if *count > 0 && !goes_on_smoothly(before(sides, i), side) {
-                    uprights.push([a, n + a]);
-                }
-            }
-            surfaces += surface_of.iter().max().map_or(0, |last| last + 1);
-            first += count;
-        }
-        let top = wireframe.edges.clone().into_iter();
-        wireframe.edges.extend(top.map(|[a, b]| [n + a, n + b]));
-        wireframe.edges.extend(uprights);
+        let sides = Sides::new(&profile, &ends, &junctions);
+        let Sides {
+            mut edges,
+            uprights,
+            mut faces,
+            round_faces,
+            surfaces,
+        } = sides;
+        let top: Vec<_> = edges.iter().map(|[a, b]| [n + a, n + b]).collect();
+        edges.extend(top.into_iter().chain(uprights));
         let arcs = (0..2)
             .flat_map(|end| profile.sides().map(move |side| (end, side)))
             .filter_map(|(end, side)| ends.rim(end, side))
             .collect();
         // Corners of holes are no part of the outline.
-        let around = corners[0];
+        let around = corners_of(&profile.loops[0]);
         for (end, outline) in [
             (0, (0..around).rev().collect()),
             (1, (n..n + around).collect()),
@@ -139,16 +161,15 @@ impl Frustum {
                 &world_from_solid,
                 end == 1,
                 outline,
-                &wireframe.junctions,
+                &junctions,
             ));
         }
-        of_planes.extend(of_rounds);
         Self {
             faces,
             round_faces,
-            wireframe,
+            wireframe: Wireframe3d { junctions, edges },
             arcs,
-            surfaces: of_planes,
+            surfaces,
             profile,
             half_height,
             top_scale,
@@ -243,6 +264,11 @@ impl Frustum {
             .collect();
         bounds_in_image(&hull, camera)
     }
+}
+
+/// How many corners a closed curve has; a circle has none.
+fn corners_of(sides: &[Side]) -> usize {
+    if sides.len() == 1 { 0 } else { sides.len() }
 }
 
 /// The side before another one.

@@ -28,14 +28,11 @@ use neat_eval::{
     CubicBezier, EdgeModel, EdgePoints, EdgeSampling, EvaluationInput, EvaluationOptions, NeatAbc,
 };
 use neat_eval::{Protocol, SceneTruth, Scores, SurfaceAndCreases, foreign};
-use neat_wireframe::assemble::{AssembleConfig, Assembled};
-use neat_wireframe::confidence::{ConfidenceConfig, assess};
+use neat_wireframe::assemble::AssembleConfig;
 use neat_wireframe::export::{WireframeDocument, write_json};
-use neat_wireframe::faces::{MeasuredGraph, completed, find_shells, surface_points};
-use neat_wireframe::kinds::{edge_kinds, without_paint};
 use neat_wireframe::metrics::{ImageEvidenceConfig, Matching, PrecisionRecall, image_evidence};
 use neat_wireframe::{ViewObservation, Wireframe3d};
-use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
+use prepared::{MIN_SEGMENT_SCORE, prepared, reconstructed};
 use probabilities::Probabilities;
 use std::env;
 use std::error::Error;
@@ -75,16 +72,15 @@ fn main() -> Result<()> {
             .step_by(usize::max(every, 1))
             .collect();
         let start = Instant::now();
-        let mut built = assembled(&scene)?;
-        if let Some(cameras) = &built.refined_cameras {
-            scene = scene.with_cameras(cameras);
-        }
         let least = if structure {
             0.5
         } else {
             AssembleConfig::default().min_structure
         };
-        built.wireframe = structure_of(&built, &scene, least)?;
+        let built = reconstructed(&scene, least)?;
+        if let Some(refined) = built.refined_scene.clone() {
+            scene = refined;
+        }
         let seconds = start.elapsed().as_secs_f64();
         let original = |p: &_| scene.original_from_world.apply(p);
         let wireframe = built.wireframe.map(original);
@@ -124,31 +120,6 @@ fn main() -> Result<()> {
         print!("{}", probabilities.table());
     }
     Ok(())
-}
-
-/// Without edges that are creases or boundaries with less than a probability, and with those that its
-/// solids add, as a run has it.
-fn structure_of(built: &Assembled, scene: &Scene, least: f64) -> Result<Wireframe3d> {
-    let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
-    let config = ConfidenceConfig::default();
-    let confidence = assess(&built.wireframe, &views, None, 1.0, &config)?;
-    let kinds = edge_kinds(&built.wireframe, scene, &confidence.edges)?;
-    let curves = (&built.arcs[..], &built.splines[..]);
-    let wireframe = without_paint(&built.wireframe, curves, &kinds, least).wireframe;
-    let junctions = assess(&wireframe, &views, None, 1.0, &config)?.junctions;
-    let covariances: Vec<_> = junctions.iter().map(|j| j.covariance).collect();
-    let graph = MeasuredGraph {
-        wireframe: &wireframe,
-        arcs: &built.arcs,
-        splines: &built.splines,
-        domes: &built.domes,
-        covariances: &covariances,
-    };
-    let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
-    let points = surface_points(&cameras, &scene.sparse_points);
-    let shells = find_shells(&graph, &views, &points);
-    let completed = completed(&graph, &shells).map(|completed| completed.wireframe);
-    Ok(completed.unwrap_or(wireframe))
 }
 
 /// How much of the length of what was found lies within 0.01 of true edges and curves, and how

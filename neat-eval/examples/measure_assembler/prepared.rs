@@ -2,13 +2,13 @@
 
 use crate::Result;
 use neat_core::{LoadOptions, Scene, hawp_json, load_scene};
-use neat_detect::{DetectorConfig, detect_views, edgel_maps};
+use neat_detect::{DetectorConfig, detect_views};
+use neat_images::assemble::assemble_images;
+use neat_images::distilled::Distilled;
 use neat_wireframe::ViewObservation;
-use neat_wireframe::assemble::{
-    AssembleConfig, Assembled, Photographs, Witnesses, assemble_with_progress,
-};
+use neat_wireframe::assemble::AssembleConfig;
+use neat_wireframe::confidence::ConfidenceConfig;
 use std::fs;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 /// As `neat reconstruct` has it.
@@ -47,24 +47,17 @@ pub fn prepared(dir: &Path, kept: Option<&Path>) -> Result<Scene> {
     Ok(scene.scaled(radius.recip()))
 }
 
-/// What `neat reconstruct` would assemble of it.
-pub fn assembled(scene: &Scene) -> Result<Assembled> {
+/// What `neat reconstruct` makes of it without a field, where edges go that are structure with less
+/// than this probability.
+pub fn reconstructed(scene: &Scene, min_structure: f64) -> Result<Distilled> {
     let views = ViewObservation::from_scene(scene, MIN_SEGMENT_SCORE);
-    let edgels = edgel_maps(&scene.views, &DetectorConfig::default(), scene.pixel_center)?;
-    let image_of = |view: usize| scene.views[view].image.read().ok();
-    let witnesses = Witnesses {
-        views: &views,
-        edgels: &edgels,
-        photographs: Some(Photographs {
-            image_of: &image_of,
-            pixel_center: scene.pixel_center,
-        }),
-        ..Witnesses::default()
+    let detector = DetectorConfig::default();
+    let config = AssembleConfig {
+        min_structure,
+        ..AssembleConfig::default()
     };
-    let config = AssembleConfig::default();
-    let go_on = &mut |_| ControlFlow::Continue(());
-    match assemble_with_progress(&witnesses, 1.0, &config, go_on) {
-        ControlFlow::Continue(assembled) => Ok(assembled),
-        ControlFlow::Break(()) => unreachable!("nobody breaks"),
-    }
+    let go_on = &mut |_| Ok(());
+    let draft = assemble_images(scene, &views, None, 1.0, &detector, &config, go_on)?;
+    let assessing = ConfidenceConfig::default();
+    Ok(draft.assess(scene, MIN_SEGMENT_SCORE, None, 1.0, &assessing)?)
 }

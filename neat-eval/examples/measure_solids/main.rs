@@ -24,12 +24,13 @@ use nalgebra::{Matrix3, Vector3};
 use neat_core::{Camera, CircularArc, Dome, Scene, Spline, Wireframe3d};
 use neat_eval::{CadFaces, FaceShares, FoundFace, SceneFaceScores, SceneFaces, SceneTruth};
 use neat_wireframe::ViewObservation;
+use neat_wireframe::assemble::AssembleConfig;
 use neat_wireframe::confidence::{ConfidenceConfig, assess, transformed_covariance};
 use neat_wireframe::export::{WireframeDocument, read_json, write_json};
 use neat_wireframe::faces::{
     MeasuredGraph, Shell, ShellGeometry, SurfacePoint, find_shells, surface_points,
 };
-use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
+use prepared::{MIN_SEGMENT_SCORE, prepared};
 use std::env;
 use std::error::Error;
 use std::fs;
@@ -137,9 +138,9 @@ fn reconstructed(dir: &Path, name: &str, kept: Option<&Path>) -> Result<Option<I
             (wireframe, document.arcs, document.splines, document.domes)
         }
         None => {
-            let built = assembled(&scene)?;
-            if let Some(cameras) = &built.refined_cameras {
-                scene = scene.with_cameras(cameras);
+            let built = prepared::reconstructed(&scene, AssembleConfig::default().min_structure)?;
+            if let Some(refined) = built.refined_scene {
+                scene = refined;
             }
             let arcs = built
                 .arcs

@@ -37,9 +37,8 @@ struct Joint {
 pub(super) fn join_tangents(images: &Images, lines: &mut [ChosenLine], arcs: &mut [FoundArc]) {
     let joints: Vec<Vec<Joint>> = (lines.par_iter())
         .map(|chosen| {
-            let joint = |(index, found): (usize, &FoundArc)| {
-                tangency(images, &chosen.line, found, index)
-            };
+            let joint =
+                |(index, found): (usize, &FoundArc)| tangency(images, &chosen.line, found, index);
             arcs.iter().enumerate().filter_map(joint).collect()
         })
         .collect();
@@ -115,12 +114,7 @@ fn touch(line: &LineSegment3, arc: &CircularArc, gap: f64) -> Option<Touch> {
 }
 
 /// The tangency of a line with an end of an arc.
-fn tangency(
-    images: &Images,
-    line: &LineSegment3,
-    found: &FoundArc,
-    index: usize,
-) -> Option<Joint> {
+fn tangency(images: &Images, line: &LineSegment3, found: &FoundArc, index: usize) -> Option<Joint> {
     let arc = &found.arc;
     let gap = MAX_GAP * images.reach * found.pixel;
     let Touch {
@@ -142,7 +136,12 @@ fn tangency(
     let into = arc.tangent_at(arc.angle_of(&point)) * [1.0, -1.0][arc_end];
     let distance = if by.abs() <= within {
         distance.max(by.abs())
-    } else if hardly_goes_on(images, found, arc_end, [-by, within].map(|by| by / arc.radius)) {
+    } else if hardly_goes_on(
+        images,
+        found,
+        arc_end,
+        [-by, within].map(|by| by / arc.radius),
+    ) {
         distance
     } else {
         return None;

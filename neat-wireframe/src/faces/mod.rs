@@ -51,6 +51,7 @@ mod face;
 mod free_faces;
 mod geometry;
 mod groups;
+mod loose_lines;
 mod min_cut;
 mod outlines;
 mod patch;
@@ -88,6 +89,7 @@ pub use completion::{Completed, completed, creases_of_solids};
 pub use curves::MeasuredGraph;
 pub(crate) use curves::{ends_of_arc, ends_of_spline, nearest_junctions};
 pub use face::{CurveIndex, Face, Shell, Step};
+pub use loose_lines::{closed_faces, loose_lines_on_solids};
 pub(crate) use triangulation::{points_within, triangles};
 
 pub(crate) use cap::Cap;

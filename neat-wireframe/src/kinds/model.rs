@@ -86,6 +86,13 @@ impl EdgeKinds {
         texture: 0.0,
         shadow: 0.0,
     };
+    /// Of a line on a face that is known to have no edge there.
+    pub const TEXTURE: Self = Self {
+        crease: 0.0,
+        boundary: 0.0,
+        texture: 1.0,
+        shadow: 0.0,
+    };
 
     /// Probability that the edge belongs to the shape of things: a crease or a boundary.
     pub fn structure(&self) -> f64 {
