@@ -35,11 +35,9 @@ use neat_core::synthetic::{Solid, SyntheticScene, generate};
 use neat_core::{CircularArc, Scene, Wireframe3d};
 use neat_detect::{DetectorConfig, detect_views};
 use neat_eval::{NeatAbc, SceneTruth, SurfaceAndCreases, TrueFace, foreign};
-use neat_wireframe::ViewObservation;
-use neat_wireframe::confidence::{ConfidenceConfig, assess, fill_arcs};
+use neat_wireframe::assemble::AssembleConfig;
 use neat_wireframe::export::WireframeDocument;
-use neat_wireframe::faces::{MeasuredGraph, find_shells, surface_points};
-use prepared::{MIN_SEGMENT_SCORE, assembled, prepared};
+use prepared::{prepared, reconstructed};
 use radii::Radii;
 use serde::Deserialize;
 use std::env;
@@ -78,7 +76,7 @@ fn main() -> Result<()> {
             true => name,
             false => folder.to_string_lossy(),
         };
-        let document = documented(scene)?;
+        let document = documented(&scene)?;
         coverage.add(&kind, &document, &truth.wireframe, truth.tolerance)?;
         radii.add(&kind, &document, &truth.arcs, truth.tolerance)?;
         areas.add(&kind, &document, &truth.faces)?;
@@ -93,9 +91,14 @@ fn main() -> Result<()> {
         let mut data = generate(&config)?;
         detect_views(&mut data.scene, &DetectorConfig::default())?;
         let tolerance = NeatAbc::default().thresholds[0];
-        let document = documented(data.scene)?;
+        let document = documented(&data.scene)?;
         coverage.add("solids", &document, &data.truth, tolerance)?;
-        areas.add("solids", &document, &faces_of_solids(&data.truth, &[]))?;
+        radii.add("solids", &document, data.solid.arcs(), tolerance)?;
+        areas.add(
+            "solids",
+            &document,
+            &faces_of_solids(&data.truth, data.solid.arcs()),
+        )?;
     }
     print!("{}{}{}", coverage.table(), radii.table(), areas.table());
     Ok(())
@@ -170,38 +173,7 @@ fn true_arcs(path: &Path) -> Result<Vec<CircularArc>> {
 }
 
 /// As a run would write it.
-fn documented(mut scene: Scene) -> Result<WireframeDocument> {
-    let built = assembled(&scene)?;
-    if let Some(cameras) = &built.refined_cameras {
-        scene = scene.with_cameras(cameras);
-    }
-    let views = ViewObservation::from_scene(&scene, MIN_SEGMENT_SCORE);
-    let config = ConfidenceConfig::default();
-    let confidence = assess(&built.wireframe, &views, None, 1.0, &config)?;
-    let original = |p: &_| scene.original_from_world.apply(p);
-    let mut document = WireframeDocument::from(&built.wireframe.map(original));
-    let names: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
-    confidence.fill(&mut document, &names, &scene.original_from_world);
-    fill_arcs(
-        &mut document,
-        &built.arcs,
-        &built.arc_covariances,
-        &scene.original_from_world,
-    );
-    document.splines = built.splines.iter().map(|s| s.map(original)).collect();
-    document.domes = built.domes.iter().map(|d| d.map(original)).collect();
-    let junctions = confidence.junctions.iter();
-    let covariances: Vec<_> = junctions.map(|junction| junction.covariance).collect();
-    let world = MeasuredGraph {
-        arcs: &built.arcs,
-        splines: &built.splines,
-        domes: &built.domes,
-        covariances: &covariances,
-        ..MeasuredGraph::of(&built.wireframe)
-    };
-    let cameras: Vec<_> = views.iter().map(|view| view.camera).collect();
-    let points = surface_points(&cameras, &scene.sparse_points);
-    let shells = find_shells(&world, &views, &points);
-    document.shells = shells.iter().map(|shell| shell.map(original)).collect();
-    Ok(document)
+fn documented(scene: &Scene) -> Result<WireframeDocument> {
+    let least = AssembleConfig::default().min_structure;
+    Ok(reconstructed(scene, least)?.document(scene))
 }
