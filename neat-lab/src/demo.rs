@@ -6,10 +6,11 @@ use neat_core::SceneError;
 use neat_core::ground_truth::{GroundTruth, write_ground_truth};
 use neat_core::layout::abc;
 use neat_core::synthetic::{SyntheticScene, generate_on_demand};
-use neat_eval::{EvaluationReport, NeatAbc, Scores};
+use neat_eval::{CadFaces, EvaluationReport, FoundFace, NeatAbc, Scores, TrueFace};
 use neat_pipeline::event::{Event, OnEvent, Stage, timed};
 use neat_pipeline::reconstruct::{Reconstruction, RunOptions, reconstruct};
 use neat_pipeline::run_dir::{Existing, RunDir};
+use neat_wireframe::export::read_json;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -78,9 +79,8 @@ pub fn demo(
     })?;
     let reconstruction = reconstruct(&options, cancelled, on_event)?;
     let evaluation = timed(on_event, Stage::Evaluate, |_| {
-        let scores =
-            NeatAbc::default().evaluate(&reconstruction.wireframe, None, &truth.wireframe)?;
-        Ok::<_, LabError>(EvaluationReport::new(Scores::NeatAbc(scores)))
+        let scores = scores(&reconstruction, &options.scene, &truth)?;
+        Ok::<_, LabError>(EvaluationReport::new(scores))
     })?;
     evaluation.write_json(&evaluation_file)?;
     on_event(Event::FileWritten(evaluation_file.clone()));
@@ -89,6 +89,25 @@ pub fn demo(
         evaluation,
         evaluation_file,
     })
+}
+
+/// Edges by NEAT's own protocol, or where some are curves, of which that knows nothing, the faces.
+fn scores(
+    reconstruction: &Reconstruction,
+    scene: &Path,
+    truth: &GroundTruth,
+) -> Result<Scores, LabError> {
+    if truth.curves.is_empty() {
+        let found = &reconstruction.wireframe;
+        let scores = NeatAbc::default().evaluate(found, None, &truth.wireframe)?;
+        return Ok(Scores::NeatAbc(scores));
+    }
+    let document = read_json(&reconstruction.run.wireframe("json"))?;
+    let found = FoundFace::of_document(&document);
+    let faces = TrueFace::read(&scene.join(GROUND_TRUTH))?;
+    Ok(Scores::CadFaces(
+        CadFaces::default().evaluate(&found, &faces)?,
+    ))
 }
 
 /// Removes the scene of an earlier demonstration in `out`.

@@ -14,7 +14,8 @@ use std::path::PathBuf;
 
 /// Make a synthetic scene, reconstruct it, and measure the result, in one go
 ///
-/// OUT then holds scene/, run/ (see `neat reconstruct`) and evaluation.json.
+/// OUT then holds scene/, run/ (see `neat reconstruct`) and evaluation.json: the edges by
+/// NEAT's protocol, or the faces of a solid with arcs.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:

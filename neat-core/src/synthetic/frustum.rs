@@ -201,6 +201,13 @@ impl Frustum {
         &self.arcs
     }
 
+    /// The volume.
+    pub fn volume(&self) -> f64 {
+        let scale = self.top_scale;
+        let mean_area = self.profile.area() * (1.0 + scale + scale * scale) / 3.0;
+        mean_area * 2.0 * self.half_height
+    }
+
     /// For each straight side, then each round one, the surface of which it is a part, counted from 0:
     /// sides that go on in each other without an edge are one.
     pub(super) fn surfaces(&self) -> &[usize] {
@@ -389,6 +396,10 @@ mod tests {
             let area =
                 |solid: &Frustum| solid.true_faces().iter().map(|face| face.area).sum::<f64>();
             assert!((area(&solid) / area(&flat) - 1.0).abs() < 1e-4, "{name}");
+            assert!(
+                (solid.volume() / flat.volume() - 1.0).abs() < 1e-3,
+                "{name}"
+            );
             // Every sharp edge is beside two faces.
             let mut beside = vec![0; solid.wireframe().edges.len() + solid.arcs().len()];
             for face in solid.true_faces() {

@@ -5,7 +5,7 @@
 //! its edgels: it is the foot of the centre on the line. Across an arc, an edge that meets nothing
 //! else ends on it.
 
-use super::circle_fitting::FoundArc;
+use super::circle_fitting::{FoundArc, SECTOR_IN_PIXELS};
 use super::corners::{Corners, MAX_GAP, WINDOW_IN_PIXELS};
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
@@ -163,7 +163,9 @@ fn hardly_goes_on(images: &Images, found: &FoundArc, end: usize, [last, beside]:
         0 => ([from, from + last - beside], [from + last, to]),
         _ => ([to - last + beside, to], [from, to - last]),
     };
-    if last <= beside || before[1] <= before[0] {
+    // What images say of a part of an arc they say by sectors.
+    let is_small = found.arc.radius < SECTOR_IN_PIXELS * found.pixel;
+    if is_small || last <= beside || before[1] <= before[0] {
         return false;
     }
     let rate = |angles: [f64; 2]| {
@@ -310,6 +312,33 @@ mod tests {
             let (found, arc) = joined(&other);
             assert_eq!(found, other);
             assert!((arc.angles[0] - as_it_was).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn an_arc_ends_where_a_line_touches_it_if_images_hardly_show_it_beyond() {
+        let late = -1.2;
+        for shown_from in [0.0, late] {
+            let edge = line([0.3, -0.4, 0.1], [0.3, 0.0, 0.1]);
+            let mut arc = quarter();
+            arc.arc.angles[0] = shown_from;
+            let mut points = edge.ends().to_vec();
+            points.extend(arc.arc.points(0.05));
+            let edges: Vec<[usize; 2]> = std::iter::once([0, 1])
+                .chain((3..points.len()).map(|k| [k - 1, k]))
+                .collect();
+            let views = TestViews::of_edges(&cameras_on_sphere(20), &points, &edges);
+            let images = views.images();
+            let (mut lines, mut arcs) = ([chosen(&images, &edge)], [quarter()]);
+            lines[0].line.end.y = 0.02;
+            arcs[0].arc.angles[0] = late;
+            join_tangents(&images, &mut lines, &mut arcs);
+            let ended = [lines[0].line.end.y, arcs[0].arc.angles[0]];
+            if shown_from == late {
+                assert_eq!(ended, [0.02, late]);
+            } else {
+                assert!(ended.iter().all(|off| off.abs() < 1e-9), "{ended:?}");
+            }
         }
     }
 
