@@ -88,8 +88,13 @@ fn evaluations() {
             },
             Case {
                 kind: "a true wireframe without faces",
-                spoil: |_| (),
-                command: "eval --pred scene/gt_wireframe.json --gt scene/gt_wireframe.json --protocol cad-faces",
+                spoil: |scene| {
+                    wireframe(
+                        scene,
+                        "{\"junctions\": [[0, 0, 0], [1, 0, 0]], \"lines\": [[0, 1]]}",
+                    );
+                },
+                command: "eval --pred scene/gt_wireframe.json --gt bad.json --protocol cad-faces",
                 names: &["cad-faces", "faces"],
             },
             Case {
