@@ -137,11 +137,13 @@ fn the_same_image_gives_the_same_on_any_number_of_threads() {
 
 #[test]
 fn nearly_all_junctions_of_synthetic_solids_are_found() {
+    // Which share is found hangs on the views, in some of which edges meet almost straight:
+    // 94.7 % in four of each solid, 97.3 % in 24, 95.5 % in 60.
     let (mut found, mut all) = (0u32, 0u32);
     for solid in Solid::POLYHEDRA {
         let data = generate(&SyntheticScene {
             solid,
-            views: 4,
+            views: 40,
             ..SyntheticScene::default()
         })
         .unwrap();

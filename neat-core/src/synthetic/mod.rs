@@ -1,7 +1,7 @@
 //! Synthetic scenes with exact truth: CAD-like solids, their images and what a
 //! detector would see in them.
 //!
-//! Every solid is a [`Frustum`], a polygon swept upwards, so that its signed
+//! Every solid is a [`Frustum`], a profile of lines and arcs swept upwards, so that its signed
 //! distance, its faces and its wireframe are exact. [`generate`] places cameras
 //! around it, ray traces the images, cuts every edge into its visible parts and
 //! imitates a wireframe detector (noise, misses, false segments). The same
