@@ -28,6 +28,7 @@ def main():
         "second": shapes.SECOND,
         "round": shapes.ROUND,
         "third": shapes.THIRD,
+        "fourth": shapes.FOURTH,
     }
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=pathlib.Path, help="folder for the scenes")

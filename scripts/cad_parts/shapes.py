@@ -2,7 +2,7 @@
 
 `FIRST` are those on which the assembler was worked on, `SECOND` were looked at only once it was
 done, `ROUND` have parts of spheres, and what looks like such, `THIRD` pockets, sockets, slots and
-ribs. Lengths are in mm; a scene scales its part to unit size.
+ribs, `FOURTH` rounded pockets, keyways and chamfered turned parts. Lengths are in mm; a scene scales its part to unit size.
 """
 
 import math
@@ -699,6 +699,100 @@ def block():
     return p
 
 
+def bushing():
+    with BuildPart() as p:
+        Cylinder(16, 6, align=(Align.CENTER, Align.CENTER, Align.MIN))
+        Cylinder(11, 34, align=(Align.CENTER, Align.CENTER, Align.MIN))
+        chamfer(p.edges().filter_by(GeomType.CIRCLE).sort_by(Axis.Z)[-1:], 2.5)
+        Hole(6)
+        with Locations((0, 0, 24)):
+            Box(5, 40, 20, mode=Mode.SUBTRACT, align=(Align.CENTER, Align.CENTER, Align.MIN))
+    return p
+
+
+def sunk():
+    with BuildPart() as p:
+        Box(70, 44, 9)
+        fillet(p.edges().filter_by(Axis.Z), 7)
+        with Locations((0, 0, 4.5)):
+            with GridLocations(48, 24, 2, 2):
+                CounterSinkHole(2.5, 5.5)
+    return p
+
+
+def keyshaft():
+    with BuildPart() as p:
+        Cylinder(9, 70)
+        chamfer(p.edges().filter_by(GeomType.CIRCLE), 1.5)
+        with BuildSketch(Plane.XZ.offset(-9)):
+            with Locations((0, 8)):
+                SlotOverall(26, 6, rotation=90)
+        extrude(amount=4, mode=Mode.SUBTRACT)
+    return p
+
+
+def case():
+    with BuildPart() as p:
+        Box(64, 42, 18)
+        fillet(p.edges().filter_by(Axis.Z), 9)
+        with BuildSketch(p.faces().sort_by(Axis.Z)[-1]):
+            RectangleRounded(58, 36, 6)
+        extrude(amount=-15, mode=Mode.SUBTRACT)
+        with Locations((32, 0, 3)):
+            Box(10, 12, 6, mode=Mode.SUBTRACT)
+    return p
+
+
+def link():
+    with BuildPart() as p:
+        with BuildSketch():
+            SlotOverall(80, 24)
+            with Locations((-28, 0), (28, 0)):
+                Circle(6, mode=Mode.SUBTRACT)
+            RectangleRounded(30, 12, 4, mode=Mode.SUBTRACT)
+        extrude(amount=7)
+    return p
+
+
+def collar():
+    with BuildPart() as p:
+        Cylinder(20, 16)
+        Hole(11)
+        with Locations((15, 0, 0)):
+            Box(14, 3, 20, mode=Mode.SUBTRACT)
+        with Locations((-24, 0, 0)):
+            Box(12, 40, 20, mode=Mode.SUBTRACT)
+    return p
+
+
+def drawer():
+    with BuildPart() as p:
+        Box(76, 48, 22)
+        with BuildSketch(p.faces().sort_by(Axis.Z)[-1]):
+            with Locations((-19, 0), (17, 0)):
+                RectangleRounded(32, 40, 5)
+        extrude(amount=-18, mode=Mode.SUBTRACT)
+        with Locations((0, -24, 11)):
+            Box(20, 6, 8, mode=Mode.SUBTRACT)
+    return p
+
+
+def spindle():
+    with BuildPart() as p:
+        with BuildSketch(Plane.XZ):
+            with BuildLine():
+                Polyline(
+                    (0, 0), (8, 0), (10, 2), (10, 22), (16, 28), (16, 36), (7, 36), (7, 58),
+                    (4, 61), (0, 61),
+                    close=True,
+                )
+            make_face()
+        revolve(axis=Axis.Z)
+        with Locations((0, 10, 12)):
+            Box(30, 6, 8, mode=Mode.SUBTRACT)
+    return p
+
+
 FIRST = [
     bracket,
     flange,
@@ -759,4 +853,14 @@ THIRD = [
     ribs,
     cover,
     block,
+]
+FOURTH = [
+    bushing,
+    sunk,
+    keyshaft,
+    case,
+    link,
+    collar,
+    drawer,
+    spindle,
 ]

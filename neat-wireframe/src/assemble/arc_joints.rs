@@ -33,8 +33,14 @@ struct Joint {
     point: Vector3<f64>,
 }
 
-/// Moves the ends of lines and arcs that run into each other to where they touch.
-pub(super) fn join_tangents(images: &Images, lines: &mut [ChosenLine], arcs: &mut [FoundArc]) {
+/// Moves the ends of lines and arcs that run into each other to where they touch; returns which ends
+/// of the lines these are.
+pub(super) fn join_tangents(
+    images: &Images,
+    lines: &mut [ChosenLine],
+    arcs: &mut [FoundArc],
+) -> Vec<[bool; 2]> {
+    let mut joined = vec![[false; 2]; lines.len()];
     let joints: Vec<Vec<Joint>> = (lines.par_iter())
         .map(|chosen| {
             let joint =
@@ -42,11 +48,12 @@ pub(super) fn join_tangents(images: &Images, lines: &mut [ChosenLine], arcs: &mu
             arcs.iter().enumerate().filter_map(joint).collect()
         })
         .collect();
-    for (chosen, joints) in lines.iter_mut().zip(joints) {
+    for ((chosen, joints), joined) in lines.iter_mut().zip(joints).zip(&mut joined) {
         for end in 0..2 {
             let nearest = (joints.iter().filter(|joint| joint.line_end == end))
                 .min_by(|a, b| a.distance.total_cmp(&b.distance));
             let Some(joint) = nearest else { continue };
+            joined[end] = true;
             match end {
                 0 => chosen.line.start = joint.point,
                 _ => chosen.line.end = joint.point,
@@ -56,6 +63,7 @@ pub(super) fn join_tangents(images: &Images, lines: &mut [ChosenLine], arcs: &mu
             arc.angles[joint.arc_end] += wrapped(arc.angle_of(&joint.point) - angle);
         }
     }
+    joined
 }
 
 /// The end of a line at which it touches the circle of an arc.
@@ -100,14 +108,14 @@ fn touch(line: &LineSegment3, arc: &CircularArc, gap: f64) -> Option<Touch> {
     let point = line.point_at(place);
     let length = line.length();
     // The circle's plane holds the line, as far as both go beside each other.
-    let beside = length.min(arc.radius);
+    let beside = (2.0 * arc.radius * gap).sqrt();
     let out_of_plane = (line.end - line.start).dot(&arc.normal()).abs() / length * beside;
     let line_end = usize::from(place > 0.5);
     let touch = Touch {
         point,
         line_end,
         distance: (point - line.ends()[line_end]).norm(),
-        within: WITHIN * (2.0 * arc.radius * gap).sqrt(),
+        within: WITHIN * beside,
     };
     (arc.distance_to_circle(&point).max(out_of_plane) <= gap && touch.within < length)
         .then_some(touch)
@@ -347,7 +355,7 @@ mod tests {
         let ends_at = |edge: LineSegment3, late: f64| {
             let views = TestViews::of_edges(&cameras_on_sphere(20), &edge.ends(), &[[0, 1]]);
             let images = views.images();
-            let mut corners = find_corners(&images, &[chosen(&images, &edge)], &[]);
+            let mut corners = find_corners(&images, &[chosen(&images, &edge)], (&[], &[]));
             let mut arcs = [quarter()];
             arcs[0].arc.angles[0] += late;
             end_on_arcs(&images, &mut corners, &mut arcs);
@@ -380,7 +388,7 @@ mod tests {
         let views = TestViews::of_edges(&cameras_on_sphere(20), &shown, &[[0, 1]]);
         let images = views.images();
         let end_of = |mut arcs: Vec<FoundArc>| {
-            let mut corners = find_corners(&images, &[chosen(&images, &edge)], &[]);
+            let mut corners = find_corners(&images, &[chosen(&images, &edge)], (&[], &[]));
             corners.windows[0] = 0.2;
             end_on_arcs(&images, &mut corners, &mut arcs);
             corners.edge(0).end
@@ -396,7 +404,7 @@ mod tests {
         let end_of = |shown: &LineSegment3| {
             let views = TestViews::of_edges(&cameras_on_sphere(20), &shown.ends(), &[[0, 1]]);
             let images = views.images();
-            let mut corners = find_corners(&images, &[chosen(&images, &edge)], &[]);
+            let mut corners = find_corners(&images, &[chosen(&images, &edge)], (&[], &[]));
             corners.windows[0] = 0.2;
             end_on_arcs(&images, &mut corners, &mut [quarter()]);
             corners.edge(0).end
@@ -414,12 +422,14 @@ mod tests {
             line([0.03, -0.4, 0.1], [0.03, 0.0, 0.1]),
             line([0.0, 0.03, 0.1], [-0.4, 0.03, 0.1]),
         ];
-        let ends = lines.map(|line| line.ends()).concat();
-        let views = TestViews::of_edges(&cameras_on_sphere(20), &ends, &[[0, 1], [2, 3]]);
+        // Images show the ways to the corner.
+        let [one, other] = lines.map(|line| line.ends());
+        let shown = [one[0], Vector3::new(0.03, 0.03, 0.1), other[1]];
+        let views = TestViews::of_edges(&cameras_on_sphere(20), &shown, &[[0, 1], [1, 2]]);
         let images = views.images();
         let chosen = lines.map(|line| chosen(&images, &line));
         let junctions = |arc: Option<FoundArc>| {
-            let corners = find_corners(&images, &chosen, arc.as_slice());
+            let corners = find_corners(&images, &chosen, (arc.as_slice(), &[]));
             corners.junctions.len()
         };
         assert_eq!(junctions(None), 3);

@@ -3,12 +3,13 @@
 //! rims of a cylinder or a cone tell where it is, which few views of an outline do not.
 
 use super::circle_fitting::FoundArc;
+use super::corners::WINDOW_IN_PIXELS;
 use super::domes::FoundDome;
 use super::edge_samples::Images;
 use super::known_tubes::GAP;
 use super::line_fitting::directions_across;
 use super::outlines::Tube;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use neat_core::{CircularArc, LineSegment3};
 
 /// Axes of two arcs are one within so many pixels, at both arcs, judged: as far as the axis of a
@@ -36,13 +37,58 @@ impl KnownArcs {
         }
     }
 
+    /// Takes the edgels beside the outlines of the tubes, which no edge goes on along.
+    pub(super) fn claim_outlines(&self, images: &Images, taken: &mut [Vec<bool>]) {
+        for tube in &self.tubes {
+            for outward in [tube.outward, -tube.outward] {
+                images.claim_outlines(&Tube { outward, ..*tube }, taken);
+            }
+        }
+    }
+
     /// Whether a line along arcs, tubes or domes is nothing else: as soon as these have their edgels,
     /// not more than `least` speaks for it.
     pub(super) fn explain(&self, images: &Images, line: &LineSegment3, least: f64) -> bool {
+        (self.edgels_beside(images, line))
+            .is_some_and(|taken| images.evidence(line, Some(&taken), least).gain <= least)
+    }
+
+    /// What of a line is something else; `None` if nothing is. An edge on a cylinder is shown beyond
+    /// its end, too, by views whose outline is there.
+    pub(super) fn left_of(
+        &self,
+        images: &Images,
+        line: &LineSegment3,
+        least: f64,
+    ) -> Option<LineSegment3> {
+        let Some(taken) = self.edgels_beside(images, line) else {
+            return Some(*line);
+        };
+        let taken = Some(&taken[..]);
+        let evidence = images.evidence(line, taken, least);
+        if evidence.gain <= least {
+            return None;
+        }
+        let shown = (images.extent(line, &evidence.showing, taken)).unwrap_or(*line);
+        let ends = shown.ends().map(|end| line.line_parameter(&end));
+        let part = |low: f64, high: f64| LineSegment3::new(line.point_at(low), line.point_at(high));
+        let is_none = |low: f64, high: f64| {
+            let rest = part(low, high);
+            images.projected_length(&rest, evidence.views()) > WINDOW_IN_PIXELS
+                && images.evidence(&rest, taken, least).gain <= least
+        };
+        Some(part(
+            if is_none(0.0, ends[0]) { ends[0] } else { 0.0 },
+            if is_none(ends[1], 1.0) { ends[1] } else { 1.0 },
+        ))
+    }
+
+    /// The edgels of what a line runs along; `None` if that is nothing.
+    fn edgels_beside(&self, images: &Images, line: &LineSegment3) -> Option<Vec<Vec<bool>>> {
         let gap = GAP * images.reach * images.pixel_size(line, 0..images.views.len());
         let touched = (self.tubes.iter()).filter_map(|tube| tube.touched_by(line, gap));
         let touched: Vec<Tube> = touched.collect();
-        let is_chord = |found: &&FoundArc| {
+        let is_chord = |found: &FoundArc| {
             let near = NEAR_IN_PIXELS * found.pixel;
             let mut points = [0.1, 0.5, 0.9]
                 .map(|place| line.point_at(place))
@@ -53,12 +99,19 @@ impl KnownArcs {
                     && found.arc.contains(angle, near / found.arc.radius)
             })
         };
-        let along: Vec<&FoundArc> = self.arcs.iter().filter(is_chord).collect();
+        // From the side an arc is straight, and so is all else in its plane.
+        let is_in_plane = |found: &FoundArc| {
+            let beside = |end: &Vector3<f64>| (end - found.arc.center).dot(&found.arc.normal());
+            (line.ends().iter()).all(|end| beside(end).abs() < NEAR_IN_PIXELS * found.pixel)
+        };
+        let along: Vec<&FoundArc> = (self.arcs.iter())
+            .filter(|found| is_chord(found) || is_in_plane(found))
+            .collect();
         let domes: Vec<&FoundDome> = (self.domes.iter())
             .filter(|found| found.is_touched_by(line))
             .collect();
         if touched.is_empty() && along.is_empty() && domes.is_empty() {
-            return false;
+            return None;
         }
         let mut taken = images.nothing_taken();
         for tube in &touched {
@@ -71,7 +124,7 @@ impl KnownArcs {
         for found in along {
             beside.claim_arc(found, &mut taken);
         }
-        images.evidence(line, Some(&taken), least).gain <= least
+        Some(taken)
     }
 }
 
@@ -97,16 +150,14 @@ fn tube_between(one: &CircularArc, other: &CircularArc, pixel: f64) -> Option<Tu
     if length < MIN_LENGTH_IN_PIXELS * pixel || !(is_coaxial(one) && is_coaxial(other)) {
         return None;
     }
-    let outward: Vector3<f64> = one.axes[0];
-    let [start, end] = [one, other].map(|arc| arc.center + arc.radius * outward);
-    let line = LineSegment3::new(start, end);
-    let across = directions_across(&line)?;
-    let axis = [one, other].map(|arc| -arc.radius * across.tr_mul(&outward));
+    let axis = LineSegment3::new(one.center, other.center);
     Some(Tube {
-        axis,
+        line: axis,
+        across: directions_across(&axis)?,
+        outward: Vector2::x(),
+        axis: [Vector2::zeros(); 2],
         radius: 0.5 * (one.radius + other.radius),
         taper: 0.5 * (other.radius - one.radius),
-        ..Tube::touching(&line, across, -axis[0])
     })
 }
 
@@ -114,8 +165,9 @@ fn tube_between(one: &CircularArc, other: &CircularArc, pixel: f64) -> Option<Tu
 mod tests {
     use super::*;
     use crate::assemble::circle_fitting::tests::{arc, found, views_of_arcs};
-    use crate::assemble::outlines::tests::{generator, views_of_cone};
-    use crate::assemble::test_views::{TestViews, cube_edge};
+    use crate::assemble::outlines::tests::{generator, views_of_cone, views_of_cone_with};
+    use crate::assemble::test_views::{TestViews, cube_edge, end_distance};
+    use crate::test_scenes::cameras_on_sphere;
     use std::f64::consts::TAU;
 
     /// A rim around the z axis.
@@ -148,7 +200,8 @@ mod tests {
 
     #[test]
     fn outlines_between_rims_are_explained_and_edges_are_not() {
-        for radii in [[0.15, 0.15], [0.1, 0.3]] {
+        // The last one is a chamfer.
+        for radii in [[0.15, 0.15], [0.1, 0.3], [0.02, 0.6]] {
             let views = views_of_cone(radii);
             let images = views.images();
             let line = generator(radii, [0.6, 0.8]);
@@ -161,15 +214,45 @@ mod tests {
             assert!(KnownArcs::new(&rims, &[]).explain(&images, &line, 3.0));
             assert!(!KnownArcs::new(&rims[..1], &[]).explain(&images, &line, 3.0));
         }
-        // An edge of a cube, on the cylinder around it.
+        // The edges of a cube, on the cylinder around it or in the plane of its rims.
         let cube = TestViews::of_cube(60);
-        let upright = (0..12).map(cube_edge);
-        let upright = upright.filter(|edge| edge.start.xy() == edge.end.xy());
         let radius = 0.5_f64.sqrt();
         let known = KnownArcs::new(&[-0.5, 0.5].map(|z| rim(radius, z, [0.0, TAU])), &[]);
-        for edge in upright {
+        for edge in (0..12).map(cube_edge) {
             assert!(!known.explain(&cube.images(), &edge, 3.0));
         }
+    }
+
+    #[test]
+    fn an_edge_on_a_cylinder_ends_before_its_outlines_do() {
+        let radii = [0.15, 0.15];
+        let whole = generator(radii, [0.6, 0.8]);
+        let edge = LineSegment3::new(whole.start, whole.point_at(0.75));
+        let views = views_of_cone_with(radii, Some(edge));
+        let images = views.images();
+        let rims = [whole.start.z, whole.end.z].map(|z| rim(0.15, z, [0.0, TAU]));
+        let left = |rims: &[FoundArc], line: &LineSegment3| {
+            KnownArcs::new(rims, &[]).left_of(&images, line, 3.0)
+        };
+        let found = left(&rims, &whole).unwrap();
+        assert!(end_distance(&found, &edge) < 0.02, "{found:?}");
+        assert_eq!(left(&[], &whole), Some(whole));
+        assert_eq!(left(&rims, &generator(radii, [-0.6, 0.8])), None);
+    }
+
+    #[test]
+    fn what_lies_in_the_plane_of_an_arc_is_one_with_it_from_the_side() {
+        let circle = rim(0.3, 0.0, [0.0, TAU]);
+        let points = circle.arc.points(TAU / 120.0);
+        let edges: Vec<[usize; 2]> = (1..points.len()).map(|k| [k - 1, k]).collect();
+        let mut cameras = cameras_on_sphere(400);
+        cameras.retain(|camera| camera.center_in_world.z.abs() < 0.1);
+        let views = TestViews::of_edges(&cameras, &points, &edges);
+        let images = views.images();
+        // A tangent.
+        let line = LineSegment3::new(Vector3::new(0.3, -0.3, 0.0), Vector3::new(0.3, 0.2, 0.0));
+        assert!(images.evidence(&line, None, 0.0).gain > 3.0);
+        assert!(KnownArcs::new(&[circle], &[]).explain(&images, &line, 3.0));
     }
 
     #[test]

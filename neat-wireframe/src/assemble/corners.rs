@@ -7,6 +7,7 @@ use super::arc_joints::rounds;
 use super::circle_fitting::FoundArc;
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
+use super::rounded_corners::MIN_SHORT_IN_PIXELS;
 use nalgebra::{Matrix3, Vector3};
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -158,8 +159,14 @@ pub(super) fn pixel_sizes(images: &Images, lines: &[ChosenLine]) -> Vec<f64> {
     lines.iter().map(size).collect()
 }
 
-/// Joins the ends of lines, but not of those that run into an arc which rounds their corner.
-pub(super) fn find_corners(images: &Images, lines: &[ChosenLine], arcs: &[FoundArc]) -> Corners {
+/// Joins the ends of lines, but not of those that run into an arc which rounds their corner, nor
+/// one that stops short of the corner as it has been `joined` to an arc (by line; the others have
+/// not), nor two that do where the images speak against the way of either.
+pub(super) fn find_corners(
+    images: &Images,
+    lines: &[ChosenLine],
+    (arcs, joined): (&[FoundArc], &[[bool; 2]]),
+) -> Corners {
     let pixels = pixel_sizes(images, lines);
     let windows: Vec<f64> = (lines.iter().zip(&pixels))
         .map(|(line, pixel)| {
@@ -175,6 +182,7 @@ pub(super) fn find_corners(images: &Images, lines: &[ChosenLine], arcs: &[FoundA
         .filter_map(|meeting| {
             let mut cost = meeting.gap;
             let mut ends = [0; 2];
+            let mut stops_short = [false; 2];
             for side in 0..2 {
                 let line = meeting.lines[side];
                 let (beyond, end) = beyond_end(meeting.places[side], lines[line].line.length());
@@ -183,6 +191,18 @@ pub(super) fn find_corners(images: &Images, lines: &[ChosenLine], arcs: &[FoundA
                 if beyond.abs() > windows[line] {
                     return None;
                 }
+                if beyond > MIN_SHORT_IN_PIXELS * pixels[line] {
+                    if joined.get(line).is_some_and(|joined| joined[end]) {
+                        return None;
+                    }
+                    let line = &lines[line].line;
+                    let rest =
+                        LineSegment3::new(line.ends()[end], line.point_at(meeting.places[side]));
+                    stops_short[side] = images.evidence(&rest, None, f64::NEG_INFINITY).gain < 0.0;
+                }
+            }
+            if stops_short == [true; 2] {
+                return None;
             }
             let pieces = meeting.lines.map(|line| &lines[line].line);
             let is_round =
@@ -333,7 +353,30 @@ impl<'a> Joining<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::test_views::TestViews;
+    use crate::assemble::test_views::{TestViews, chosen};
+    use crate::test_scenes::cameras_on_sphere;
+
+    #[test]
+    fn ends_meet_in_a_corner_unless_images_speak_against_the_ways_there() {
+        let line = |a: [f64; 3], b: [f64; 3]| LineSegment3::new(a.into(), b.into());
+        let lines = |short: f64| {
+            [
+                line([-0.4, 0.0, 0.1], [-short, 0.0, 0.1]),
+                line([0.0, 0.1, -0.3], [0.0, short / 4.0, 0.1 - short]),
+            ]
+        };
+        let junctions = |shown: f64, joined: &[[bool; 2]]| {
+            let ends = lines(shown).map(|line| line.ends()).concat();
+            let views = TestViews::of_edges(&cameras_on_sphere(20), &ends, &[[0, 1], [2, 3]]);
+            let images = views.images();
+            let found = lines(0.05).map(|line| chosen(&images, &line));
+            find_corners(&images, &found, (&[], joined)).junctions.len()
+        };
+        assert_eq!(junctions(0.0, &[]), 3);
+        assert_eq!(junctions(0.05, &[]), 4);
+        // An arc goes on from one of them.
+        assert_eq!(junctions(0.0, &[[false, true], [false; 2]]), 4);
+    }
 
     #[test]
     fn nearest_points_of_crossing_lines() {

@@ -141,7 +141,7 @@ mod tests {
         for line in &lines {
             claim_edgels(images, &line.line, &mut taken);
         }
-        (find_corners(images, &lines, &[]), taken)
+        (find_corners(images, &lines, (&[], &[])), taken)
     }
 
     #[test]

@@ -195,7 +195,7 @@ mod tests {
         };
         let lines: Vec<ChosenLine> = lines.iter().map(chosen).collect();
         in_order(
-            &cut_edges(&images, find_corners(&images, &lines, &[])).0,
+            &cut_edges(&images, find_corners(&images, &lines, (&[], &[]))).0,
             BTreeSet::new(),
         )
     }

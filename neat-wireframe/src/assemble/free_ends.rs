@@ -76,7 +76,7 @@ mod tests {
         };
         for share in [0.0, 0.02] {
             let lines = short_by(share);
-            let mut corners = find_corners(&images, &lines, &[]);
+            let mut corners = find_corners(&images, &lines, (&[], &[]));
             assert_eq!(corners.junctions.len(), 9);
             assert!((end_distance(&corners.edge(0), &half) - share).abs() < 1e-3);
             move_free_ends(&images, &lines, &mut corners);

@@ -10,7 +10,7 @@ use super::line_evidence::LineEvidence;
 use super::line_fitting::directions_across;
 use super::line_selection::ChosenLine;
 use super::outlines::{ADVANTAGE, FREE_VIEWS, Tube, shows_as_well};
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector2;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 pub(super) const GAP: f64 = 2.0;
 /// … or lies outside by so much of the radius, where tangent planes meet that are 60° apart …
 const MAX_BEYOND: f64 = 0.15;
-/// … if it has this cosine to the axis, 15°, judged: lines of a cone are as oblique as it is.
+/// … if it has this cosine to the ruling there, 15°, judged.
 const MIN_COSINE: f64 = 0.966;
 
 /// An outline leaves at most this share of a line's evidence, judged: what a tube is fitted to
@@ -26,29 +26,35 @@ const MIN_COSINE: f64 = 0.966;
 const MOST_LEFT: f64 = 0.5;
 
 impl Tube {
-    /// The same tube as one of another line; `None` unless they touch, within `gap`.
+    /// The part of the tube beside a line, as a tube around its own axis; `None` unless they
+    /// touch, within `gap`.
     pub(super) fn touched_by(&self, line: &LineSegment3, gap: f64) -> Option<Self> {
         let [start, end] = self.axis.map(|axis| self.across * axis);
         let axis = LineSegment3::new(self.line.start + start, self.line.end + end);
-        let along = (line.end - line.start).try_normalize(0.0)?;
-        let direction = axis.end - axis.start;
-        if direction.dot(&along).abs() < MIN_COSINE * direction.norm() {
-            return None;
-        }
-        let across = directions_across(line)?;
-        // Where a plane across the line meets the axis.
-        let place = |point: Vector3<f64>| (point - axis.start).dot(&along) / direction.dot(&along);
-        let ends = line.ends();
-        let axis = ends.map(|point| across.tr_mul(&(axis.point_at(place(point)) - point)));
-        let [start, end] = ends.map(|point| self.radius_at(place(point)).abs());
-        let touches = |axis: &Vector2<f64>, radius: f64| {
-            (-gap..=gap + MAX_BEYOND * radius).contains(&(axis.norm() - radius))
+        let across = directions_across(&axis)?;
+        // What is across its line is oblique to the axis of a cone.
+        let [of_line, of_axis] = [self.line, axis].map(|line| line.end - line.start);
+        let slant = of_line.normalize().dot(&of_axis.normalize());
+        let places = line.ends().map(|point| axis.line_parameter(&point));
+        let radii = places.map(|place| self.radius_at(place) / slant);
+        let offsets = line
+            .ends()
+            .map(|point| across.tr_mul(&(point - axis.start)));
+        let touches = |k: usize| {
+            let radius = radii[k].abs();
+            (-gap..=gap + MAX_BEYOND * radius).contains(&(offsets[k].norm() - radius))
         };
-        (touches(&axis[0], start) && touches(&axis[1], end)).then(|| Self {
-            axis,
-            radius: 0.5 * (start + end),
-            taper: 0.5 * (end - start),
-            ..Self::touching(line, across, -(axis[0] + axis[1]))
+        let outward = (offsets[0] + offsets[1]).try_normalize(0.0)?;
+        let [start, end] = places.map(|place| axis.point_at(place));
+        let ruling = end - start + across * outward * (radii[1] - radii[0]);
+        let cosine = (line.end - line.start).normalize().dot(&ruling.normalize());
+        (touches(0) && touches(1) && cosine >= MIN_COSINE).then(|| Self {
+            line: LineSegment3::new(start, end),
+            across,
+            outward,
+            axis: [Vector2::zeros(); 2],
+            radius: 0.5 * (radii[0] + radii[1]),
+            taper: 0.5 * (radii[1] - radii[0]),
         })
     }
 }
@@ -114,13 +120,17 @@ mod tests {
     use super::*;
     use crate::assemble::outlines::tests::{generator, views_of_cone};
     use crate::assemble::test_views::{TestViews, cube_edge};
+    use nalgebra::Vector3;
 
     /// A tube of the cone, by one of its lines.
     fn tube(radii: [f64; 2], direction: [f64; 2]) -> Tube {
         let line = generator(radii, direction);
         let across = directions_across(&line).unwrap();
-        let axis = generator([0.0; 2], direction);
-        let axis = [axis.start - line.start, axis.end - line.end].map(|a| across.tr_mul(&a));
+        let along = (line.end - line.start).normalize();
+        let axis = line.ends().map(|end| {
+            let on_axis = Vector3::z() * end.dot(&along) / along.z;
+            across.tr_mul(&(on_axis - end))
+        });
         Tube {
             axis,
             radius: 0.5 * (radii[0] + radii[1]),

@@ -61,7 +61,7 @@ pub(super) fn continue_lines(
 /// How far along a stretch the images show it: all of it unless they speak against the part after
 /// which the views that show most of it do not.
 fn shown_until(images: &Images, stretch: &LineSegment3, evidence: &LineEvidence) -> f64 {
-    let Some(shown) = images.extent(stretch, &evidence.showing) else {
+    let Some(shown) = images.extent(stretch, &evidence.showing, None) else {
         return 1.0;
     };
     let ends = shown.ends().map(|end| stretch.line_parameter(&end));

@@ -22,8 +22,13 @@ const MIN_STRETCH: usize = 3;
 
 impl Images<'_> {
     /// The stretch of a line that the views which show it speak for most; `None` if there
-    /// is none.
-    pub(super) fn extent(&self, line: &LineSegment3, showing: &[Showing]) -> Option<LineSegment3> {
+    /// is none. Edgels that are `taken` by others do not count.
+    pub(super) fn extent(
+        &self,
+        line: &LineSegment3,
+        showing: &[Showing],
+        taken: Option<&[Vec<bool>]>,
+    ) -> Option<LineSegment3> {
         let length = self.projected_length(line, showing.iter().map(|s| s.view));
         let whole = 1.0 + 2.0 * BEYOND;
         let count = ((whole * length / PIXELS_PER_SAMPLE) as usize).clamp(COUNTS[0], COUNTS[1]);
@@ -44,8 +49,7 @@ impl Images<'_> {
                         pixel,
                         normal,
                     };
-                    let edgel = self.edgel(*view, &sample, self.reach);
-                    *gain += gain_of_sample(edgel.is_some(), *chance);
+                    *gain += gain_of_sample(self.has_edgel(*view, &sample, taken), *chance);
                 }
             }
         }
@@ -108,7 +112,7 @@ mod tests {
         let truth = cube_edge(4);
         let part = LineSegment3::new(truth.point_at(0.3), truth.point_at(0.9));
         let showing = images.evidence(&part, None, 0.0).showing;
-        let grown = images.extent(&part, &showing).unwrap();
+        let grown = images.extent(&part, &showing, None).unwrap();
         assert!(end_distance(&grown, &truth) < 0.02);
     }
 }

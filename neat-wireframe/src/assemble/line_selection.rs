@@ -317,7 +317,7 @@ impl Chooser<'_> {
         let mut line = *line;
         for share in FITTING_REACHES {
             line = images.fit(&line, evidence.views(), share * images.reach);
-            line = images.extent(&line, &evidence.showing)?;
+            line = images.extent(&line, &evidence.showing, None)?;
             evidence = images.evidence(&line, Some(&self.taken), self.min_evidence);
             if evidence.gain <= self.min_evidence || evidence.showing.len() < MIN_SHOWING {
                 return None;

@@ -339,7 +339,11 @@ fn graph_of(
     selection.lines.extend(take_straight(&images, arcs, least));
     report.lines = selection.lines.len();
     let known = &KnownArcs::new(arcs, domes);
-    (selection.lines).retain(|found| !known.explain(&images, &found.line, least));
+    selection.lines.retain_mut(|found| {
+        let left = known.left_of(&images, &found.line, least);
+        found.line = left.unwrap_or(found.line);
+        left.is_some()
+    });
     report.outlines += report.lines - selection.lines.len();
     report.lines = selection.lines.len();
     cut_tangent_ends(&images, &mut selection.lines, selection.noise);
@@ -347,6 +351,7 @@ fn graph_of(
     turn_to_common_directions(&images, selection.noise, &mut selection.lines);
     let mut lines = merge_pieces(&images, selection.lines);
     let taken = &mut selection.taken;
+    known.claim_outlines(&images, taken);
     continue_lines(&images, &mut lines, arcs, taken, least);
     lines = merge_pieces(&images, lines);
     progress(CONTINUED)?;
@@ -359,9 +364,9 @@ fn graph_of(
     progress(PLACED)?;
     images.retain_own(&lines, arcs);
     report.common_directions = turn_to_common_directions(&images, selection.noise, &mut lines);
-    join_tangents(&images, &mut lines, arcs);
+    let joined = join_tangents(&images, &mut lines, arcs);
     meet_in_slivers(&images, &mut lines);
-    let mut corners = find_corners(&images, &lines, arcs);
+    let mut corners = find_corners(&images, &lines, (arcs, &joined));
     report.ends = corners.junctions.len();
     fit_graph(&images, &lines, &corners.ends, &mut corners.junctions);
     move_free_ends(&images, &lines, &mut corners);

@@ -256,17 +256,26 @@ pub(super) mod tests {
     }
 
     /// Views of both outlines of that cone.
-    pub(crate) fn views_of_cone([start, end]: [f64; 2]) -> TestViews {
+    pub(crate) fn views_of_cone(radii: [f64; 2]) -> TestViews {
+        views_of_cone_with(radii, None)
+    }
+
+    /// Likewise, and of an edge on it.
+    pub(crate) fn views_of_cone_with(
+        [start, end]: [f64; 2],
+        edge: Option<LineSegment3>,
+    ) -> TestViews {
         let outlines = |camera: &Camera| {
             let center = camera.center_in_world;
             let beside = 0.5 * (1.0 + center.z / HALF_LENGTH);
             let turned = ((start + beside * (end - start)) / center.xy().norm()).acos();
             let toward = center.y.atan2(center.x);
-            let ends: Vec<Vector3<f64>> = [toward - turned, toward + turned]
-                .iter()
-                .flat_map(|angle| generator([start, end], [angle.cos(), angle.sin()]).ends())
-                .collect();
-            let seen = views_of_edges(&[*camera], &ends, &[[0, 1], [2, 3]]);
+            let outlines = [toward - turned, toward + turned]
+                .map(|angle| generator([start, end], [angle.cos(), angle.sin()]));
+            let lines = outlines.into_iter().chain(edge);
+            let ends: Vec<Vector3<f64>> = lines.flat_map(|line| line.ends()).collect();
+            let edges: Vec<[usize; 2]> = (0..ends.len() / 2).map(|k| [2 * k, 2 * k + 1]).collect();
+            let seen = views_of_edges(&[*camera], &ends, &edges);
             PreparedView::new(&seen[0], 1.0, 1.0)
         };
         TestViews::of(cameras_on_sphere(60).iter().map(outlines).collect())

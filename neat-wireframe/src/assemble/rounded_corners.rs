@@ -13,14 +13,14 @@ use neat_core::{CircularArc, LineSegment3};
 use rayon::prelude::*;
 
 /// Edges that stop nearer to where they would meet, in pixels, meet there, judged.
-const MIN_SHORT_IN_PIXELS: f64 = 4.0;
+pub(super) const MIN_SHORT_IN_PIXELS: f64 = 4.0;
 /// Edges stop where both do within so many pixels …
 const UNEVEN_IN_PIXELS: f64 = 4.0;
 /// … or this share of it: one may be hidden a little earlier. Judged.
 const UNEVEN: f64 = 0.3;
 /// The arc is off by so many pixels in its middle, where edges stop that uncertainly, judged.
 const OFF_IN_PIXELS: f64 = 1.5;
-/// Fewer views that show both edges tell of no arc, as of no line.
+/// Fewer views tell of no arc, as of no line.
 const MIN_VIEWS: usize = 3;
 
 /// Two ends of lines, each `2 * line + end`, and the arc between them.
@@ -53,18 +53,20 @@ pub(super) fn rounded_corners(
     };
     (all.par_iter())
         .filter(|rounding| is_nearest(rounding))
-        // Sides of a polygon have others between them.
-        .filter(|Rounding { arc, .. }| {
+        .filter_map(|Rounding { ends, arc, .. }| {
+            let [one, other] = ends.map(|end| &lines[end / 2]);
+            // Sides of a polygon have others between them.
             let third = arc.sweep() / 3.0;
             let angles = [arc.angles[0] + third, arc.angles[1] - third];
-            wide.evidence_of_sector(arc, angles, Some(taken)).gain > 0.0
-        })
-        .filter_map(|rounding| {
-            let [one, other] = rounding.ends.map(|end| &lines[end / 2]);
+            let middle = wide.evidence_of_sector(arc, angles, Some(taken));
+            // Those that show both edges, unless these face away from each other.
             let shown = |view: &usize| other.evidence.views().any(|other| other == *view);
-            let views: Vec<usize> = one.evidence.views().filter(shown).collect();
-            let guess =
-                (views.len() >= MIN_VIEWS).then(|| wide.follow_arc(&rounding.arc, &views))??;
+            let mut views: Vec<usize> = one.evidence.views().filter(shown).collect();
+            if views.len() < MIN_VIEWS {
+                views = middle.views().collect();
+            }
+            let is_shown = middle.gain > 0.0 && views.len() >= MIN_VIEWS;
+            let guess = is_shown.then(|| wide.follow_arc(arc, &views))??;
             let found = images.follow_arc(&guess.arc, &views)?;
             // Or it is something else.
             let touches = |line: &ChosenLine| runs_into(images, &line.line, &found).is_some();

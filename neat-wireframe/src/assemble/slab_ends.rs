@@ -246,7 +246,7 @@ mod tests {
         for line in &along {
             claim_edgels(&images, &line.line, &mut taken);
         }
-        let mut corners = find_corners(&images, &along, &[]);
+        let mut corners = find_corners(&images, &along, (&[], &[]));
         let before = corners.ends.len();
         let count = close_slabs(
             &images,
@@ -293,7 +293,7 @@ mod tests {
             evidence: LineEvidence::default(),
             placed: true,
         });
-        let corners = find_corners(&cube.images(), &lines, &[]);
+        let corners = find_corners(&cube.images(), &lines, (&[], &[]));
         let ends = slab_ends(&corners);
         assert!(ends.values().all(|taper| *taper > MAX_TAPER));
         assert_eq!(ends.into_keys().collect::<Vec<_>>(), [[0, 2]]);
