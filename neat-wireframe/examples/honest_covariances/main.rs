@@ -71,7 +71,7 @@ fn print_covariances() {
         for views in [12, 40] {
             for sigma in [0.3, 0.5, 1.0] {
                 let scenes: Vec<(u64, Scene)> = (0..SEEDS)
-                    .flat_map(|seed| Solid::ALL.map(|solid| (seed, solid)))
+                    .flat_map(|seed| Solid::POLYHEDRA.map(|solid| (seed, solid)))
                     .map(|(seed, solid)| (seed, scene(solid, detector, sigma, views, seed)))
                     .collect();
                 for (name, wireframe) in WIREFRAMES {

@@ -18,8 +18,8 @@ use rayon::prelude::*;
 pub(super) const GAP: f64 = 2.0;
 /// … or lies outside by so much of the radius, where tangent planes meet that are 60° apart …
 const MAX_BEYOND: f64 = 0.15;
-/// … if it has this cosine to the ruling there, 15°, judged.
-const MIN_COSINE: f64 = 0.966;
+/// … if it has this cosine to the ruling there, 30°, judged: what few views show is oblique.
+const MIN_COSINE: f64 = 0.866;
 
 /// An outline leaves at most this share of a line's evidence, judged: what a tube is fitted to
 /// does not lie on it exactly.

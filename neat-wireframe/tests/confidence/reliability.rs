@@ -36,7 +36,7 @@ pub fn with_false_edges(scene: &Scene, seed: u64) -> (Wireframe3d, Vec<bool>) {
 pub fn judged(with_surface: bool, views: usize) -> Vec<(f64, bool)> {
     let mut judged = Vec::new();
     for seed in 0..4 {
-        for solid in Solid::ALL {
+        for solid in Solid::POLYHEDRA {
             let scene = scene(solid, Detector::Segments, 0.7, views, seed);
             let (wireframe, is_true) = with_false_edges(&scene, seed);
             let surface = with_surface.then_some(&scene.surface as &dyn SignedDistance);
