@@ -18,7 +18,7 @@ pub(super) const GAP_IN_PIXELS: f64 = 2.0;
 /// Arcs that are nearer to each other, in pixels, are one or lie in one plane, judged.
 const MIN_LENGTH_IN_PIXELS: f64 = 4.0;
 /// A line that is farther from an arc, in pixels, is no chord of it, judged: one that bends more is
-/// told by its bow.
+/// told by its bow. Nor is it in its plane if an end is farther from that.
 const NEAR_IN_PIXELS: f64 = 8.0;
 
 /// Arcs, the tubes between them and the domes around their axes.
@@ -151,14 +151,13 @@ fn tube_between(one: &CircularArc, other: &CircularArc, pixel: f64) -> Option<Tu
         return None;
     }
     let axis = LineSegment3::new(one.center, other.center);
-    Some(Tube {
-        line: axis,
-        across: directions_across(&axis)?,
-        outward: Vector2::x(),
-        axis: [Vector2::zeros(); 2],
-        radius: 0.5 * (one.radius + other.radius),
-        taper: 0.5 * (other.radius - one.radius),
-    })
+    let radii = [one.radius, other.radius];
+    Some(Tube::around(
+        axis,
+        directions_across(&axis)?,
+        Vector2::x(),
+        radii,
+    ))
 }
 
 #[cfg(test)]

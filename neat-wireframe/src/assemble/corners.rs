@@ -182,7 +182,7 @@ pub(super) fn find_corners(
         .filter_map(|meeting| {
             let mut cost = meeting.gap;
             let mut ends = [0; 2];
-            let mut stops_short = [false; 2];
+            let mut short = true;
             for side in 0..2 {
                 let line = meeting.lines[side];
                 let (beyond, end) = beyond_end(meeting.places[side], lines[line].line.length());
@@ -191,17 +191,22 @@ pub(super) fn find_corners(
                 if beyond.abs() > windows[line] {
                     return None;
                 }
-                if beyond > MIN_SHORT_IN_PIXELS * pixels[line] {
-                    if joined.get(line).is_some_and(|joined| joined[end]) {
-                        return None;
-                    }
-                    let line = &lines[line].line;
-                    let rest =
-                        LineSegment3::new(line.ends()[end], line.point_at(meeting.places[side]));
-                    stops_short[side] = images.evidence(&rest, None, f64::NEG_INFINITY).gain < 0.0;
+                let stops_short = beyond > MIN_SHORT_IN_PIXELS * pixels[line];
+                if stops_short && joined.get(line).is_some_and(|joined| joined[end]) {
+                    return None;
                 }
+                short &= stops_short;
             }
-            if stops_short == [true; 2] {
+            let is_denied = |side: usize| {
+                let line = &lines[meeting.lines[side]].line;
+                let [end, corner] = [
+                    line.ends()[ends[side] % 2],
+                    line.point_at(meeting.places[side]),
+                ];
+                let rest = LineSegment3::new(end, corner);
+                images.evidence(&rest, None, f64::NEG_INFINITY).gain < 0.0
+            };
+            if short && (0..2).all(is_denied) {
                 return None;
             }
             let pieces = meeting.lines.map(|line| &lines[line].line);

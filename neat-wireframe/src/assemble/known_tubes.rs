@@ -10,7 +10,6 @@ use super::line_evidence::LineEvidence;
 use super::line_fitting::directions_across;
 use super::line_selection::ChosenLine;
 use super::outlines::{ADVANTAGE, FREE_VIEWS, Tube, shows_as_well};
-use nalgebra::Vector2;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 
@@ -48,14 +47,8 @@ impl Tube {
         let [start, end] = places.map(|place| axis.point_at(place));
         let ruling = end - start + across * outward * (radii[1] - radii[0]);
         let cosine = (line.end - line.start).normalize().dot(&ruling.normalize());
-        (touches(0) && touches(1) && cosine >= MIN_COSINE).then(|| Self {
-            line: LineSegment3::new(start, end),
-            across,
-            outward,
-            axis: [Vector2::zeros(); 2],
-            radius: 0.5 * (radii[0] + radii[1]),
-            taper: 0.5 * (radii[1] - radii[0]),
-        })
+        (touches(0) && touches(1) && cosine >= MIN_COSINE)
+            .then(|| Self::around(LineSegment3::new(start, end), across, outward, radii))
     }
 }
 
@@ -120,7 +113,7 @@ mod tests {
     use super::*;
     use crate::assemble::outlines::tests::{generator, views_of_cone};
     use crate::assemble::test_views::{TestViews, cube_edge};
-    use nalgebra::Vector3;
+    use nalgebra::{Vector2, Vector3};
 
     /// A tube of the cone, by one of its lines.
     fn tube(radii: [f64; 2], direction: [f64; 2]) -> Tube {

@@ -67,6 +67,23 @@ impl Tube {
         }
     }
 
+    /// One whose line is its axis, with these radii at the ends.
+    pub(super) fn around(
+        axis: LineSegment3,
+        across: Matrix3x2<f64>,
+        outward: Vector2<f64>,
+        [start, end]: [f64; 2],
+    ) -> Self {
+        Self {
+            line: axis,
+            across,
+            outward,
+            axis: [Vector2::zeros(); 2],
+            radius: 0.5 * (start + end),
+            taper: 0.5 * (end - start),
+        }
+    }
+
     /// At a place along the line, which is 0 at its start and 1 at its end.
     pub(super) fn radius_at(&self, place: f64) -> f64 {
         self.radius + (2.0 * place - 1.0) * self.taper
