@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Writes scenes of everyday CAD parts with exact truth.
 
-    scripts/make_parts.py OUT [--set first|second|round|third] [NAME...]
+    scripts/make_parts.py OUT [--set first|second|round|third|fourth|catalogue] [NAME...]
 
 Each scene is a folder of OUT: 60 grey pictures on black, cameras.json,
 gt_wireframe.json and mesh.obj, for `neat reconstruct` and
 `cargo run --release -p neat-eval --example measure_assembler -- OUT/*`.
 Needs what scripts/requirements-parts.txt names; a part takes about 20 seconds.
+The set "catalogue" needs two packages more (cad_parts/catalogue.py).
 """
 
 import argparse
@@ -33,9 +34,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("out", type=pathlib.Path, help="folder for the scenes")
     parser.add_argument("names", nargs="*", help="parts, all unless some are named")
-    parser.add_argument("--set", choices=sets, help="one of the sets of parts alone")
+    parser.add_argument(
+        "--set", choices=[*sets, "catalogue"], help="one of the sets of parts alone"
+    )
     parser.add_argument("--truth", action="store_true", help="write the truth alone")
     options = parser.parse_args()
+    if options.set == "catalogue":
+        from cad_parts import catalogue  # Of packages that nothing else needs.
+
+        sets["catalogue"] = catalogue.CATALOGUE
     of_set = sets[options.set] if options.set else sum(sets.values(), [])
     parts = {part.__name__: part for part in of_set}
     unknown = [name for name in options.names if name not in parts]

@@ -83,11 +83,25 @@ impl KnownArcs {
         ))
     }
 
-    /// The edgels of what a line runs along; `None` if that is nothing.
-    fn edgels_beside(&self, images: &Images, line: &LineSegment3) -> Option<Vec<Vec<bool>>> {
+    /// Whether tubes that a line runs along explain it.
+    pub(super) fn is_outline(&self, images: &Images, line: &LineSegment3, least: f64) -> bool {
+        let mut taken = images.nothing_taken();
+        let touched = self.touched_by(images, line);
+        for tube in &touched {
+            images.claim_outlines(tube, &mut taken);
+        }
+        !touched.is_empty() && images.evidence(line, Some(&taken), least).gain <= least
+    }
+
+    fn touched_by(&self, images: &Images, line: &LineSegment3) -> Vec<Tube> {
         let gap = GAP * images.reach * images.pixel_size(line, 0..images.views.len());
         let touched = (self.tubes.iter()).filter_map(|tube| tube.touched_by(line, gap));
-        let touched: Vec<Tube> = touched.collect();
+        touched.collect()
+    }
+
+    /// The edgels of what a line runs along; `None` if that is nothing.
+    fn edgels_beside(&self, images: &Images, line: &LineSegment3) -> Option<Vec<Vec<bool>>> {
+        let touched = self.touched_by(images, line);
         let is_chord = |found: &FoundArc| {
             let near = NEAR_IN_PIXELS * found.pixel;
             let mut points = [0.1, 0.5, 0.9]

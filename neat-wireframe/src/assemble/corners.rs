@@ -21,7 +21,7 @@ pub(super) const WINDOW_IN_PIXELS: f64 = 16.0;
 /// … or by this share of the line, whose ends grow uncertain with its depth …
 const WINDOW_SHARE: f64 = 0.1;
 /// … but never by so much of it that its other end would be meant.
-const MAX_WINDOW_SHARE: f64 = 0.4;
+pub(super) const MAX_WINDOW_SHARE: f64 = 0.4;
 /// The edgels of edges nearer to each other are neither the one's nor the other's, in pixels: so far
 /// do profiles tell edges apart that edgels do not.
 const TOGETHER: f64 = 3.0;
