@@ -2,232 +2,38 @@
 //!
 //! Where two lines are known, an arc that touches both has nothing else to tell. So of all of them
 //! that one is sought beside which most edgels lie, from line to line, and asked against the sharp
-//! corner. It is fitted to the edgels with what they lie aside of both lines, too: smoothing and shading
+//! corner and what cuts it (`corner_ways.rs`). It is fitted to the edgels with what they lie aside of both lines, too: smoothing and shading
 //! move them alike along all of an edge.
 
 use super::arc_joints::rounds;
 use super::arc_pieces::OWN_SHARE;
-use super::circle_fitting::{FoundArc, SECTOR_IN_PIXELS, Sector, equal_parts};
+use super::circle_fitting::{FoundArc, Sector, equal_parts};
 use super::claimed_edgels::claim_edgels;
-use super::corners::{
-    MAX_GAP, MAX_WINDOW_SHARE, WINDOW_IN_PIXELS, beyond_end, nearest_points, pixel_sizes,
-};
+use super::corner_ways::{Corner, SPACING, Way};
+use super::corners::pixel_sizes;
 use super::curve_samples::distance_of_curve;
 use super::curves::{BESIDE_IN_PIXELS, runs_beside};
 use super::edge_samples::{Images, Sample};
 use super::line_evidence::Showing;
-use super::line_extent::gain_of_sample;
 use super::line_fitting::change_by_edgels;
 use super::line_selection::{ChosenLine, MIN_SHOWING};
 use nalgebra::{SVector, Vector3};
 use neat_core::{CircularArc, LineSegment3};
 use rayon::prelude::*;
 
-/// Smoothing rounds corners by so many pixels: nearer to a sharp one nothing is asked …
-const ROUNDING_IN_PIXELS: f64 = 2.0;
-/// … and an arc that comes nearer to it may be a sharp one, judged.
-const MIN_RISE_IN_PIXELS: f64 = 2.5;
 /// How far before the corner arcs that are tried begin: each by this factor farther than the last.
 const STEP: f64 = 1.15;
-/// An edge goes on over so many pixels of its arc, besides those that cannot be told apart, judged.
-const OVER_IN_PIXELS: f64 = 4.0;
-/// Of both lines so many pixels are asked with the arc.
-const MARGIN_IN_PIXELS: f64 = 6.0;
-/// Distance between samples, in pixels.
-const SPACING: f64 = 2.0;
 /// Probability that something hides a corner in a view that shows both of its lines, judged.
 const HIDDEN: f64 = 0.3;
 /// An arc must explain the edgels so much better than the sharp corner, in nats, as for outlines: it
 /// is the best of many tries.
 const ADVANTAGE: f64 = 12.0;
-/// Lines under a smaller angle than this have no corner to round (cosine), about 15°.
-const MAX_COSINE: f64 = 0.966;
-/// So many parts of an arc must each be shown.
-const THIRDS: f64 = 3.0;
 /// Rounds of fitting.
 const ROUNDS: usize = 3;
 /// Fewer edgels tell nothing of an arc.
 const MIN_EDGELS: usize = 12;
 /// What keeps a number where no edgel tells of it.
 const RIDGE: f64 = 1e-6;
-
-/// Where two lines in one plane would meet beyond their ends.
-struct Corner {
-    lines: [usize; 2],
-    ends: [usize; 2],
-    point: Vector3<f64>,
-    /// From it along both lines.
-    toward: [Vector3<f64>; 2],
-    /// Between both, and cosine and tangent of the angle to either.
-    bisector: Vector3<f64>,
-    cosine: f64,
-    tangent: f64,
-    /// From where to where an arc may begin, away from the corner.
-    bounds: [f64; 2],
-    pixel: f64,
-}
-
-impl Corner {
-    fn between(images: &Images, lines: [&LineSegment3; 2], pixel: f64) -> Option<Self> {
-        let reach = images.reach * pixel;
-        let (places, gap) = nearest_points(lines[0], lines[1])?;
-        if gap > MAX_GAP * reach {
-            return None;
-        }
-        let beyond = [0, 1].map(|k| beyond_end(places[k], lines[k].length()));
-        let point = 0.5 * (lines[0].point_at(places[0]) + lines[1].point_at(places[1]));
-        let far = [0, 1].map(|k| lines[k].ends()[1 - beyond[k].1] - point);
-        let toward = far.map(|far| far.normalize());
-        let bisector = (toward[0] + toward[1]).try_normalize(1e-9)?;
-        let cosine = bisector.dot(&toward[0]);
-        let tangent = (1.0 - cosine * cosine).sqrt() / cosine;
-        let short = beyond[0].0.max(beyond[1].0);
-        // Beside an arc, twice as far as they cannot be told apart: t = short + 2 √(2 r δ), r = t tan.
-        let over = (2.0 * reach * tangent).sqrt();
-        let most = (over + (over * over + short.max(0.0)).sqrt()).powi(2);
-        let rise = cosine.recip() - tangent;
-        let bounds = [
-            (short - WINDOW_IN_PIXELS * pixel).max(MIN_RISE_IN_PIXELS * pixel / rise),
-            (most + OVER_IN_PIXELS * pixel)
-                .min(far[0].norm())
-                .min(far[1].norm()),
-        ];
-        let is_corner = toward[0].dot(&toward[1]).abs() < MAX_COSINE;
-        let ends_there = beyond
-            .iter()
-            .all(|(beyond, _)| *beyond > -OVER_IN_PIXELS * pixel);
-        (is_corner && ends_there && bounds[0] < bounds[1]).then_some(Self {
-            lines: [0, 1],
-            ends: beyond.map(|(_, end)| end),
-            point,
-            toward,
-            bisector,
-            cosine,
-            tangent,
-            bounds,
-            pixel,
-        })
-    }
-
-    /// The arc that begins so far from the corner, on the first line.
-    fn arc(&self, from: f64) -> Option<CircularArc> {
-        let middle = from * (self.cosine.recip() - self.tangent) * self.bisector;
-        let points = [from * self.toward[0], middle, from * self.toward[1]];
-        CircularArc::through(points.map(|point| self.point + point))
-    }
-
-    /// How a point of the arc moves as that begins farther from the corner, by its direction from the
-    /// centre.
-    fn moved(&self, outward: &Vector3<f64>) -> f64 {
-        self.tangent + outward.dot(&self.bisector) / self.cosine
-    }
-
-    /// Each `2 * line + end`.
-    fn ends_of_lines(&self) -> [usize; 2] {
-        [0, 1].map(|side| 2 * self.lines[side] + self.ends[side])
-    }
-
-    /// How far from the corner both lines are asked.
-    fn asked(&self) -> f64 {
-        self.bounds[1] + MARGIN_IN_PIXELS * self.pixel
-    }
-}
-
-/// A way from one line to the other.
-struct Way<'a> {
-    corner: &'a Corner,
-    /// How far from the corner it leaves the lines.
-    from: [f64; 2],
-    between: Between,
-}
-
-/// What lies between both lines.
-enum Between {
-    /// Nothing that is asked: they meet.
-    Nothing,
-    Line(LineSegment3),
-    Arc(CircularArc),
-}
-
-impl<'a> Way<'a> {
-    fn sharp(corner: &'a Corner) -> Self {
-        Self {
-            corner,
-            from: [ROUNDING_IN_PIXELS * corner.pixel; 2],
-            between: Between::Nothing,
-        }
-    }
-
-    /// By a line that runs from one to the other.
-    fn cut(corner: &'a Corner, lines: [&LineSegment3; 2], cut: &LineSegment3) -> Option<Self> {
-        let gap = BESIDE_IN_PIXELS * corner.pixel;
-        let window = (WINDOW_IN_PIXELS * corner.pixel).min(MAX_WINDOW_SHARE * cut.length());
-        let from = |line: &LineSegment3, toward: &Vector3<f64>| {
-            let ([place, along], apart) = nearest_points(line, cut)?;
-            let from = (line.point_at(place) - corner.point).dot(toward);
-            let beyond = beyond_end(along, cut.length()).0.abs();
-            (apart <= gap && beyond <= window && from > 0.0).then_some((from, cut.point_at(along)))
-        };
-        let (one, start) = from(lines[0], &corner.toward[0])?;
-        let (other, end) = from(lines[1], &corner.toward[1])?;
-        Some(Self {
-            corner,
-            from: [one, other],
-            between: Between::Line(LineSegment3::new(start, end)),
-        })
-    }
-
-    fn round(corner: &'a Corner, from: f64) -> Option<Self> {
-        Some(Self {
-            corner,
-            from: [from; 2],
-            between: Between::Arc(corner.arc(from)?),
-        })
-    }
-
-    /// The places of both lines, as distances from the corner along it: negative on the first.
-    fn on_lines(&self) -> [[f64; 2]; 2] {
-        let asked = self.corner.asked();
-        let [one, other] = self.from;
-        [[-asked, -one], [other, asked]]
-    }
-
-    fn point(&self, place: f64) -> Vector3<f64> {
-        let Corner { point, toward, .. } = self.corner;
-        point + place.abs() * toward[usize::from(place > 0.0)]
-    }
-
-    /// What each view says about it, by its length.
-    fn gains(&self, images: &Images, views: &[Showing]) -> Vec<f64> {
-        let of_view = |showing: &Showing| {
-            let samples = |part: [f64; 2], at: &dyn Fn(f64) -> Vector3<f64>| {
-                images.samples_of_curve(showing.view, part, SPACING, |place| Some(at(place)))
-            };
-            let between = match &self.between {
-                Between::Nothing => None,
-                Between::Line(line) => samples([0.0, 1.0], &|place| line.point_at(place)),
-                Between::Arc(arc) => samples(arc.angles, &|angle| arc.point_at(angle)),
-            };
-            let on_lines = self.on_lines();
-            let of_lines = on_lines.into_iter().filter(|part| part[0] < part[1]);
-            let of_lines = of_lines.map(|part| samples(part, &|place| self.point(place)));
-            (of_lines.chain([between]).flatten())
-                .map(|samples| gain_of_part(images, showing, &samples))
-                .sum()
-        };
-        views.iter().map(of_view).collect()
-    }
-}
-
-/// What a view says about a part of a way, as if its samples were as far apart as others.
-fn gain_of_part(images: &Images, Showing { view, chance }: &Showing, samples: &[Sample]) -> f64 {
-    let gain = |sample: &Sample| gain_of_sample(images.has_edgel(*view, sample, None), *chance);
-    let steps = samples
-        .windows(2)
-        .map(|pair| (pair[1].pixel - pair[0].pixel).norm());
-    let spacing = steps.sum::<f64>() / (samples.len() - 1) as f64;
-    spacing / SPACING * samples.iter().map(gain).sum::<f64>()
-}
 
 /// What all views say together, of which some may be hidden.
 fn total(gains: &[f64]) -> f64 {
@@ -270,11 +76,7 @@ pub(super) fn round_corners(images: &Images, lines: &[ChosenLine], arcs: &mut Ve
             .filter(|j| (middles[i] - middles[*j]).norm() <= reach(i) + reach(*j))
             .filter_map(|j| {
                 let pieces = [i, j].map(|line| &lines[line].line);
-                let corner = Corner::between(images, pieces, pixels[i].max(pixels[j]))?;
-                Some(Corner {
-                    lines: [i, j],
-                    ..corner
-                })
+                Corner::between(images, [i, j], pieces, pixels[i].max(pixels[j]))
             })
             .collect()
     };
@@ -310,6 +112,7 @@ pub(super) fn round_corners(images: &Images, lines: &[ChosenLine], arcs: &mut Ve
     arcs.extend(added);
 }
 
+/// The arc that rounds a corner, if the images say that one does.
 fn rounded(images: &Images, lines: &[ChosenLine], corner: &Corner) -> Option<Rounded> {
     let [one, other] = corner.lines.map(|line| &lines[line].evidence.showing);
     let both = one.iter().filter_map(|one| {
@@ -364,12 +167,16 @@ fn rounded(images: &Images, lines: &[ChosenLine], corner: &Corner) -> Option<Rou
         angles,
         evidence: images.evidence_of_sector(&arc, angles, Some(&taken)),
     };
-    let gains = equal_parts(arc.angles, THIRDS * SECTOR_IN_PIXELS, 1.0)
-        .into_iter()
-        .map(|third| {
-            [Some(&taken[..]), None].map(|taken| images.evidence_of_sector(&arc, third, taken).gain)
-        });
-    let gains: Vec<[f64; 2]> = gains.collect();
+    let third = arc.sweep() / 3.0;
+    let gains = [0.0, 1.0, 2.0].map(|k| {
+        let low = arc.angles[0] + k * third;
+        let gain = |taken| {
+            images
+                .evidence_of_sector(&arc, [low, low + third], taken)
+                .gain
+        };
+        [gain(Some(&taken[..])), gain(None)]
+    });
     let [own, all] = [0, 1].map(|k| gains.iter().map(|gain| gain[k]).sum::<f64>());
     if gains.iter().any(|[own, _]| *own <= 0.0) || own <= OWN_SHARE * all {
         return None;

@@ -30,6 +30,7 @@ mod claimed_edgels;
 mod collinear_pieces;
 mod common_directions;
 mod config;
+mod corner_ways;
 mod corners;
 mod curve_pieces;
 mod curve_samples;
