@@ -18,7 +18,7 @@ use super::line_evidence::Showing;
 use super::line_fitting::change_by_edgels;
 use super::line_selection::{ChosenLine, MIN_SHOWING};
 use nalgebra::{SVector, Vector3};
-use neat_core::{CircularArc, LineSegment3};
+use neat_core::CircularArc;
 use rayon::prelude::*;
 
 /// How far before the corner arcs that are tried begin: each by this factor farther than the last.
@@ -126,36 +126,56 @@ fn rounded(images: &Images, lines: &[ChosenLine], corner: &Corner) -> Option<Rou
     if views.len() < MIN_SHOWING {
         return None;
     }
+    let (from, gains, advantage) = best_round(images, lines, corner, &views)?;
+    let odds = (HIDDEN / (1.0 - HIDDEN)).ln();
+    let seen: Vec<Showing> = (views.iter().zip(&gains))
+        .filter(|(_, gain)| **gain > odds)
+        .map(|(showing, _)| *showing)
+        .collect();
+    let arc = corner.arc(fitted(images, corner, from, &seen)?)?;
+    Some(Rounded {
+        ends: corner.ends_of_lines(),
+        advantage,
+        found: shown(images, lines, corner, &arc)?,
+    })
+}
+
+/// Where the arc begins that explains the views best, what each says, and by how much it is better than
+/// its rivals.
+fn best_round(
+    images: &Images,
+    lines: &[ChosenLine],
+    corner: &Corner,
+    views: &[Showing],
+) -> Option<(f64, Vec<f64>, f64)> {
     let pieces = corner.lines.map(|line| &lines[line].line);
     let others = (0..lines.len()).filter(|k| !corner.lines.contains(k));
-    let others: Vec<&LineSegment3> = others.map(|k| &lines[k].line).collect();
-    let cut = others
-        .iter()
-        .filter_map(|other| Way::cut(corner, pieces, other));
+    let cut = others.filter_map(|other| Way::cut(corner, pieces, &lines[other].line));
     let rivals = [Way::sharp(corner)].into_iter().chain(cut);
-    let rivals: Vec<Vec<f64>> = rivals.map(|way| way.gains(images, &views)).collect();
+    let rivals: Vec<Vec<f64>> = rivals.map(|way| way.gains(images, views)).collect();
     // A step more on both sides: an arc that is best at a bound is none.
     let (mut from, mut tried) = (corner.bounds[0] / STEP, Vec::new());
     while from < corner.bounds[1] * STEP {
-        tried.push((from, Way::round(corner, from)?.gains(images, &views)));
+        tried.push((from, Way::round(corner, from)?.gains(images, views)));
         from *= STEP;
     }
     let best =
         (0..tried.len()).max_by(|a, b| total(&tried[*a].1).total_cmp(&total(&tried[*b].1)))?;
-    let (from, gains) = &tried[best];
-    let advantage =
-        (rivals.iter().map(|rival| advantage(gains, rival))).fold(f64::INFINITY, f64::min);
-    if best == 0 || best + 1 == tried.len() || advantage <= ADVANTAGE {
-        return None;
-    }
-    let odds = (HIDDEN / (1.0 - HIDDEN)).ln();
-    let seen: Vec<Showing> = (views.iter().zip(gains))
-        .filter(|(_, gain)| **gain > odds)
-        .map(|(showing, _)| *showing)
-        .collect();
-    let from = fitted(images, corner, *from, &seen)?;
-    let arc = corner.arc(from)?;
-    // What other lines have is no arc's: a chamfer, the sides of a polygon.
+    let is_inner = best > 0 && best + 1 < tried.len();
+    let (from, gains) = tried.swap_remove(best);
+    let advantages = rivals.iter().map(|rival| advantage(&gains, rival));
+    let advantage = advantages.fold(f64::INFINITY, f64::min);
+    (is_inner && advantage > ADVANTAGE).then_some((from, gains, advantage))
+}
+
+/// An arc with what the images say about it, if they show all of it, and other lines do not have that:
+/// a chamfer, the sides of a polygon.
+fn shown(
+    images: &Images,
+    lines: &[ChosenLine],
+    corner: &Corner,
+    arc: &CircularArc,
+) -> Option<FoundArc> {
     let mut taken = images.nothing_taken();
     let middle = arc.point_at(0.5 * (arc.angles[0] + arc.angles[1]));
     for (k, line) in lines.iter().enumerate() {
@@ -163,16 +183,12 @@ fn rounded(images: &Images, lines: &[ChosenLine], corner: &Corner) -> Option<Rou
             claim_edgels(images, &line.line, &mut taken);
         }
     }
-    let part = |angles| Sector {
-        angles,
-        evidence: images.evidence_of_sector(&arc, angles, Some(&taken)),
-    };
     let third = arc.sweep() / 3.0;
     let gains = [0.0, 1.0, 2.0].map(|k| {
         let low = arc.angles[0] + k * third;
         let gain = |taken| {
             images
-                .evidence_of_sector(&arc, [low, low + third], taken)
+                .evidence_of_sector(arc, [low, low + third], taken)
                 .gain
         };
         [gain(Some(&taken[..])), gain(None)]
@@ -182,18 +198,17 @@ fn rounded(images: &Images, lines: &[ChosenLine], corner: &Corner) -> Option<Rou
         return None;
     }
     let sectors: Vec<Sector> = (equal_parts(arc.angles, arc.length(), corner.pixel).into_iter())
-        .map(part)
+        .map(|angles| Sector {
+            angles,
+            evidence: images.evidence_of_sector(arc, angles, Some(&taken)),
+        })
         .collect();
-    Some(Rounded {
-        ends: corner.ends_of_lines(),
-        advantage,
-        found: FoundArc {
-            arc,
-            gain: sectors.iter().map(|sector| sector.evidence.gain).sum(),
-            pixel: corner.pixel,
-            sectors,
-            covariance: None,
-        },
+    Some(FoundArc {
+        arc: *arc,
+        gain: sectors.iter().map(|sector| sector.evidence.gain).sum(),
+        pixel: corner.pixel,
+        sectors,
+        covariance: None,
     })
 }
 
@@ -267,6 +282,7 @@ mod tests {
     use super::*;
     use crate::assemble::test_views::{TestViews, chosen};
     use crate::test_scenes::cameras_on_sphere;
+    use neat_core::LineSegment3;
     use std::f64::consts::FRAC_PI_2;
 
     const RADIUS: f64 = 0.1;
