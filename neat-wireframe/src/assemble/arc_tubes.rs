@@ -85,12 +85,15 @@ impl KnownArcs {
 
     /// Whether tubes that a line runs along explain it.
     pub(super) fn is_outline(&self, images: &Images, line: &LineSegment3, least: f64) -> bool {
-        let mut taken = images.nothing_taken();
         let touched = self.touched_by(images, line);
+        if touched.is_empty() {
+            return false;
+        }
+        let mut taken = images.nothing_taken();
         for tube in &touched {
             images.claim_outlines(tube, &mut taken);
         }
-        !touched.is_empty() && images.evidence(line, Some(&taken), least).gain <= least
+        images.evidence(line, Some(&taken), least).gain <= least
     }
 
     fn touched_by(&self, images: &Images, line: &LineSegment3) -> Vec<Tube> {

@@ -22,17 +22,68 @@ pub(super) const SPACING: f64 = 2.0;
 /// Lines under a smaller angle than this have no corner to round (cosine), about 15°.
 const MAX_COSINE: f64 = 0.966;
 
-/// Where two lines in one plane would meet beyond their ends.
-pub(super) struct Corner {
-    pub lines: [usize; 2],
-    pub ends: [usize; 2],
+/// Where two lines in one plane would meet.
+pub(super) struct Meet {
     point: Vector3<f64>,
     /// From it along both lines.
     pub toward: [Vector3<f64>; 2],
     /// Between both, and cosine and tangent of the angle to either.
     pub bisector: Vector3<f64>,
     pub cosine: f64,
-    tangent: f64,
+    pub tangent: f64,
+    /// How far it lies beyond the nearest end of each line (inside: negative), and that end.
+    pub beyond: [(f64, usize); 2],
+    /// How far from it the other end of each line lies.
+    far: [f64; 2],
+}
+
+impl Meet {
+    /// Of lines that come as near to each other as `most`.
+    pub(super) fn of(lines: [&LineSegment3; 2], most: f64) -> Option<Self> {
+        let (places, gap) = nearest_points(lines[0], lines[1])?;
+        if gap > most {
+            return None;
+        }
+        let beyond = [0, 1].map(|k| beyond_end(places[k], lines[k].length()));
+        let point = 0.5 * (lines[0].point_at(places[0]) + lines[1].point_at(places[1]));
+        let far = [0, 1].map(|k| lines[k].ends()[1 - beyond[k].1] - point);
+        let toward = far.map(|far| far.normalize());
+        let bisector = (toward[0] + toward[1]).try_normalize(1e-9)?;
+        let cosine = bisector.dot(&toward[0]);
+        Some(Self {
+            point,
+            toward,
+            bisector,
+            cosine,
+            tangent: (1.0 - cosine * cosine).sqrt() / cosine,
+            beyond,
+            far: far.map(|far| far.norm()),
+        })
+    }
+
+    /// How far the arc that begins at a distance of 1 passes the corner.
+    fn rise(&self) -> f64 {
+        self.cosine.recip() - self.tangent
+    }
+
+    /// The arc that begins so far from the corner, on the first line.
+    pub(super) fn arc(&self, from: f64) -> Option<CircularArc> {
+        let middle = from * self.rise() * self.bisector;
+        let points = [from * self.toward[0], middle, from * self.toward[1]];
+        CircularArc::through(points.map(|point| self.point + point))
+    }
+
+    /// How a point of the arc moves as that begins farther from the corner, by its direction from the
+    /// centre.
+    pub(super) fn moved(&self, outward: &Vector3<f64>) -> f64 {
+        self.tangent + outward.dot(&self.bisector) / self.cosine
+    }
+}
+
+/// Where two lines meet, and the arcs that may round it.
+pub(super) struct Corner {
+    pub lines: [usize; 2],
+    pub meet: Meet,
     /// From where to where an arc may begin, away from the corner.
     pub bounds: [f64; 2],
     pub pixel: f64,
@@ -47,61 +98,36 @@ impl Corner {
         pixel: f64,
     ) -> Option<Self> {
         let reach = images.reach * pixel;
-        let (places, gap) = nearest_points(lines[0], lines[1])?;
-        if gap > MAX_GAP * reach {
-            return None;
-        }
-        let beyond = [0, 1].map(|k| beyond_end(places[k], lines[k].length()));
-        let point = 0.5 * (lines[0].point_at(places[0]) + lines[1].point_at(places[1]));
-        let far = [0, 1].map(|k| lines[k].ends()[1 - beyond[k].1] - point);
-        let toward = far.map(|far| far.normalize());
-        let bisector = (toward[0] + toward[1]).try_normalize(1e-9)?;
-        let cosine = bisector.dot(&toward[0]);
-        let tangent = (1.0 - cosine * cosine).sqrt() / cosine;
-        let short = beyond[0].0.max(beyond[1].0);
+        let meet = Meet::of(lines, MAX_GAP * reach)?;
+        let short = meet.beyond[0].0.max(meet.beyond[1].0);
         // Beside an arc, twice as far as they cannot be told apart: t = short + 2 √(2 r δ), r = t tan.
-        let over = (2.0 * reach * tangent).sqrt();
+        let over = (2.0 * reach * meet.tangent).sqrt();
         let most = (over + (over * over + short.max(0.0)).sqrt()).powi(2);
-        let rise = cosine.recip() - tangent;
         let bounds = [
-            (short - WINDOW_IN_PIXELS * pixel).max(MIN_RISE_IN_PIXELS * pixel / rise),
+            (short - WINDOW_IN_PIXELS * pixel).max(MIN_RISE_IN_PIXELS * pixel / meet.rise()),
             (most + OVER_IN_PIXELS * pixel)
-                .min(far[0].norm())
-                .min(far[1].norm()),
+                .min(meet.far[0])
+                .min(meet.far[1]),
         ];
-        let is_corner = toward[0].dot(&toward[1]).abs() < MAX_COSINE;
-        let ends_there = beyond
-            .iter()
-            .all(|(beyond, _)| *beyond > -OVER_IN_PIXELS * pixel);
+        let is_corner = meet.toward[0].dot(&meet.toward[1]).abs() < MAX_COSINE;
+        let mut beyond = meet.beyond.iter();
+        let ends_there = beyond.all(|(beyond, _)| *beyond > -OVER_IN_PIXELS * pixel);
         (is_corner && ends_there && 0.0 < bounds[0] && bounds[0] < bounds[1]).then_some(Self {
             lines: numbers,
-            ends: beyond.map(|(_, end)| end),
-            point,
-            toward,
-            bisector,
-            cosine,
-            tangent,
+            meet,
             bounds,
             pixel,
         })
     }
 
-    /// The arc that begins so far from the corner, on the first line.
-    pub(super) fn arc(&self, from: f64) -> Option<CircularArc> {
-        let middle = from * (self.cosine.recip() - self.tangent) * self.bisector;
-        let points = [from * self.toward[0], middle, from * self.toward[1]];
-        CircularArc::through(points.map(|point| self.point + point))
-    }
-
-    /// How a point of the arc moves as that begins farther from the corner, by its direction from the
-    /// centre.
-    pub(super) fn moved(&self, outward: &Vector3<f64>) -> f64 {
-        self.tangent + outward.dot(&self.bisector) / self.cosine
+    /// The ends of the lines there.
+    pub(super) fn ends(&self) -> [usize; 2] {
+        self.meet.beyond.map(|(_, end)| end)
     }
 
     /// Each `2 * line + end`.
     pub(super) fn ends_of_lines(&self) -> [usize; 2] {
-        [0, 1].map(|side| 2 * self.lines[side] + self.ends[side])
+        [0, 1].map(|side| 2 * self.lines[side] + self.meet.beyond[side].1)
     }
 
     /// How far from the corner both lines are asked.
@@ -145,12 +171,12 @@ impl<'a> Way<'a> {
         let window = (WINDOW_IN_PIXELS * corner.pixel).min(MAX_WINDOW_SHARE * cut.length());
         let from = |line: &LineSegment3, toward: &Vector3<f64>| {
             let ([place, along], apart) = nearest_points(line, cut)?;
-            let from = (line.point_at(place) - corner.point).dot(toward);
+            let from = (line.point_at(place) - corner.meet.point).dot(toward);
             let beyond = beyond_end(along, cut.length()).0.abs();
             (apart <= gap && beyond <= window && from > 0.0).then_some((from, cut.point_at(along)))
         };
-        let (one, start) = from(lines[0], &corner.toward[0])?;
-        let (other, end) = from(lines[1], &corner.toward[1])?;
+        let (one, start) = from(lines[0], &corner.meet.toward[0])?;
+        let (other, end) = from(lines[1], &corner.meet.toward[1])?;
         Some(Self {
             corner,
             from: [one, other],
@@ -162,7 +188,7 @@ impl<'a> Way<'a> {
         Some(Self {
             corner,
             from: [from; 2],
-            between: Between::Arc(corner.arc(from)?),
+            between: Between::Arc(corner.meet.arc(from)?),
         })
     }
 
@@ -174,7 +200,7 @@ impl<'a> Way<'a> {
     }
 
     pub(super) fn point(&self, place: f64) -> Vector3<f64> {
-        let Corner { point, toward, .. } = self.corner;
+        let Meet { point, toward, .. } = &self.corner.meet;
         point + place.abs() * toward[usize::from(place > 0.0)]
     }
 

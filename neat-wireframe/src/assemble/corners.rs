@@ -159,6 +159,24 @@ pub(super) fn pixel_sizes(images: &Images, lines: &[ChosenLine]) -> Vec<f64> {
     lines.iter().map(size).collect()
 }
 
+/// The pairs of lines whose middles are no farther apart than both reach, ascending.
+pub(super) fn near_pairs(
+    lines: &[ChosenLine],
+    reach: impl Fn(usize) -> f64 + Sync,
+) -> Vec<[usize; 2]> {
+    let middles: Vec<Vector3<f64>> = lines.iter().map(|line| line.line.point_at(0.5)).collect();
+    let of_line = |i: usize| -> Vec<[usize; 2]> {
+        (i + 1..lines.len())
+            .filter(|j| (middles[i] - middles[*j]).norm() <= reach(i) + reach(*j))
+            .map(|j| [i, j])
+            .collect()
+    };
+    (0..lines.len())
+        .into_par_iter()
+        .flat_map_iter(of_line)
+        .collect()
+}
+
 /// Joins the ends of lines, but not of those that run into an arc which rounds their corner, nor
 /// one that stops short of the corner as it has been `joined` to an arc (by line; the others have
 /// not), nor two that do where the images speak against the way of either.
@@ -233,28 +251,21 @@ pub(super) fn find_corners(
 
 fn find_meetings(lines: &[ChosenLine], windows: &[f64], max_gaps: &[f64]) -> Vec<Meeting> {
     let reach = |k: usize| 0.5 * lines[k].line.length() + windows[k];
-    let middles: Vec<Vector3<f64>> = lines.iter().map(|line| line.line.point_at(0.5)).collect();
-    let of_line = |i: usize| -> Vec<Meeting> {
-        (i + 1..lines.len())
-            .filter(|j| (middles[i] - middles[*j]).norm() <= reach(i) + reach(*j))
-            .filter_map(|j| {
-                let (places, gap) = nearest_points(&lines[i].line, &lines[j].line)?;
-                let max_gap = max_gaps[i].max(max_gaps[j]);
-                let within = |k: usize, place: f64| {
-                    beyond_end(place, lines[k].line.length()).0 <= windows[k]
-                };
-                (gap <= max_gap && within(i, places[0]) && within(j, places[1])).then_some(
-                    Meeting {
-                        lines: [i, j],
-                        places,
-                        gap: gap / max_gap,
-                    },
-                )
-            })
-            .collect()
+    let meeting = |[i, j]: [usize; 2]| {
+        let (places, gap) = nearest_points(&lines[i].line, &lines[j].line)?;
+        let max_gap = max_gaps[i].max(max_gaps[j]);
+        let within =
+            |k: usize, place: f64| beyond_end(place, lines[k].line.length()).0 <= windows[k];
+        (gap <= max_gap && within(i, places[0]) && within(j, places[1])).then_some(Meeting {
+            lines: [i, j],
+            places,
+            gap: gap / max_gap,
+        })
     };
-    let meetings: Vec<Vec<Meeting>> = (0..lines.len()).into_par_iter().map(of_line).collect();
-    meetings.into_iter().flatten().collect()
+    near_pairs(lines, reach)
+        .into_par_iter()
+        .filter_map(meeting)
+        .collect()
 }
 
 /// Clusters of ends that grow by joining. End `2 k + side` belongs to line `k`.

@@ -10,13 +10,14 @@ use super::arc_pieces::OWN_SHARE;
 use super::circle_fitting::{FoundArc, Sector, equal_parts};
 use super::claimed_edgels::claim_edgels;
 use super::corner_ways::{Corner, SPACING, Way};
-use super::corners::pixel_sizes;
+use super::corners::{near_pairs, pixel_sizes};
 use super::curve_samples::distance_of_curve;
 use super::curves::{BESIDE_IN_PIXELS, runs_beside};
 use super::edge_samples::{Images, Sample};
 use super::line_evidence::Showing;
 use super::line_fitting::change_by_edgels;
 use super::line_selection::{ChosenLine, MIN_SHOWING};
+use super::rounded_corners::NEAR;
 use nalgebra::{SVector, Vector3};
 use neat_core::CircularArc;
 use rayon::prelude::*;
@@ -67,20 +68,14 @@ pub(super) fn round_corners(images: &Images, lines: &[ChosenLine], arcs: &mut Ve
     let is_known = |corner: &Corner| {
         let pieces = corner.lines.map(|line| &lines[line].line);
         (arcs.iter())
-            .any(|found| found.covariance.is_some() && rounds(images, found, pieces, corner.ends))
+            .any(|found| found.covariance.is_some() && rounds(images, found, pieces, corner.ends()))
     };
-    let reach = |k: usize| 1.5 * lines[k].line.length();
-    let middles: Vec<Vector3<f64>> = lines.iter().map(|line| line.line.point_at(0.5)).collect();
-    let of_line = |i: usize| -> Vec<Corner> {
-        (i + 1..lines.len())
-            .filter(|j| (middles[i] - middles[*j]).norm() <= reach(i) + reach(*j))
-            .filter_map(|j| {
-                let pieces = [i, j].map(|line| &lines[line].line);
-                Corner::between(images, [i, j], pieces, pixels[i].max(pixels[j]))
-            })
-            .collect()
+    let pairs = near_pairs(lines, |k| NEAR * lines[k].line.length());
+    let corner = |[i, j]: [usize; 2]| {
+        let pieces = [i, j].map(|line| &lines[line].line);
+        Corner::between(images, [i, j], pieces, pixels[i].max(pixels[j]))
     };
-    let corners: Vec<Corner> = (0..lines.len()).into_par_iter().flat_map(of_line).collect();
+    let corners: Vec<Corner> = pairs.into_par_iter().filter_map(corner).collect();
     // An end runs into one arc.
     let mut has_arc = vec![false; 2 * lines.len()];
     for corner in corners.iter().filter(|corner| is_known(corner)) {
@@ -132,7 +127,7 @@ fn rounded(images: &Images, lines: &[ChosenLine], corner: &Corner) -> Option<Rou
         .filter(|(_, gain)| **gain > odds)
         .map(|(showing, _)| *showing)
         .collect();
-    let arc = corner.arc(fitted(images, corner, from, &seen)?)?;
+    let arc = corner.meet.arc(fitted(images, corner, from, &seen)?)?;
     Some(Rounded {
         ends: corner.ends_of_lines(),
         advantage,
@@ -216,7 +211,7 @@ fn shown(
 fn fitted(images: &Images, corner: &Corner, from: f64, views: &[Showing]) -> Option<f64> {
     let mut from = from;
     for _ in 0..ROUNDS {
-        let arc = corner.arc(from)?;
+        let arc = corner.meet.arc(from)?;
         let way = Way::round(corner, from)?;
         let rows: Vec<(SVector<f64, 2>, f64)> = (views.iter())
             .flat_map(|showing| rows(images, &way, &arc, showing.view))
@@ -251,8 +246,8 @@ fn rows(
     for part in way.on_lines() {
         let samples = images.samples_of_curve(view, part, SPACING, |place| Some(way.point(place)));
         for sample in samples.into_iter().flatten() {
-            let toward = corner.toward[usize::from(sample.place > 0.0)];
-            let outward = (corner.cosine * toward - corner.bisector).normalize();
+            let toward = corner.meet.toward[usize::from(sample.place > 0.0)];
+            let outward = (corner.meet.cosine * toward - corner.meet.bisector).normalize();
             rows.extend(row(
                 &sample,
                 way.point(sample.place),
@@ -270,7 +265,7 @@ fn rows(
             &sample,
             arc.point_at(sample.place),
             tangent,
-            corner.moved(&outward) * outward,
+            corner.meet.moved(&outward) * outward,
             outward,
         ));
     }

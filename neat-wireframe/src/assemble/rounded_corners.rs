@@ -5,15 +5,18 @@
 //! of an arc that touches both.
 
 use super::arc_joints::runs_into;
-use super::corners::{MAX_GAP, beyond_end, nearest_points, pixel_sizes};
+use super::corner_ways::Meet;
+use super::corners::{MAX_GAP, near_pairs, pixel_sizes};
 use super::edge_samples::Images;
 use super::line_selection::{Chord, ChosenLine};
-use nalgebra::Vector3;
 use neat_core::{CircularArc, LineSegment3};
 use rayon::prelude::*;
 
 /// Edges that stop nearer to where they would meet, in pixels, meet there, judged.
 pub(super) const MIN_SHORT_IN_PIXELS: f64 = 4.0;
+/// Lines are asked whose middles are at most so many of their lengths apart: each stops short by less than
+/// its own.
+pub(super) const NEAR: f64 = 1.5;
 /// Edges stop where both do within so many pixels …
 const UNEVEN_IN_PIXELS: f64 = 4.0;
 /// … or this share of it: one may be hidden a little earlier. Judged.
@@ -80,58 +83,45 @@ pub(super) fn rounded_corners(
 
 fn roundings(images: &Images, lines: &[ChosenLine]) -> Vec<Rounding> {
     let pixels = pixel_sizes(images, lines);
-    let reach = |k: usize| 1.5 * lines[k].line.length();
-    let middles: Vec<Vector3<f64>> = lines.iter().map(|line| line.line.point_at(0.5)).collect();
-    let of_line = |i: usize| -> Vec<Rounding> {
-        (i + 1..lines.len())
-            .filter(|j| (middles[i] - middles[*j]).norm() <= reach(i) + reach(*j))
-            .filter_map(|j| {
-                let pixel = pixels[i].max(pixels[j]);
-                let found = rounding(&lines[i].line, &lines[j].line, images.reach * pixel, pixel)?;
-                let [a, b] = found.ends;
-                Some(Rounding {
-                    ends: [2 * i + a, 2 * j + b],
-                    ..found
-                })
-            })
-            .collect()
+    let of_pair = |[i, j]: [usize; 2]| {
+        let pixel = pixels[i].max(pixels[j]);
+        let found = rounding(&lines[i].line, &lines[j].line, images.reach * pixel, pixel)?;
+        let [a, b] = found.ends;
+        Some(Rounding {
+            ends: [2 * i + a, 2 * j + b],
+            ..found
+        })
     };
-    (0..lines.len()).into_par_iter().flat_map(of_line).collect()
+    let pairs = near_pairs(lines, |k| NEAR * lines[k].line.length());
+    pairs.into_par_iter().filter_map(of_pair).collect()
 }
 
 /// The arc that touches two lines which stop before they meet, and these ends. Each line is followed
 /// over the arc until that has left it by `reach`.
 fn rounding(one: &LineSegment3, other: &LineSegment3, reach: f64, pixel: f64) -> Option<Rounding> {
-    let (places, gap) = nearest_points(one, other)?;
     let lines = [one, other];
-    let short = [0, 1].map(|k| beyond_end(places[k], lines[k].length()));
-    let [a, b] = short.map(|(beyond, _)| beyond);
+    let meet = Meet::of(lines, MAX_GAP * reach)?;
+    let [a, b] = meet.beyond.map(|(beyond, _)| beyond);
     let is_even = (a - b).abs() <= (UNEVEN_IN_PIXELS * pixel).max(UNEVEN * a.max(b));
     let is_short =
-        |k: usize| (MIN_SHORT_IN_PIXELS * pixel..=lines[k].length()).contains(&short[k].0);
-    if gap > MAX_GAP * reach || !(is_even && is_short(0) && is_short(1)) {
+        |k: usize| (MIN_SHORT_IN_PIXELS * pixel..=lines[k].length()).contains(&meet.beyond[k].0);
+    if !(is_even && is_short(0) && is_short(1)) {
         return None;
     }
-    let corner = 0.5 * (one.point_at(places[0]) + other.point_at(places[1]));
-    let toward = [0, 1].map(|k| (lines[k].ends()[1 - short[k].1] - corner).normalize());
-    let bisector = (toward[0] + toward[1]).try_normalize(1e-9)?;
-    let cosine = bisector.dot(&toward[0]);
-    let tangent = (1.0 - cosine * cosine).sqrt() / cosine;
     // From the corner to where it touches: t = d + √(2 r δ), with r = t tan(α / 2).
-    let over = (2.0 * reach * tangent).sqrt();
+    let over = (2.0 * reach * meet.tangent).sqrt();
     let touches = (0.5 * (over + (over * over + 2.0 * (a + b)).sqrt())).powi(2);
-    let middle = touches * (1.0 / cosine - tangent) * bisector;
-    let points = [touches * toward[0], middle, touches * toward[1]];
     Some(Rounding {
-        ends: short.map(|(_, end)| end),
+        ends: meet.beyond.map(|(_, end)| end),
         short: a + b,
-        arc: CircularArc::through(points.map(|point| corner + point))?,
+        arc: meet.arc(touches)?,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     #[test]
     fn an_arc_touches_both_lines() {
