@@ -2,6 +2,7 @@
 """Writes scenes of everyday CAD parts with exact truth.
 
     scripts/make_parts.py OUT [--set first|second|round|third|fourth|catalogue] [NAME...]
+    scripts/make_parts.py OUT --random SEED...
 
 Each scene is a folder of OUT: 60 grey pictures on black, cameras.json,
 gt_wireframe.json and mesh.obj, for `neat reconstruct` and
@@ -18,7 +19,7 @@ import sys
 import numpy as np
 from PIL import Image
 
-from cad_parts import pictures, shapes, truth
+from cad_parts import pictures, random_parts, shapes, truth
 
 VIEWS = 60
 
@@ -37,8 +38,16 @@ def main():
     parser.add_argument(
         "--set", choices=[*sets, "catalogue"], help="one of the sets of parts alone"
     )
+    parser.add_argument(
+        "--random", type=int, nargs="+", metavar="SEED", help="parts that nobody drew, by seeds"
+    )
     parser.add_argument("--truth", action="store_true", help="write the truth alone")
     options = parser.parse_args()
+    for seed in options.random or []:
+        write(random_parts.part(seed)(), options.out / f"random_{seed:03d}", seed, options.truth)
+        print(options.out / f"random_{seed:03d}", flush=True)
+    if options.random:
+        return
     if options.set == "catalogue":
         from cad_parts import catalogue  # Of packages that nothing else needs.
 

@@ -22,7 +22,7 @@ use std::f64::consts::{PI, TAU};
 /// nats.
 pub(super) const OPEN_END: f64 = 3.0;
 /// An end within so many pixels of a junction is there, as for 2D segments.
-const AT_JUNCTION: f64 = 5.0;
+pub(super) const AT_JUNCTION: f64 = 5.0;
 /// Arcs of a smaller radius, in pixels, stay as they are: any short edge beside them would be a
 /// chord.
 pub(super) const MIN_RADIUS: f64 = SECTOR_IN_PIXELS;

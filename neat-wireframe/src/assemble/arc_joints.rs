@@ -236,7 +236,12 @@ pub(super) fn end_on_arcs(images: &Images, corners: &mut Corners, arcs: &mut [Fo
 }
 
 /// The point near the end of an edge where it crosses an arc.
-fn crossing(edge: &LineSegment3, end: usize, found: &FoundArc, gap: f64) -> Option<Vector3<f64>> {
+pub(super) fn crossing(
+    edge: &LineSegment3,
+    end: usize,
+    found: &FoundArc,
+    gap: f64,
+) -> Option<Vector3<f64>> {
     let arc = &found.arc;
     let along = (edge.end - edge.start).try_normalize(0.0)?;
     let mut point = edge.ends()[end];

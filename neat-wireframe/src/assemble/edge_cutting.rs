@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// A junction lies on an edge within so many reaches: less than where ends meet, since a cut
 /// bends the edge. Twice as many cost a house and a façade 0.01 of F1 at 1 cm, half as many are
 /// the same.
-const MAX_GAP: f64 = 0.75;
+pub(super) const MAX_GAP: f64 = 0.75;
 /// Nearer to an end of the edge nothing is cut, in pixels …
 const MARGIN_IN_PIXELS: f64 = 3.0;
 /// … or as a share of the edge, if that is less.

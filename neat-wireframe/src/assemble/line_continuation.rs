@@ -5,11 +5,13 @@ use super::arc_joints::touching_place;
 use super::circle_fitting::FoundArc;
 use super::claimed_edgels::claim_edgels;
 use super::corners::{
-    MAX_GAP, WINDOW_IN_PIXELS, beyond_end, nearest_points, pixel_sizes, sliver_end,
+    MAX_GAP, MAX_WINDOW_SHARE, WINDOW_IN_PIXELS, beyond_end, nearest_points, pixel_sizes,
+    sliver_end,
 };
 use super::edge_samples::Images;
 use super::line_evidence::LineEvidence;
 use super::line_selection::ChosenLine;
+use super::rounded_corners::MIN_SHORT_IN_PIXELS;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 
@@ -115,8 +117,10 @@ fn places_ahead(
     let line = &lines[k].line;
     let length = line.length();
     let gap = |pixel: f64| MAX_GAP * images.reach * pixel.max(pixels[k]);
-    let of_lines = (lines.iter().zip(pixels))
-        .flat_map(|(other, pixel)| meeting_places(line, &other.line, gap(*pixel)));
+    let of_lines = (lines.iter().zip(pixels)).flat_map(|(other, pixel)| {
+        let short = MIN_SHORT_IN_PIXELS * pixel.max(pixels[k]);
+        meeting_places(line, &other.line, gap(*pixel), short)
+    });
     let of_arcs =
         (arcs.iter()).filter_map(|found| touching_place(line, &found.arc, gap(found.pixel)));
     let mut ahead = [Vec::new(), Vec::new()];
@@ -133,12 +137,13 @@ fn places_ahead(
     ahead
 }
 
-/// Where a line would meet another: a point of the other within its length, or the ends of one
-/// that lies on the same line.
-fn meeting_places(line: &LineSegment3, other: &LineSegment3, gap: f64) -> Vec<f64> {
+/// Where a line would meet another, at most `gap` beside it: a point of the other, which may stop
+/// `short` of it, too, or the ends of one that lies on the same line.
+fn meeting_places(line: &LineSegment3, other: &LineSegment3, gap: f64, short: f64) -> Vec<f64> {
     if let Some(([place, on_other], distance)) = nearest_points(line, other) {
-        let (beyond, _) = beyond_end(on_other, other.length());
-        return if distance <= gap && beyond <= gap {
+        let length = other.length();
+        let (beyond, _) = beyond_end(on_other, length);
+        return if distance <= gap && beyond <= short.min(MAX_WINDOW_SHARE * length) {
             vec![place]
         } else {
             Vec::new()
@@ -222,14 +227,16 @@ mod tests {
     }
 
     #[test]
-    fn lines_meet_others_within_their_lengths_and_pieces_of_themselves() {
+    fn lines_meet_others_where_these_may_end_and_pieces_of_themselves() {
         let line = |a: [f64; 3], b: [f64; 3]| LineSegment3::new(a.into(), b.into());
         let along = line([0.0; 3], [1.0, 0.0, 0.0]);
-        let places = |other: LineSegment3| meeting_places(&along, &other, 0.01);
+        let places = |other: LineSegment3| meeting_places(&along, &other, 0.01, 0.1);
         let across = places(line([1.5, -1.0, 0.005], [1.5, 1.0, 0.005]));
         assert!(across.len() == 1 && (across[0] - 1.5).abs() < 1e-9);
         assert!(places(line([1.5, -1.0, 0.02], [1.5, 1.0, 0.02])).is_empty());
+        assert_eq!(places(line([1.5, 0.08, 0.0], [1.5, 1.0, 0.0])), across);
         assert!(places(line([1.5, 0.2, 0.0], [1.5, 1.0, 0.0])).is_empty());
+        assert!(places(line([1.5, 0.08, 0.0], [1.5, 0.2, 0.0])).is_empty());
         let piece = places(line([1.4, 0.0, 0.0], [2.0, 0.005, 0.0]));
         assert!(piece.len() == 2 && (piece[0] - 1.4).abs() < 1e-9);
         assert!(places(line([1.4, 0.02, 0.0], [2.0, 0.02, 0.0])).is_empty());

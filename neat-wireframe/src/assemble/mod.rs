@@ -19,6 +19,7 @@
 //! All steps work in a world whose scene ball is the unit ball around the origin.
 
 mod arc_covariance;
+mod arc_crossings;
 mod arc_ends;
 mod arc_joints;
 mod arc_pieces;
@@ -86,6 +87,7 @@ pub use report::{AssembleReport, Assembled};
 
 use crate::paper::NeatLine;
 use crate::{ViewObservation, Wireframe3d};
+use arc_crossings::cut_at_arcs;
 use arc_ends::{end_at_junctions, junctions_of_edges};
 use arc_joints::{end_on_arcs, join_tangents};
 use arc_tubes::KnownArcs;
@@ -388,6 +390,7 @@ fn graph_of(
     }
     let mut curved = take_curved_edges(&images, &mut wireframe, &mut sources);
     report.curved_lines += curved.len();
+    cut_at_arcs(&images, &mut wireframe, &mut sources, arcs);
     end_at_junctions(&images, &mut wireframe, &mut sources, &mut curved, arcs);
     fit_edges(&images, &lines, &sources, &mut wireframe);
     let junctions = junctions_of_edges(&wireframe, &curved);
