@@ -25,16 +25,23 @@ const MIN_PIECES: usize = 3;
 
 /// The pieces of all curves, of edgels that are `free`.
 pub(super) fn curve_pieces(map: &EdgelMap, free: impl Fn(usize) -> bool) -> Vec<LineSegment2> {
+    let chains = chains(map, free).into_iter();
+    chains
+        .flat_map(|chain| bending_pieces(&straight_pieces(&chain)))
+        .collect()
+}
+
+/// The chains of edgels that are `free`, each edgel in one.
+pub(super) fn chains(map: &EdgelMap, free: impl Fn(usize) -> bool) -> Vec<Vec<Vector2<f64>>> {
     let mut left: Vec<bool> = (0..map.len()).map(free).collect();
-    let mut pieces = Vec::new();
+    let mut chains = Vec::new();
     for seed in 0..map.len() {
         if left[seed] {
             left[seed] = false;
-            let chain = chain_through(map, seed, &mut left);
-            pieces.extend(bending_pieces(&straight_pieces(&chain)));
+            chains.push(chain_through(map, seed, &mut left));
         }
     }
-    pieces
+    chains
 }
 
 /// The edgels before and after one, in order.

@@ -56,14 +56,18 @@ pub(super) fn find_arcs(
     for line in &selection.lines {
         claim_edgels(images, &line.line, &mut taken);
     }
+    for circle in &selection.circles {
+        images.claim_arc(circle, &mut taken);
+    }
     chords.extend(rounded_corners(images, &selection.lines, &taken));
     tracing::debug!(pieces, chords = chords.len(), "curves are proposed");
-    let grown = grown_arcs(images, &chords);
+    let grown = grown_arcs(images, &selection.circles, &chords);
     let mut arcs = chosen_arcs(images, grown, taken.clone(), config.min_evidence);
     let merged = images.merge_arcs(arcs.clone());
     if merged.len() < arcs.len() {
         arcs = chosen_arcs(images, merged, taken, config.min_evidence);
     }
+    arcs.extend_from_slice(&selection.circles);
     retain_steady(images, &mut arcs);
     ControlFlow::Continue(arcs)
 }
@@ -100,11 +104,15 @@ pub(super) fn take_straight(
     lines
 }
 
-/// The arcs around chords, as far as the images show them.
-fn grown_arcs(images: &Images, chords: &[Chord]) -> Vec<FoundArc> {
+/// The arcs around chords, as far as the images show them, but for those along `known` ones.
+fn grown_arcs(images: &Images, known: &[FoundArc], chords: &[Chord]) -> Vec<FoundArc> {
     let mut grown: Vec<FoundArc> = Vec::new();
     for Chord { arc, views } in chords {
-        if !grown.iter().any(|other| covers(images, other, arc)) {
+        if !known
+            .iter()
+            .chain(&grown)
+            .any(|other| covers(images, other, arc))
+        {
             grown.extend(images.follow_arc(arc, views));
         }
     }
