@@ -5,6 +5,7 @@
 //! axes tell its radius, and each says its normal but for a sign, on which the others agree. What lies
 //! there is followed along the edgels as any arc is.
 
+use super::arc_joints::OF_WHOLE;
 use super::circle_fitting::FoundArc;
 use super::curves::{BESIDE_IN_PIXELS, runs_beside};
 use super::edge_samples::Images;
@@ -15,7 +16,7 @@ use nalgebra::Vector3;
 use neat_core::{CircularArc, Ray};
 use rayon::prelude::*;
 use std::cmp::Reverse;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// The centre of a circle lies so far from that of its ellipse at most, in pixels, besides what
 /// perspective moves it, judged.
@@ -225,7 +226,7 @@ impl<'a> Ellipses<'a> {
         upper_median(&mut members.iter().map(of_view).collect::<Vec<f64>>())
     }
 
-    /// The circle of some ellipses as the edgels show it, if that is half of it at least.
+    /// The circle of some ellipses, if the edgels show all of it: parts of one are left to their pieces.
     fn followed(&self, of: &Agreement, least: f64) -> Option<FoundArc> {
         let views: Vec<usize> = of.members.iter().map(|k| self.seen[*k].view).collect();
         let start = |factor: f64| CircularArc {
@@ -238,7 +239,10 @@ impl<'a> Ellipses<'a> {
         let found = (followed.into_iter()).max_by(|a, b| a.gain.total_cmp(&b.gain))?;
         let by_center = (found.arc.center - of.circle.center).norm();
         let moved = by_center.max((found.arc.radius - of.circle.radius).abs());
-        let is_it = found.arc.sweep() >= PI && moved <= MAX_MOVE * of.circle.radius;
+        let gains = found.sectors.iter().map(|sector| sector.evidence.gain);
+        let weakest = OF_WHOLE * gains.clone().fold(0.0, f64::max);
+        let is_whole = found.arc.is_closed() && gains.min_by(f64::total_cmp) >= Some(weakest);
+        let is_it = is_whole && moved <= MAX_MOVE * of.circle.radius;
         let is_outline = || self.images.is_outline(&found.arc, found.pixel);
         (is_it && found.gain > least && !is_outline()).then_some(found)
     }
