@@ -6,9 +6,11 @@ use super::config::AssembleConfig;
 use super::curve_pieces::curve_pieces;
 use super::edge_samples::Images;
 use super::line_selection::{Chord, ChosenLine, MIN_SHOWING, Selection, select_chords};
+use super::neighbours::neighbours;
 use super::progress::OnProgress;
 use super::proposals;
 use super::rounded_corners::rounded_corners;
+use super::small_circles::small_circles;
 use super::view_segments::PreparedView;
 use super::wander::retain_steady;
 use neat_core::{CircularArc, LineSegment3};
@@ -56,18 +58,20 @@ pub(super) fn find_arcs(
     for line in &selection.lines {
         claim_edgels(images, &line.line, &mut taken);
     }
-    for circle in &selection.circles {
+    let beside = neighbours(images.views, config.ball_margin, config.neighbours);
+    let circles = small_circles(images, &beside, config.min_evidence);
+    for circle in &circles {
         images.claim_arc(circle, &mut taken);
     }
     chords.extend(rounded_corners(images, &selection.lines, &taken));
     tracing::debug!(pieces, chords = chords.len(), "curves are proposed");
-    let grown = grown_arcs(images, &selection.circles, &chords);
+    let grown = grown_arcs(images, &circles, &chords);
     let mut arcs = chosen_arcs(images, grown, taken.clone(), config.min_evidence);
     let merged = images.merge_arcs(arcs.clone());
     if merged.len() < arcs.len() {
         arcs = chosen_arcs(images, merged, taken, config.min_evidence);
     }
-    arcs.extend_from_slice(&selection.circles);
+    arcs.extend(circles);
     retain_steady(images, &mut arcs);
     ControlFlow::Continue(arcs)
 }

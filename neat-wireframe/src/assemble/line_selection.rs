@@ -2,17 +2,14 @@
 //! before it has.
 
 use super::candidate_queue::CandidateQueue;
-use super::circle_fitting::FoundArc;
 use super::claimed_edgels::claim_edgels;
 use super::config::AssembleConfig;
 use super::edge_samples::{Images, project_segment};
 use super::hypothesis_scoring::Alternatives;
 use super::line_evidence::LineEvidence;
 use super::line_kind::{Kind, curve_or_straight, kind};
-use super::neighbours::neighbours;
 use super::progress::OnProgress;
 use super::projected_line::ProjectedLine;
-use super::small_circles::small_circles;
 use super::view_segments::SegmentId;
 use crate::statistics::{SIGMA_BY_MEDIAN, upper_median};
 use neat_core::{CircularArc, LineSegment2, LineSegment3};
@@ -80,9 +77,7 @@ pub(super) struct Selection<'a> {
     pub chords: Vec<Chord>,
     /// Those that are outlines of round things.
     pub outlines: usize,
-    /// Circles that are known before, whose edgels no line has.
-    pub circles: Vec<FoundArc>,
-    /// For each edgel of each view, whether a line or one of the circles has it.
+    /// For each edgel of each view, whether a line has it.
     pub taken: Vec<Vec<bool>>,
 }
 
@@ -130,17 +125,7 @@ pub(super) fn select_lines<'a>(
         noise,
         kind,
     };
-    let beside = neighbours(images.views, config.ball_margin, config.neighbours);
-    let circles = small_circles(&images, &beside, config.min_evidence);
-    let mut taken = images.nothing_taken();
-    for circle in &circles {
-        images.claim_arc(circle, &mut taken);
-    }
-    let selection = choose(images, &all, &wanted, taken, progress)?;
-    ControlFlow::Continue(Selection {
-        circles,
-        ..selection
-    })
+    choose(images, &all, &wanted, images.nothing_taken(), progress)
 }
 
 /// The chords among the lines that the images show, of all positions of pieces of curves, by the
@@ -283,7 +268,6 @@ fn choose<'a>(
         curved,
         chords,
         outlines,
-        circles: Vec::new(),
         taken: chooser.taken,
     })
 }
