@@ -1,5 +1,6 @@
 """Parts that nobody drew: a random sketch, extruded or turned, and two to six features on it, as
-people model, another part for each seed. They say what a rule is worth where no one chose the scene."""
+people model, another part for each seed. They say what a rule is worth where no one chose the
+scene."""
 
 import math
 
@@ -108,7 +109,8 @@ def planar_face(rng, made):
     faces = made.faces().filter_by(GeomType.PLANE)
     areas = np.array([face.area for face in faces])
     face = faces[rng.choice(len(faces), p=areas / areas.sum())]
-    plane = Plane(face.center(), x_dir=face.edges().sort_by(Edge.length)[-1] % 0.5, z_dir=face.normal_at())
+    along = face.edges().sort_by(Edge.length)[-1] % 0.5
+    plane = Plane(face.center(), x_dir=along, z_dir=face.normal_at())
     size = plane.to_local_coords(face).bounding_box().size
     return face, plane, size.X, size.Y
 
