@@ -43,10 +43,13 @@ def main():
     )
     parser.add_argument("--truth", action="store_true", help="write the truth alone")
     options = parser.parse_args()
-    for seed in options.random or []:
-        write(random_parts.part(seed)(), options.out / f"random_{seed:03d}", seed, options.truth)
-        print(options.out / f"random_{seed:03d}", flush=True)
     if options.random:
+        if options.set or options.names:
+            parser.error("--random makes parts of seeds, not of a set or with a name")
+        for seed in options.random:
+            folder = options.out / f"random_{seed:03d}"
+            write(random_parts.part(seed), folder, seed, options.truth)
+            print(folder, flush=True)
         return
     if options.set == "catalogue":
         from cad_parts import catalogue  # Of packages that nothing else needs.

@@ -142,6 +142,20 @@ impl Ray {
         let far = middle + half;
         (far > 0.0).then(|| [(middle - half).max(0.0), far])
     }
+
+    /// The point halfway between the nearest points of both rays; `None` where one of these lies
+    /// behind its ray, or the rays are parallel.
+    pub fn meeting(&self, other: &Self) -> Option<Vector3<f64>> {
+        let cosine = self.direction.dot(&other.direction);
+        let squared_sine = 1.0 - cosine * cosine;
+        let between = other.origin - self.origin;
+        let [own, others] = [self, other].map(|ray| between.dot(&ray.direction));
+        let near = (own - cosine * others) / squared_sine;
+        let far = (cosine * own - others) / squared_sine;
+        (near > 0.0 && far > 0.0 && near.is_finite() && far.is_finite()).then(|| {
+            0.5 * (self.origin + self.direction * near + other.origin + other.direction * far)
+        })
+    }
 }
 
 /// Where a world point appears in a camera.
@@ -353,6 +367,22 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rays_meet_halfway_between_their_nearest_points_in_front_of_both() {
+        let ray = |origin: [f64; 3], direction: [f64; 3]| Ray {
+            origin: origin.into(),
+            direction: Vector3::from(direction).normalize(),
+        };
+        let one = ray([0.0; 3], [1.0, 0.0, 0.0]);
+        let met = one
+            .meeting(&ray([2.0, -1.0, 0.1], [0.0, 1.0, 0.0]))
+            .unwrap();
+        assert!((met - Vector3::new(2.0, 0.0, 0.05)).norm() < 1e-12);
+        assert_eq!(one.meeting(&ray([-2.0, -1.0, 0.1], [0.0, 1.0, 0.0])), None);
+        assert_eq!(one.meeting(&ray([2.0, 1.0, 0.1], [0.0, 1.0, 0.0])), None);
+        assert_eq!(one.meeting(&ray([2.0, 1.0, 0.1], [1.0, 0.0, 0.0])), None);
+    }
 
     #[test]
     fn rays_cross_the_ball_where_they_should() {

@@ -22,6 +22,17 @@ pub struct CircularArc {
 }
 
 impl CircularArc {
+    /// The whole circle around a centre, whose plane has a normal of length 1.
+    pub fn around(center: Vector3<f64>, normal: &Vector3<f64>, radius: f64) -> Self {
+        let x = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
+        Self {
+            center,
+            axes: [x, normal.cross(&x)],
+            radius,
+            angles: [0.0, TAU],
+        }
+    }
+
     /// The arc from the first of three points through the second to the third; `None` if they
     /// lie on a line, as well as numbers tell.
     pub fn through([start, middle, end]: [Vector3<f64>; 3]) -> Option<Self> {

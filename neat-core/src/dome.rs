@@ -3,7 +3,7 @@
 use crate::CircularArc;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 /// A cap of a sphere, such as the round end of a pin: what is no farther from its pole than its rim.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,13 +22,8 @@ impl Dome {
     /// The circle in which it ends, around its axis.
     pub fn rim(&self) -> CircularArc {
         let (sine, cosine) = self.reach.sin_cos();
-        let x = across(&self.axis);
-        CircularArc {
-            center: self.center + self.radius * cosine * self.axis,
-            axes: [x, self.axis.cross(&x)],
-            radius: self.radius * sine,
-            angles: [0.0, TAU],
-        }
+        let center = self.center + self.radius * cosine * self.axis;
+        CircularArc::around(center, &self.axis, self.radius * sine)
     }
 
     /// Where a camera sees the sphere end, as far as the dome goes: the same way to both sides of the

@@ -275,21 +275,10 @@ impl<'a> PairGeometry<'a> {
             return None;
         }
         let (ray_a, ray_b) = (&rays[first][a], &rays[second][b]);
-        let cosine = ray_a.direction.dot(&ray_b.direction);
-        if cosine.abs() > MAX_COSINE {
+        if ray_a.direction.dot(&ray_b.direction).abs() > MAX_COSINE {
             return None;
         }
-        // The points of both rays that are nearest to each other.
-        let between = ray_b.origin - ray_a.origin;
-        let (along_a, along_b) = (between.dot(&ray_a.direction), between.dot(&ray_b.direction));
-        let squared_sine = 1.0 - cosine * cosine;
-        let depth_a = (along_a - cosine * along_b) / squared_sine;
-        let depth_b = (cosine * along_a - along_b) / squared_sine;
-        if depth_a <= 0.0 || depth_b <= 0.0 {
-            return None;
-        }
-        let point = 0.5
-            * (ray_a.origin + ray_a.direction * depth_a + ray_b.origin + ray_b.direction * depth_b);
+        let point = ray_a.meeting(ray_b)?;
         let near = |side: usize, corner: usize| {
             let view = views[self.pair[side]];
             let projection = self.cameras[side].project(&point);

@@ -12,19 +12,14 @@ SHORTEST_EDGE = 0.012  # Of the part's extent: five pixels of a picture.
 
 
 def part(seed):
-    """A function as those of `shapes`, with a name by the seed."""
-
-    def built():
-        rng = np.random.default_rng(seed)
-        made = base(rng)
-        for feature in rng.choice(FEATURES, rng.integers(2, 7)):
-            made = with_feature(rng, made, feature)
-        with BuildPart() as p:
-            add(made)
-        return p
-
-    built.__name__ = f"random_{seed:03d}"
-    return built
+    """The part of a seed, as functions of `shapes` make theirs."""
+    rng = np.random.default_rng(seed)
+    made = base(rng)
+    for feature in rng.choice(FEATURES, rng.integers(2, 7)):
+        made = with_feature(rng, made, feature)
+    with BuildPart() as p:
+        add(made)
+    return p
 
 
 def with_feature(rng, made, feature):
@@ -68,7 +63,8 @@ def turned(rng):
     for _ in range(rng.integers(2, 5)):
         radius, length = millimetres(rng, 8, 35), millimetres(rng, 6, 30)
         top = radius if rng.random() < 0.8 else max(radius - length / 2, 5)
-        outline += [at for at in [(radius, height)] if outline[-1:] != [at]]
+        if outline[-1:] != [(radius, height)]:
+            outline.append((radius, height))
         outline.append((top, height + length))
         height += length
     bore = 0.0 if rng.random() < 0.5 else 3.0
@@ -109,10 +105,17 @@ def planar_face(rng, made):
     faces = made.faces().filter_by(GeomType.PLANE)
     areas = np.array([face.area for face in faces])
     face = faces[rng.choice(len(faces), p=areas / areas.sum())]
-    along = face.edges().sort_by(Edge.length)[-1] % 0.5
-    plane = Plane(face.center(), x_dir=along, z_dir=face.normal_at())
+    longest = face.edges().sort_by(Edge.length)[-1]
+    plane = Plane(face.center(), x_dir=longest % 0.5, z_dir=face.normal_at())
     size = plane.to_local_coords(face).bounding_box().size
     return face, plane, size.X, size.Y
+
+
+def outline_on(rng, made):
+    """A sketch on a planar face."""
+    _, plane, width, depth = planar_face(rng, made)
+    outline = sketch(rng, rng.uniform(0.2, 0.8) * width, rng.uniform(0.2, 0.8) * depth)
+    return plane * place(rng, width, depth) * outline
 
 
 def place(rng, width, depth):
@@ -123,15 +126,11 @@ def place(rng, width, depth):
 
 
 def boss(rng, made):
-    _, plane, width, depth = planar_face(rng, made)
-    outline = sketch(rng, rng.uniform(0.2, 0.8) * width, rng.uniform(0.2, 0.8) * depth)
-    return made + extrude(plane * place(rng, width, depth) * outline, millimetres(rng, 4, 25))
+    return made + extrude(outline_on(rng, made), millimetres(rng, 4, 25))
 
 
 def pocket(rng, made):
-    _, plane, width, depth = planar_face(rng, made)
-    outline = sketch(rng, rng.uniform(0.2, 0.8) * width, rng.uniform(0.2, 0.8) * depth)
-    return made - extrude(plane * place(rng, width, depth) * outline, -millimetres(rng, 3, 20))
+    return made - extrude(outline_on(rng, made), -millimetres(rng, 3, 20))
 
 
 def holes(rng, made):

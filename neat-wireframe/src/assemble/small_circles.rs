@@ -152,7 +152,7 @@ impl<'a> Ellipses<'a> {
         }
         let normals = members.iter().flat_map(|k| self.normals(&self.seen[*k]));
         let tried = normals.map(|normal| {
-            let circle = circle_around(center, radius, &normal);
+            let circle = CircularArc::around(center, &normal, radius);
             (self.apart(&members, &circle), circle)
         });
         let (apart, circle) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -248,30 +248,10 @@ impl<'a> Ellipses<'a> {
     }
 }
 
-/// Where two rays come nearest to each other, in front of both cameras.
+/// Where two rays meet that tell a depth.
 fn meeting(one: &Ray, other: &Ray) -> Option<Vector3<f64>> {
-    let cosine = one.direction.dot(&other.direction);
-    let square = 1.0 - cosine * cosine;
-    let between = other.origin - one.origin;
-    let [a, b] = [one, other].map(|ray| between.dot(&ray.direction));
-    let [near, far] = [(a - cosine * b) / square, (cosine * a - b) / square];
-    let is_known = square >= MIN_SINE * MIN_SINE && near > 0.0 && far > 0.0;
-    let points = [
-        one.origin + near * one.direction,
-        other.origin + far * other.direction,
-    ];
-    is_known.then(|| 0.5 * (points[0] + points[1]))
-}
-
-fn circle_around(center: Vector3<f64>, radius: f64, normal: &Vector3<f64>) -> CircularArc {
-    let aside = Vector3::ith_axis(normal.iamin());
-    let axis = normal.cross(&aside).normalize();
-    CircularArc {
-        center,
-        axes: [axis, normal.cross(&axis)],
-        radius,
-        angles: [0.0, TAU],
-    }
+    let sine = one.direction.cross(&other.direction).norm();
+    (sine >= MIN_SINE).then(|| one.meeting(other))?
 }
 
 #[cfg(test)]
@@ -282,7 +262,7 @@ mod tests {
 
     /// A circle of this radius around a point.
     fn circle(radius: f64, normal: Vector3<f64>) -> CircularArc {
-        circle_around(Vector3::new(0.1, -0.2, 0.15), radius, &normal.normalize())
+        CircularArc::around(Vector3::new(0.1, -0.2, 0.15), &normal.normalize(), radius)
     }
 
     /// What is found of what views show.

@@ -223,13 +223,8 @@ mod tests {
         let eye = camera.center_in_world;
         let toward = eye.normalize();
         let sine = RADIUS / eye.norm();
-        let x = toward.cross(&Vector3::ith(toward.iamin(), 1.0)).normalize();
-        CircularArc {
-            center: RADIUS * sine * toward,
-            axes: [x, toward.cross(&x)],
-            radius: RADIUS * (1.0 - sine * sine).sqrt(),
-            angles: [0.0, TAU],
-        }
+        let radius = RADIUS * (1.0 - sine * sine).sqrt();
+        CircularArc::around(RADIUS * sine * toward, &toward, radius)
     }
 
     #[test]
