@@ -66,6 +66,18 @@ fn junction_type(leaving: &[Vector3<f64>]) -> JunctionType {
     }
 }
 
+/// For every edge the share of its ends at which no other edge is: 0, a half or 1.
+pub(super) fn free_ends(wireframe: &Wireframe3d) -> Vec<f64> {
+    let mut degrees = vec![0; wireframe.junctions.len()];
+    for end in wireframe.edges.iter().flatten() {
+        degrees[*end] += 1;
+    }
+    let free = |ends: &[usize; 2]| ends.iter().filter(|end| degrees[**end] == 1).count();
+    (wireframe.edges.iter())
+        .map(|ends| free(ends) as f64 / 2.0)
+        .collect()
+}
+
 /// For every edge the sine of the largest angle between two planes that it spans with edges
 /// it meets: 0 within a face, 1 where two faces meet at right angles. `directions` are those
 /// of the edges.

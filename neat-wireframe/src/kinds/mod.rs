@@ -36,7 +36,7 @@ use crate::confidence::EdgeConfidence;
 use coplanarity::coplanarity;
 use edge_frame::EdgeFrame;
 use edge_samples::{ViewSamples, edge_samples, sampled_bytes};
-use junctions::leaves_plane;
+use junctions::{free_ends, leaves_plane};
 use model::Witnesses;
 use nalgebra::Vector3;
 use neat_core::{Camera, Scene, SceneError, Wireframe3d};
@@ -79,17 +79,20 @@ pub fn edge_kinds(
         .map(|segment| (segment.end - segment.start).try_normalize(0.0))
         .collect();
     let leaving = leaves_plane(wireframe, &directions);
+    let rarities: Vec<f64> = (free_ends(wireframe).into_iter().zip(edges))
+        .map(|(free, edge)| rarity(edge, free))
+        .collect();
     let mut kinds = Vec::with_capacity(frames.len());
     while kinds.len() < frames.len() {
         let first = kinds.len();
-        let (frames, leaving, edges) = (&frames[first..], &leaving[first..], &edges[first..]);
+        let (frames, leaving, rarities) = (&frames[first..], &leaving[first..], &rarities[first..]);
         let count = so_many_at_once(frames, SAMPLED_AT_ONCE);
         let samples = edge_samples(&frames[..count], scene)?;
-        let of_edges = frames.par_iter().zip(leaving).zip(edges).zip(samples);
-        kinds.par_extend(of_edges.map(|(((frame, leaves_plane), edge), samples)| {
+        let of_edges = frames.par_iter().zip(leaving).zip(rarities).zip(samples);
+        kinds.par_extend(of_edges.map(|(((frame, leaves_plane), rarity), samples)| {
             let of_wireframe = Witnesses {
                 leaves_plane: *leaves_plane,
-                rarity: rarity(edge),
+                rarity: *rarity,
                 ..Witnesses::default()
             };
             witnesses(frame.as_ref(), of_wireframe, &samples).kinds()
@@ -136,11 +139,14 @@ fn so_many_at_once(frames: &[Option<EdgeFrame>], most: usize) -> usize {
 }
 
 /// From 0 to 1: few show the edge of many views that ought to. Lines that are none are found
-/// where two views agree by chance, and pairs of views are as the square of their number.
-fn rarity(edge: &EdgeConfidence) -> f64 {
+/// where two views agree by chance, and pairs of views are as the square of their number. Edges
+/// deep in pockets are rare, too, but others meet them: of what any view shows the share of its
+/// ends that are `free` counts.
+fn rarity(edge: &EdgeConfidence, free: f64) -> f64 {
     let shown = edge.showing_views.len() as f64;
     let many = (edge.expected_views as f64 / MANY_VIEWS).min(1.0);
-    (-shown / CLEAR_VIEWS).exp() * many * many
+    let rare = (-shown / CLEAR_VIEWS).exp() * many * many;
+    if shown > 0.0 { free * rare } else { rare }
 }
 
 /// What the images say, beside what is known `of_wireframe`.

@@ -151,21 +151,26 @@ fn probabilities_add_up_and_anything_may_be_asked() {
 }
 
 #[test]
-fn what_few_of_many_views_show_is_hardly_structure() {
+fn what_few_of_many_views_show_is_hardly_structure_unless_edges_meet_it() {
     let scene = scene_of(0.8, step);
-    let wireframe = Wireframe3d {
-        junctions: vec![Vector3::new(-0.4, 0.0, 0.0), Vector3::new(0.4, 0.0, 0.0)],
-        edges: vec![[0, 1]],
-    };
-    let structure = |expected_views: usize| {
-        let edge = EdgeConfidence {
+    let [start, end] = [-0.4, 0.4].map(|x| Vector3::new(x, 0.0, 0.0));
+    let beyond = [start, end].map(|point| 1.5 * point);
+    let structure = |edges: Vec<[usize; 2]>, expected_views: usize| {
+        let wireframe = Wireframe3d {
+            junctions: vec![start, end, beyond[0], beyond[1]],
+            edges,
+        };
+        let confidence = EdgeConfidence {
             expected_views,
             ..shown_in(2)
         };
-        edge_kinds(&wireframe, &scene, &[edge]).unwrap()[0].structure()
+        let confidences = vec![confidence; wireframe.edges.len()];
+        edge_kinds(&wireframe, &scene, &confidences).unwrap()[0].structure()
     };
-    assert!(structure(40) < 0.25, "{}", structure(40));
-    assert!(structure(5) > 0.6, "{}", structure(5));
+    let [alone, met] = [vec![[0, 1]], vec![[0, 1], [0, 2], [1, 3]]];
+    assert!(structure(alone.clone(), 40) < 0.25);
+    assert!(structure(alone, 5) > 0.6);
+    assert!(structure(met, 40) > 0.6);
 }
 
 #[test]
