@@ -20,9 +20,6 @@ use std::ops::ControlFlow;
 pub(super) const REACH_NOISES: f64 = 3.0;
 /// Bounds of the reach in pixels: rounding and rendering, and edges side by side.
 const REACH_BOUNDS: [f64; 2] = [0.25, 1.5];
-/// Edgels within so many pixels speak for a line that is not fitted yet: 2D segments are less exact
-/// than edgels, and few views may show it. Of 0.5 and 0.75 the better on parts.
-const LEAST_REACH_OF_PROPOSALS: f64 = 0.5;
 /// So many lines tell of the noise and the poses; with 400 scores of photographs are the same.
 const SURE_LINES: usize = 100;
 /// Of so many 2D segments one proposes them.
@@ -190,14 +187,6 @@ fn noise_of_edgels(images: &Images, lines: &[ChosenLine]) -> f64 {
     }
 }
 
-/// The images as proposals are asked for, before they are fitted.
-fn proposed<'a>(images: &Images<'a>) -> Images<'a> {
-    Images {
-        reach: images.reach.max(LEAST_REACH_OF_PROPOSALS),
-        ..*images
-    }
-}
-
 /// Which lines are chosen.
 struct Wanted {
     min_evidence: f64,
@@ -223,7 +212,7 @@ fn choose<'a>(
         kind,
     } = wanted;
     let bounds: Vec<f64> = (candidates.par_iter())
-        .map(|candidate| proposed(&images).most_evidence(&candidate.line))
+        .map(|candidate| images.most_evidence(&candidate.line))
         .collect();
     let mut chooser = Chooser {
         images,
@@ -302,14 +291,13 @@ impl Chooser<'_> {
                 let SegmentId { view, segment } = self.candidates[index].segment;
                 !self.explained[view][segment]
             };
-            let wide = proposed(&self.images);
             let weigh = |index: usize| {
                 let line = &self.candidates[index].line;
-                (wide.evidence(line, None, self.min_evidence)).gain
+                (self.images.evidence(line, None, self.min_evidence)).gain
             };
             let (gain, index) = self.queue.pop(is_open, weigh)?;
             let Candidate { segment, line } = &self.candidates[index];
-            let evidence = wide.evidence(line, Some(&self.taken), self.min_evidence);
+            let evidence = (self.images).evidence(line, Some(&self.taken), self.min_evidence);
             if evidence.gain <= self.min_evidence {
                 continue;
             }

@@ -23,10 +23,9 @@ const DARKNESS: f64 = -1.0;
 const BRIGHTNESS: f64 = 3.6;
 /// Both sides as bright as each other, from all views: two faces hardly are (-2.4 to -1.7).
 const EVENNESS: f64 = -2.3;
-/// Few of the views that ought to show it do, and nothing meets it: leaves, and lines between things
-/// that are none. It was -4.1 (-4.4 to -3.8) while what meets others was rare, too, and is
-/// fitted on the three scenes of the parenthesis above alone since.
-const RARITY: f64 = -5.0;
+/// Few of the views that ought to show it do: leaves, and lines between things that are none
+/// (-4.4 to -3.8).
+const RARITY: f64 = -4.1;
 
 /// Logarithm of the ratio of colours at which a difference is clear: ten percent.
 const CLEAR_CHROMA: f64 = 0.1;
