@@ -96,7 +96,7 @@ pub(super) fn round_corners(images: &Images, lines: &[ChosenLine], arcs: &mut Ve
             continue;
         }
         ends.iter().for_each(|end| has_arc[*end] = true);
-        arcs.retain(|other| !runs_beside(other, &found.arc, BESIDE_IN_PIXELS * found.pixel));
+        arcs.retain(|other| !is_same(other, &found));
         added.push(found);
     }
     tracing::debug!(
@@ -105,6 +105,12 @@ pub(super) fn round_corners(images: &Images, lines: &[ChosenLine], arcs: &mut Ve
         "corners are rounded"
     );
     arcs.extend(added);
+}
+
+/// Whether one of two arcs runs along the other.
+fn is_same(one: &FoundArc, other: &FoundArc) -> bool {
+    let near = BESIDE_IN_PIXELS * other.pixel;
+    runs_beside(one, &other.arc, near) || runs_beside(other, &one.arc, near)
 }
 
 /// The arc that rounds a corner, if the images say that one does.
