@@ -26,6 +26,10 @@ pub(super) const AT_JUNCTION: f64 = 5.0;
 /// Arcs of a smaller radius, in pixels, stay as they are: any short edge beside them would be a
 /// chord.
 pub(super) const MIN_RADIUS: f64 = SECTOR_IN_PIXELS;
+/// What goes past a junction to where nothing ends is shown at least by this share of the best piece, judged: a
+/// line that touches the arc there leaves it slowly.
+const PAST_JUNCTION: f64 = 0.3;
+
 /// Ends the arcs at the junctions of edges, straight and curved ones. Edges that are parts of arcs
 /// are taken away; `sources` belong to the straight ones.
 pub(super) fn end_at_junctions(
@@ -208,7 +212,15 @@ impl<'a> Ends<'a> {
             .collect();
         let rates = gains.iter().map(|([from, to], gain)| gain / (to - from));
         let least = OF_WHOLE * rates.fold(0.0, f64::max);
-        let is_there = |([from, to], gain): &([f64; 2], f64)| *gain >= least * (to - from);
+        let ends_at_one = |angle: f64| {
+            let mut off = (self.stations.iter()).map(|station| wrapped(station - angle).abs());
+            off.any(|off| off <= near)
+        };
+        let is_there = |([from, to], gain): &([f64; 2], f64)| {
+            let goes_past = !(ends_at_one(*from) && ends_at_one(*to)) && bounds.len() > 2;
+            let least = if goes_past { PAST_JUNCTION / OF_WHOLE * least } else { least };
+            *gain >= least * (to - from)
+        };
         if gains.iter().all(is_there) {
             return vec![self.found.clone()];
         }
