@@ -3,19 +3,23 @@
 
 use crate::assemble::{AssembleError, Draft};
 use crate::distilled::{BackEndReport, Distilled};
-use nalgebra::Matrix3;
-use neat_core::{Scene, Wireframe3d};
+use nalgebra::{Matrix3, Matrix4};
+use neat_core::{CircularArc, Scene, Wireframe3d};
 use neat_wireframe::confidence::{Confidence, ConfidenceConfig, assess};
 use neat_wireframe::faces::{
-    MeasuredGraph, Shell, SurfacePoint, closed_faces, completed, creases_of_solids, find_shells,
-    loose_lines_on_solids, surface_points,
+    MeasuredGraph, Shell, SurfacePoint, closed_faces, completed, creases_of_solids, divided_arcs,
+    find_shells, loose_lines_on_solids, surface_points,
 };
 use neat_wireframe::kinds::{EdgeKinds, WithoutPaint, edge_kinds, without_paint};
 use neat_wireframe::{SignedDistance, ViewObservation};
+use std::mem;
 
 /// What is asked, and by whom.
 struct Assessor<'a> {
     draft: &'a Draft,
+    /// Those of the draft, at last divided where edges end on them.
+    arcs: Vec<CircularArc>,
+    arc_covariances: Vec<Option<Matrix4<f64>>>,
     scene: &'a Scene,
     views: Vec<ViewObservation>,
     points: Vec<SurfacePoint>,
@@ -53,7 +57,9 @@ impl Draft {
         // The images are asked from where they show the wireframe.
         let scene = refined_scene.as_ref().unwrap_or(scene);
         let cameras: Vec<_> = scene.views.iter().map(|view| view.camera).collect();
-        let assessor = Assessor {
+        let mut assessor = Assessor {
+            arcs: mem::take(&mut self.arcs),
+            arc_covariances: mem::take(&mut self.arc_covariances),
             draft: &self,
             scene,
             views: ViewObservation::from_scene(scene, min_segment_score),
@@ -70,11 +76,12 @@ impl Draft {
         for edge in creases_of_solids(&found.wireframe, &found.shells) {
             found.kinds[edge] = EdgeKinds::CREASE;
         }
+        let (arcs, arc_covariances) = (assessor.arcs, assessor.arc_covariances);
         Ok(Distilled {
             wireframe: found.wireframe,
-            arcs: self.arcs,
+            arcs,
             shells: found.shells,
-            arc_covariances: self.arc_covariances,
+            arc_covariances,
             splines: self.splines,
             domes: self.domes,
             confidence: found.confidence,
@@ -87,18 +94,27 @@ impl Draft {
 }
 
 impl Assessor<'_> {
-    /// The wireframe without what is hardly structure.
-    fn structure(&self, report: &mut BackEndReport) -> Result<Structure, AssembleError> {
+    /// The wireframe without what is hardly structure, and the arcs divided by what is left.
+    fn structure(&mut self, report: &mut BackEndReport) -> Result<Structure, AssembleError> {
         let whole = &self.draft.wireframe;
         let confidence = self.confidence(whole)?;
         let kinds = edge_kinds(whole, self.scene, &confidence.edges)?;
         let left = self.without_paint(whole, &kinds);
+        self.divide_arcs(&left.wireframe);
         if left.painted == 0 {
             return Ok(self.with_shells(left.wireframe, left.kinds, confidence));
         }
         report.leave_out(left.painted, &left.wireframe);
         let confidence = self.confidence(&left.wireframe)?;
         Ok(self.with_shells(left.wireframe, left.kinds, confidence))
+    }
+
+    fn divide_arcs(&mut self, wireframe: &Wireframe3d) {
+        let pieces = divided_arcs(&self.graph(wireframe, &[]));
+        self.arc_covariances = (pieces.iter())
+            .map(|(arc, _)| self.arc_covariances[*arc])
+            .collect();
+        self.arcs = pieces.into_iter().map(|(_, piece)| piece).collect();
     }
 
     /// Lines on faces of solids that close without them are something painted, too.
@@ -160,7 +176,7 @@ impl Assessor<'_> {
     }
 
     fn without_paint(&self, wireframe: &Wireframe3d, kinds: &[EdgeKinds]) -> WithoutPaint {
-        let curves = (&self.draft.arcs[..], &self.draft.splines[..]);
+        let curves = (&self.arcs[..], &self.draft.splines[..]);
         without_paint(wireframe, curves, kinds, self.draft.min_structure)
     }
 
@@ -187,7 +203,7 @@ impl Assessor<'_> {
     ) -> MeasuredGraph<'g> {
         MeasuredGraph {
             wireframe,
-            arcs: &self.draft.arcs,
+            arcs: &self.arcs,
             splines: &self.draft.splines,
             domes: &self.draft.domes,
             covariances,

@@ -218,7 +218,11 @@ impl<'a> Ends<'a> {
         };
         let is_there = |([from, to], gain): &([f64; 2], f64)| {
             let goes_past = !(ends_at_one(*from) && ends_at_one(*to)) && bounds.len() > 2;
-            let least = if goes_past { PAST_JUNCTION / OF_WHOLE * least } else { least };
+            let least = if goes_past {
+                PAST_JUNCTION / OF_WHOLE * least
+            } else {
+                least
+            };
             *gain >= least * (to - from)
         };
         if gains.iter().all(is_there) {
