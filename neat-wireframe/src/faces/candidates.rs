@@ -3,7 +3,7 @@
 
 use super::cells::cells;
 use super::creases::missing_creases;
-use super::curves::{Curve, Curves, sorted};
+use super::curves::{Curve, Curves, measured_points, sorted};
 use super::face::{CurveIndex, Face, Step};
 use super::plane_fit::{PlaneFit, PlaneFrame};
 use super::planes::{CoplanarCurves, coplanar_curves};
@@ -11,11 +11,16 @@ use super::round_cells::round_cells;
 use super::surface::Surface;
 use super::walls::walls;
 use nalgebra::Vector3;
+use neat_core::CircularArc;
+use std::f64::consts::FRAC_PI_4;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Rims of one cylinder or cone agree within so many standard deviations of an arc, of both
 /// together: as one point of a thousand does not.
 pub(super) const AGREEMENT: f64 = 3.29 * std::f64::consts::SQRT_2;
+
+/// What is less of a circle may be a short arc.
+const SHORT: f64 = FRAC_PI_4;
 
 /// All curves, inferred ones among them, and faces with different boundaries, but for `caps`. None
 /// knows its outer side yet. A face most of whose curves are inferred lines, and most of their length,
@@ -120,10 +125,18 @@ pub(super) fn straight_by_ends(curves: &Curves) -> BTreeMap<[usize; 2], &Curve> 
         .collect()
 }
 
-/// The cylinder or cone on which both arcs are rims, with its normal away from the axis.
+/// The cylinder or cone on which both arcs are rims, with its normal away from the axis. Of a short arc
+/// only its points are known, and where its centre would be hardly: the longer one says where the axis is.
 pub(super) fn common_surface(curves: &Curves, rims: [&Curve; 2]) -> Option<Surface> {
     let [a, b] = [rims[0].arc?, rims[1].arc?];
     let tolerance = AGREEMENT * curves.arc_sigma();
+    let [a, b] = if is_short(curves, &b) {
+        [a, around_axis(&b, &a, curves.arc_sigma())?]
+    } else if is_short(curves, &a) {
+        [around_axis(&a, &b, curves.arc_sigma())?, b]
+    } else {
+        [a, b]
+    };
     let between = b.center - a.center;
     let turned = b.normal() * a.normal().dot(&b.normal()).signum();
     let axis = (a.normal() + turned).normalize();
@@ -152,6 +165,33 @@ pub(super) fn common_surface(curves: &Curves, rims: [&Curve; 2]) -> Option<Surfa
             half_angle: (widens.abs() / height).atan(),
             convex: true,
         }
+    })
+}
+
+/// Whether points that are as uncertain as arcs are leave the centre of an arc open: it rises hardly over its chord.
+fn is_short(curves: &Curves, arc: &CircularArc) -> bool {
+    let rise = arc.radius * (1.0 - (0.5 * arc.sweep()).cos());
+    arc.sweep() < SHORT && rise < AGREEMENT * curves.arc_sigma()
+}
+
+/// A short arc as one around the axis of another, if its points lie on such a circle.
+fn around_axis(short: &CircularArc, other: &CircularArc, sigma: f64) -> Option<CircularArc> {
+    let axis = other.normal();
+    let from_center = measured_points(short).map(|point| point - other.center);
+    let places: Vec<[f64; 2]> = from_center
+        .map(|from| {
+            let height = axis.dot(&from);
+            [height, (from - height * axis).norm()]
+        })
+        .collect();
+    let mean = |k: usize| places.iter().map(|place| place[k]).sum::<f64>() / places.len() as f64;
+    let [height, radius] = [mean(0), mean(1)];
+    let is_near = |place: &[f64; 2]| (place[0] - height).abs().max((place[1] - radius).abs()) <= sigma;
+    places.iter().all(is_near).then(|| CircularArc {
+        center: other.center + height * axis,
+        axes: other.axes,
+        radius,
+        angles: short.angles,
     })
 }
 
