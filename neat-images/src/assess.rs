@@ -98,7 +98,7 @@ impl Assessor<'_> {
     fn structure(&mut self, report: &mut BackEndReport) -> Result<Structure, AssembleError> {
         let whole = &self.draft.wireframe;
         let confidence = self.confidence(whole)?;
-        let kinds = edge_kinds(whole, self.scene, &confidence.edges)?;
+        let kinds = self.kinds(whole, &confidence)?;
         let left = self.without_paint(whole, &kinds);
         self.divide_arcs(&left.wireframe);
         if left.painted == 0 {
@@ -156,7 +156,7 @@ impl Assessor<'_> {
         };
         let confidence = self.confidence(&completed.wireframe)?;
         let confidence = confidence.of_completed(&completed, &found.confidence);
-        let kinds = edge_kinds(&completed.wireframe, self.scene, &confidence.edges)?;
+        let kinds = self.kinds(&completed.wireframe, &confidence)?;
         let inferred: Vec<bool> = completed.inferred().collect();
         let whole = Structure {
             inferred,
@@ -173,6 +173,15 @@ impl Assessor<'_> {
     fn confidence(&self, wireframe: &Wireframe3d) -> Result<Confidence, AssembleError> {
         let (views, radius) = (&self.views, self.scene_radius);
         Ok(assess(wireframe, views, self.hiding, radius, self.config)?)
+    }
+
+    fn kinds(
+        &self,
+        wireframe: &Wireframe3d,
+        confidence: &Confidence,
+    ) -> Result<Vec<EdgeKinds>, AssembleError> {
+        let least = self.draft.min_structure;
+        Ok(edge_kinds(wireframe, self.scene, &confidence.edges, least)?)
     }
 
     fn without_paint(&self, wireframe: &Wireframe3d, kinds: &[EdgeKinds]) -> WithoutPaint {

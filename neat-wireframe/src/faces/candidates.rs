@@ -12,8 +12,8 @@ use super::surface::Surface;
 use super::walls::walls;
 use nalgebra::Vector3;
 use neat_core::CircularArc;
-use std::f64::consts::FRAC_PI_4;
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::FRAC_PI_4;
 
 /// Rims of one cylinder or cone agree within so many standard deviations of an arc, of both
 /// together: as one point of a thousand does not.
@@ -186,7 +186,8 @@ fn around_axis(short: &CircularArc, other: &CircularArc, sigma: f64) -> Option<C
         .collect();
     let mean = |k: usize| places.iter().map(|place| place[k]).sum::<f64>() / places.len() as f64;
     let [height, radius] = [mean(0), mean(1)];
-    let is_near = |place: &[f64; 2]| (place[0] - height).abs().max((place[1] - radius).abs()) <= sigma;
+    let is_near =
+        |place: &[f64; 2]| (place[0] - height).abs().max((place[1] - radius).abs()) <= sigma;
     places.iter().all(is_near).then(|| CircularArc {
         center: other.center + height * axis,
         axes: other.axes,

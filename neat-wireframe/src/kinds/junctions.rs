@@ -66,16 +66,20 @@ fn junction_type(leaving: &[Vector3<f64>]) -> JunctionType {
     }
 }
 
-/// For every edge the share of its ends at which no other edge is: 0, a half or 1.
-pub(super) fn free_ends(wireframe: &Wireframe3d) -> Vec<f64> {
+/// For every edge the share of its ends at which no other edge is that `is_there`: 0, a half or 1.
+pub(super) fn free_ends(wireframe: &Wireframe3d, is_there: &[bool]) -> Vec<f64> {
     let mut degrees = vec![0; wireframe.junctions.len()];
-    for end in wireframe.edges.iter().flatten() {
-        degrees[*end] += 1;
+    for (ends, is_there) in wireframe.edges.iter().zip(is_there) {
+        for end in ends {
+            degrees[*end] += usize::from(*is_there);
+        }
     }
-    let free = |ends: &[usize; 2]| ends.iter().filter(|end| degrees[**end] == 1).count();
-    (wireframe.edges.iter())
-        .map(|ends| free(ends) as f64 / 2.0)
-        .collect()
+    let free = |(ends, is_there): (&[usize; 2], &bool)| {
+        let own = usize::from(*is_there);
+        let free = ends.iter().filter(|end| degrees[**end] == own).count();
+        free as f64 / 2.0
+    };
+    wireframe.edges.iter().zip(is_there).map(free).collect()
 }
 
 /// For every edge the sine of the largest angle between two planes that it spans with edges

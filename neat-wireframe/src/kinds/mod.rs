@@ -59,6 +59,7 @@ const SAMPLED_AT_ONCE: usize = 256 << 20;
 /// - `wireframe`: valid, in the world of the cameras, with edges cut where others meet them.
 /// - `scene`: images and cameras; one image at a time is in memory.
 /// - `edges`: what [`assess`](crate::confidence::assess) says of each, in the same order.
+/// - `min_structure`: what is structure with less than this probability is no edge that others meet.
 ///
 /// The result does not depend on the number of threads.
 ///
@@ -68,6 +69,7 @@ pub fn edge_kinds(
     wireframe: &Wireframe3d,
     scene: &Scene,
     edges: &[EdgeConfidence],
+    min_structure: f64,
 ) -> Result<Vec<EdgeKinds>, SceneError> {
     let _span = tracing::debug_span!("edge_kinds", edges = wireframe.edges.len()).entered();
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
@@ -79,27 +81,49 @@ pub fn edge_kinds(
         .map(|segment| (segment.end - segment.start).try_normalize(0.0))
         .collect();
     let leaving = leaves_plane(wireframe, &directions);
-    let rarities: Vec<f64> = (free_ends(wireframe).into_iter().zip(edges))
-        .map(|(free, edge)| rarity(edge, free))
-        .collect();
-    let mut kinds = Vec::with_capacity(frames.len());
-    while kinds.len() < frames.len() {
-        let first = kinds.len();
-        let (frames, leaving, rarities) = (&frames[first..], &leaving[first..], &rarities[first..]);
+    let mut witnesses = Vec::with_capacity(frames.len());
+    while witnesses.len() < frames.len() {
+        let first = witnesses.len();
+        let (frames, leaving) = (&frames[first..], &leaving[first..]);
         let count = so_many_at_once(frames, SAMPLED_AT_ONCE);
         let samples = edge_samples(&frames[..count], scene)?;
-        let of_edges = frames.par_iter().zip(leaving).zip(rarities).zip(samples);
-        kinds.par_extend(of_edges.map(|(((frame, leaves_plane), rarity), samples)| {
-            let of_wireframe = Witnesses {
-                leaves_plane: *leaves_plane,
-                rarity: *rarity,
-                ..Witnesses::default()
-            };
-            witnesses(frame.as_ref(), of_wireframe, &samples).kinds()
-        }));
+        let of_edges = frames.par_iter().zip(leaving).zip(samples);
+        witnesses.par_extend(
+            of_edges
+                .map(|((frame, leaving), samples)| of_images(frame.as_ref(), *leaving, &samples)),
+        );
     }
+    let mut kinds = with_rarity(wireframe, edges, &witnesses, min_structure);
     take_after_neighbours(wireframe, edges, &mut kinds);
     Ok(kinds)
+}
+
+/// What edges are by all witnesses. Others end where an edge does only if they are structure themselves, so those
+/// that are not are left out one after the other.
+fn with_rarity(
+    wireframe: &Wireframe3d,
+    edges: &[EdgeConfidence],
+    witnesses: &[Witnesses],
+    min_structure: f64,
+) -> Vec<EdgeKinds> {
+    let mut is_there = vec![true; witnesses.len()];
+    loop {
+        let free = free_ends(wireframe, &is_there);
+        let kinds: Vec<EdgeKinds> = (witnesses.iter().zip(edges).zip(free))
+            .map(|((known, edge), free)| {
+                let rarity = rarity(edge, free);
+                Witnesses { rarity, ..*known }.kinds()
+            })
+            .collect();
+        let stays = |(kinds, is_there): (&EdgeKinds, &bool)| {
+            *is_there && kinds.structure() >= min_structure
+        };
+        let staying: Vec<bool> = kinds.iter().zip(&is_there).map(stays).collect();
+        if staying == is_there {
+            return kinds;
+        }
+        is_there = staying;
+    }
 }
 
 /// An edge that no view shows was asked for by those that it joins, as the end of a slab: it is no
@@ -149,13 +173,12 @@ fn rarity(edge: &EdgeConfidence, free: f64) -> f64 {
     if shown > 0.0 { free * rare } else { rare }
 }
 
-/// What the images say, beside what is known `of_wireframe`.
-fn witnesses(
-    frame: Option<&EdgeFrame>,
-    of_wireframe: Witnesses,
-    samples: &[ViewSamples],
-) -> Witnesses {
-    let mut witnesses = of_wireframe;
+/// What the images say, and how an edge is `leaving` the planes of its neighbours.
+fn of_images(frame: Option<&EdgeFrame>, leaving: f64, samples: &[ViewSamples]) -> Witnesses {
+    let mut witnesses = Witnesses {
+        leaves_plane: leaving,
+        ..Witnesses::default()
+    };
     let Some(frame) = frame else {
         return witnesses;
     };

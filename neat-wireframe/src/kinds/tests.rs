@@ -8,6 +8,9 @@ use neat_core::synthetic::{Solid, render};
 use neat_core::{LineSegment3, Ray, Similarity, View, Wireframe2d};
 use std::f64::consts::TAU;
 
+/// As in the default configuration.
+const MIN_STRUCTURE: f64 = 0.33;
+
 /// Twelve cameras at 15° and 30° from the z axis.
 fn cameras() -> Vec<Camera> {
     let center = |i: usize| {
@@ -84,7 +87,7 @@ fn kinds_of(scene: &Scene) -> EdgeKinds {
         junctions: vec![Vector3::new(-0.4, 0.0, 0.0), Vector3::new(0.4, 0.0, 0.0)],
         edges: vec![[0, 1]],
     };
-    edge_kinds(&wireframe, scene, &[shown_in(12)]).unwrap()[0]
+    edge_kinds(&wireframe, scene, &[shown_in(12)], MIN_STRUCTURE).unwrap()[0]
 }
 
 /// A step of brightness along the edge, and grain on both sides.
@@ -137,14 +140,14 @@ fn probabilities_add_up_and_anything_may_be_asked() {
     };
     for (views, most_likely) in [(12, EdgeKind::Crease), (0, EdgeKind::Texture)] {
         let edges = vec![shown_in(views); 3];
-        for kinds in edge_kinds(&wireframe, &scene, &edges).unwrap() {
+        for kinds in edge_kinds(&wireframe, &scene, &edges, MIN_STRUCTURE).unwrap() {
             let rest = kinds.texture + kinds.shadow;
             assert!((kinds.structure() + rest - 1.0).abs() < 1e-12, "{kinds:?}");
             assert_eq!(kinds.most_likely().0, most_likely);
         }
     }
     assert!(
-        edge_kinds(&Wireframe3d::default(), &scene, &[])
+        edge_kinds(&Wireframe3d::default(), &scene, &[], MIN_STRUCTURE)
             .unwrap()
             .is_empty()
     );
@@ -155,22 +158,25 @@ fn what_few_of_many_views_show_is_hardly_structure_unless_edges_meet_it() {
     let scene = scene_of(0.8, step);
     let [start, end] = [-0.4, 0.4].map(|x| Vector3::new(x, 0.0, 0.0));
     let beyond = [start, end].map(|point| 1.5 * point);
-    let structure = |edges: Vec<[usize; 2]>, expected_views: usize| {
+    // The first of some edges, if so many views show the others.
+    let structure = |edges: Vec<[usize; 2]>, expected_views: usize, others_shown: usize| {
         let wireframe = Wireframe3d {
             junctions: vec![start, end, beyond[0], beyond[1]],
             edges,
         };
-        let confidence = EdgeConfidence {
+        let confidence = |shown: usize| EdgeConfidence {
             expected_views,
-            ..shown_in(2)
+            ..shown_in(shown)
         };
-        let confidences = vec![confidence; wireframe.edges.len()];
-        edge_kinds(&wireframe, &scene, &confidences).unwrap()[0].structure()
+        let mut confidences = vec![confidence(others_shown); wireframe.edges.len()];
+        confidences[0] = confidence(2);
+        edge_kinds(&wireframe, &scene, &confidences, MIN_STRUCTURE).unwrap()[0].structure()
     };
     let [alone, met] = [vec![[0, 1]], vec![[0, 1], [0, 2], [1, 3]]];
-    assert!(structure(alone.clone(), 40) < 0.25);
-    assert!(structure(alone, 5) > 0.6);
-    assert!(structure(met, 40) > 0.6);
+    assert!(structure(alone.clone(), 40, 2) < 0.25, "it is rare");
+    assert!(structure(alone, 5, 2) > 0.6, "few views ought to show it");
+    assert!(structure(met.clone(), 40, 12) > 0.6, "others meet it");
+    assert!(structure(met, 40, 0) < 0.25, "what is none meets it");
 }
 
 #[test]
