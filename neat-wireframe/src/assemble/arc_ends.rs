@@ -274,6 +274,7 @@ mod tests {
     use crate::assemble::test_views::TestViews;
     use crate::assemble::view_segments::PreparedView;
     use crate::test_scenes::{cameras_on_sphere, views_of_edges};
+    use std::cell::Cell;
 
     /// The angles of what is left of an arc, and how many edges, where an edge leaves the circle
     /// at some angles, and others are chords of it.
@@ -360,6 +361,18 @@ mod tests {
             "{angles:?}"
         );
         assert!((angles[1][0] - 2.0).abs() < 1e-6 && (angles[1][1] - 3.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_few_views_show_beyond_a_junction_ends_at_another_one_or_is_none() {
+        let view = Cell::new(0);
+        let views = views_of_arcs(20, |_| {
+            view.set(view.get() + 1);
+            arc(if view.get() % 5 == 0 { 1.5 } else { 1.0 })
+        });
+        assert_near(&ended(&views, [0.0, 1.5], &[1.0], &[]).0, &[[0.0, 1.0]]);
+        let (angles, _) = ended(&views, [0.0, 1.5], &[0.0, 1.0, 1.5], &[]);
+        assert_near(&angles, &[[0.0, 1.5]]);
     }
 
     #[test]

@@ -237,3 +237,30 @@ pub(super) fn joined(
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_arc_is_around_the_axis_of_a_longer_one() {
+        let longer = CircularArc {
+            center: Vector3::zeros(),
+            axes: [Vector3::x(), Vector3::y()],
+            radius: 0.5,
+            angles: [0.0, 3.0],
+        };
+        // Above it, a little too high in its middle, and with its end raised.
+        let short = |off: f64, raised: f64| {
+            let points = [(0.4, 0.0), (0.5, off), (0.6, 0.0)]
+                .map(|(angle, off)| (1.0 + off / 0.5) * longer.point_at(angle) + Vector3::z());
+            CircularArc::through([points[0], points[1], points[2] + raised * Vector3::z()]).unwrap()
+        };
+        let bowed = short(2e-3, 0.0);
+        assert!(bowed.radius < 0.3, "{}", bowed.radius);
+        let around = around_axis(&bowed, &longer, 3e-3).unwrap();
+        assert!((around.radius - 0.5).abs() < 2e-3, "{}", around.radius);
+        assert!((around.center - Vector3::z()).norm() < 1e-9);
+        assert!(around_axis(&short(0.0, 0.02), &longer, 3e-3).is_none());
+    }
+}
