@@ -29,6 +29,8 @@ const HIDDEN: f64 = 0.3;
 /// An arc must explain the edgels so much better than the sharp corner, in nats, as for outlines: it
 /// is the best of many tries.
 const ADVANTAGE: f64 = 12.0;
+/// Places at which an arc is asked whether it is another one.
+const PLACES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// Rounds of fitting.
 const ROUNDS: usize = 3;
 /// Fewer edgels tell nothing of an arc.
@@ -96,7 +98,7 @@ pub(super) fn round_corners(images: &Images, lines: &[ChosenLine], arcs: &mut Ve
             continue;
         }
         ends.iter().for_each(|end| has_arc[*end] = true);
-        arcs.retain(|other| !is_same(other, &found));
+        arcs.retain(|other| !is_again(other, &found));
         added.push(found);
     }
     tracing::debug!(
@@ -107,10 +109,16 @@ pub(super) fn round_corners(images: &Images, lines: &[ChosenLine], arcs: &mut Ve
     arcs.extend(added);
 }
 
-/// Whether one of two arcs runs along the other.
-fn is_same(one: &FoundArc, other: &FoundArc) -> bool {
-    let near = BESIDE_IN_PIXELS * other.pixel;
-    runs_beside(one, &other.arc, near) || runs_beside(other, &one.arc, near)
+/// Whether another arc runs along all of the one that is `found`, or that along most of it.
+fn is_again(other: &FoundArc, found: &FoundArc) -> bool {
+    let near = BESIDE_IN_PIXELS * found.pixel;
+    let is_beside = |place: &&f64| {
+        let point = (other.arc).point_at(other.arc.angles[0] + *place * other.arc.sweep());
+        let angle = found.arc.angle_of(&point);
+        found.arc.distance_to_circle(&point) < near && found.arc.contains(angle, 0.0)
+    };
+    runs_beside(other, &found.arc, near)
+        || 2 * PLACES.iter().filter(is_beside).count() > PLACES.len()
 }
 
 /// The arc that rounds a corner, if the images say that one does.
