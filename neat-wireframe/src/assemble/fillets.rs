@@ -387,11 +387,13 @@ mod tests {
             assert_eq!(arcs.len(), 1);
             assert_eq!(arcs[0].arc == tilted(None).arc, is_kept);
         }
-        // A piece of it, too.
-        let mut arcs = vec![known.clone()];
-        arcs[0].arc.angles = [0.2, 0.6].map(|place| known.arc.angles[0] + place * FRAC_PI_2);
-        round_corners(&images, &lines, &mut arcs);
-        assert_eq!(arcs.len(), 1);
-        assert!((arcs[0].arc.sweep() - FRAC_PI_2).abs() < 1e-9);
+        // A piece of it, too, and one that goes on past its end.
+        for places in [[0.2, 0.6], [0.3, 1.25]] {
+            let mut arcs = vec![known.clone()];
+            arcs[0].arc.angles = places.map(|place| known.arc.angles[0] + place * FRAC_PI_2);
+            round_corners(&images, &lines, &mut arcs);
+            assert_eq!(arcs.len(), 1, "{places:?}");
+            assert!((arcs[0].arc.sweep() - FRAC_PI_2).abs() < 1e-9);
+        }
     }
 }
