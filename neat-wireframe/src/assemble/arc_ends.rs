@@ -26,8 +26,8 @@ pub(super) const AT_JUNCTION: f64 = 5.0;
 /// Arcs of a smaller radius, in pixels, stay as they are: any short edge beside them would be a
 /// chord.
 pub(super) const MIN_RADIUS: f64 = SECTOR_IN_PIXELS;
-/// What goes past a junction to where nothing ends is shown at least by this share of the best piece, judged: a
-/// line that touches the arc there leaves it slowly.
+/// What goes past a junction to where nothing ends is shown by at least this share of what the best
+/// piece is, judged: a line that touches the arc there leaves it slowly.
 const PAST_JUNCTION: f64 = 0.3;
 
 /// Ends the arcs at the junctions of edges, straight and curved ones. Edges that are parts of arcs

@@ -125,17 +125,17 @@ pub(super) fn straight_by_ends(curves: &Curves) -> BTreeMap<[usize; 2], &Curve> 
         .collect()
 }
 
-/// The cylinder or cone on which both arcs are rims, with its normal away from the axis. Of a short arc
-/// only its points are known, and where its centre would be hardly: the longer one says where the axis is.
+/// The cylinder or cone on which both arcs are rims, with its normal away from the axis. Of a short
+/// arc only its points are known, and its centre hardly: the longer one says where the axis is.
 pub(super) fn common_surface(curves: &Curves, rims: [&Curve; 2]) -> Option<Surface> {
     let [a, b] = [rims[0].arc?, rims[1].arc?];
     let tolerance = AGREEMENT * curves.arc_sigma();
-    let [a, b] = if is_short(curves, &b) {
-        [a, around_axis(&b, &a, curves.arc_sigma())?]
-    } else if is_short(curves, &a) {
-        [around_axis(&a, &b, curves.arc_sigma())?, b]
-    } else {
-        [a, b]
+    let is_longer = a.length() >= b.length();
+    let [a, b] = match [a, b].map(|arc| is_short(curves, &arc)) {
+        [false, false] => [a, b],
+        [false, true] => [a, around_axis(&b, &a, curves.arc_sigma())?],
+        [true, true] if is_longer => [a, around_axis(&b, &a, curves.arc_sigma())?],
+        [true, _] => [around_axis(&a, &b, curves.arc_sigma())?, b],
     };
     let between = b.center - a.center;
     let turned = b.normal() * a.normal().dot(&b.normal()).signum();
@@ -168,13 +168,14 @@ pub(super) fn common_surface(curves: &Curves, rims: [&Curve; 2]) -> Option<Surfa
     })
 }
 
-/// Whether points that are as uncertain as arcs are leave the centre of an arc open: it rises hardly over its chord.
+/// Whether points that are as uncertain as those of arcs leave the centre of an arc open, as it
+/// rises hardly over its chord.
 fn is_short(curves: &Curves, arc: &CircularArc) -> bool {
     let rise = arc.radius * (1.0 - (0.5 * arc.sweep()).cos());
     arc.sweep() < SHORT && rise < AGREEMENT * curves.arc_sigma()
 }
 
-/// A short arc as one around the axis of another, if its points lie on such a circle.
+/// The circle around the axis of another arc on which the points of a short one lie, if they do.
 fn around_axis(short: &CircularArc, other: &CircularArc, sigma: f64) -> Option<CircularArc> {
     let axis = other.normal();
     let from_center = measured_points(short).map(|point| point - other.center);
@@ -190,9 +191,8 @@ fn around_axis(short: &CircularArc, other: &CircularArc, sigma: f64) -> Option<C
         |place: &[f64; 2]| (place[0] - height).abs().max((place[1] - radius).abs()) <= sigma;
     places.iter().all(is_near).then(|| CircularArc {
         center: other.center + height * axis,
-        axes: other.axes,
         radius,
-        angles: short.angles,
+        ..*other
     })
 }
 

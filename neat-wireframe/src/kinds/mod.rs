@@ -98,8 +98,8 @@ pub fn edge_kinds(
     Ok(kinds)
 }
 
-/// What edges are by all witnesses. Others end where an edge does only if they are structure themselves, so those
-/// that are not are left out one after the other.
+/// What edges are by all witnesses. Others end where an edge does only if they are structure
+/// themselves, so those that are not are left out, until nothing changes.
 fn with_rarity(
     wireframe: &Wireframe3d,
     edges: &[EdgeConfidence],
@@ -173,7 +173,7 @@ fn rarity(edge: &EdgeConfidence, free: f64) -> f64 {
     if shown > 0.0 { free * rare } else { rare }
 }
 
-/// What the images say, and how an edge is `leaving` the planes of its neighbours.
+/// What the images say, and whether the neighbours are `leaving` the plane of the edge.
 fn of_images(frame: Option<&EdgeFrame>, leaving: f64, samples: &[ViewSamples]) -> Witnesses {
     let mut witnesses = Witnesses {
         leaves_plane: leaving,
