@@ -5,7 +5,7 @@ use crate::evidence::{Evidence, Gathered, evenly};
 use crate::examination::{Check, Finding, Level, Repair, counted, median, percent};
 use crate::hypothesis::{Hypothesis, PoseOrder};
 use crate::point_transfer::{known_points, transfer_gain};
-use crate::silhouettes::covered_share;
+use crate::silhouettes::{covered_share, covered_share_of};
 use neat_core::layout::{CameraAxes, PoseConvention};
 use neat_core::{Camera, Scene};
 use rayon::prelude::*;
@@ -22,6 +22,9 @@ const SIGNIFICANT: f64 = 4.0;
 /// have looks elsewhere than they do, and all that it has may be false. On photographs of a house
 /// from all sides such views have 4 to 21 %, neighbours of three scenes at least 33 %.
 const MIN_TOLD: f64 = 0.25;
+/// A view with fewer corners than this share of what the others have may have none of the thing,
+/// judged: of 36 random parts two views of one have .3, all of their corners false.
+const FEW_CORNERS: f64 = 0.5;
 /// So many views speak for the others.
 const ASKED_VIEWS: usize = 8;
 /// Right cameras explain at least this share of the silhouettes …
@@ -255,12 +258,36 @@ impl<'a> Diagnosis<'a> {
         trusted
     }
 
-    /// The views without trust where nothing that the `trusted` ones agree on is seen: few
-    /// tracks may all be false, as at the ends of a run of neighbours.
+    /// The views without trust for which nothing else speaks: few tracks may all be false, as at
+    /// the ends of a run of neighbours, and so may few corners, as of something round from above.
     fn bad_views_beside(&self, trusted: &[bool]) -> Vec<usize> {
+        let speaks = |view: usize| match self.evidence() {
+            Evidence::Tracks { .. } => self.shows_known_points(view, trusted),
+            Evidence::Corners(_) => self.shows_few_corners_but_its_outline(view, trusted),
+        };
         (self.gathered.views.iter().copied())
-            .filter(|&view| !trusted[view] && !self.shows_known_points(view, trusted))
+            .filter(|&view| !trusted[view] && !speaks(view))
             .collect()
+    }
+
+    /// Whether a view has far fewer corners than the `trusted` ones, and its silhouette lies in the
+    /// hull of all others.
+    fn shows_few_corners_but_its_outline(&self, view: usize, trusted: &[bool]) -> bool {
+        let given = self.all_given();
+        let told = |view: &usize| given.per_view[*view].total as f64;
+        let typical = median(
+            self.gathered
+                .views
+                .iter()
+                .filter(|view| trusted[**view])
+                .map(told),
+        );
+        let cameras: Vec<Camera> = self.scene.views.iter().map(|view| view.camera).collect();
+        let share = || {
+            let silhouettes = &self.gathered.silhouettes;
+            covered_share_of(view, silhouettes, &cameras, self.scene.sphere_radius)
+        };
+        told(&view) < FEW_CORNERS * typical && share().is_some_and(|share| share > MIN_COVERED)
     }
 
     /// What speaks for the given cameras where tracks or corners do not; `None` if nothing does.

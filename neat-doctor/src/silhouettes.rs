@@ -5,6 +5,7 @@
 //! other views show within theirs: the visual hull (Laurentini 1994). With wrong ones much of
 //! the silhouettes is left over.
 
+use crate::agreement::Tally;
 use crate::gray_image::GrayImage;
 use nalgebra::Vector2;
 use neat_core::{Camera, Ray};
@@ -106,21 +107,42 @@ fn beside(index: usize, columns: usize, rows: usize) -> impl Iterator<Item = usi
 /// The share of all silhouettes that has a place in the hull of the others, within a ball
 /// around the origin. `cameras` are those of all views of the scene.
 pub(crate) fn covered_share(silhouettes: &[Silhouette], cameras: &[Camera], radius: f64) -> f64 {
-    let counts: Vec<[usize; 2]> = (silhouettes.par_iter())
-        .map(|own| {
-            let camera = &cameras[own.view];
-            let size = Vector2::new(f64::from(camera.width), f64::from(camera.height));
-            let covered = |sample: &&Vector2<f64>| {
-                let ray = camera.ray_through(&sample.component_mul(&size));
-                places(&ray, BALL * radius)
-                    .any(|along| is_in_hull(silhouettes, cameras, own.view, &ray, along))
-            };
-            let covered = own.samples.iter().filter(covered).count();
-            [covered, own.samples.len()]
-        })
-        .collect();
-    let [covered, all] = (counts.iter()).fold([0, 0], |[a, b], [c, d]| [a + c, b + d]);
-    covered as f64 / all.max(1) as f64
+    let of_one = |own: &Silhouette| covered_of(own, silhouettes, cameras, radius);
+    let counts: Vec<Tally> = silhouettes.par_iter().map(of_one).collect();
+    let mut all = Tally::default();
+    counts.into_iter().for_each(|of_one| all += of_one);
+    all.share()
+}
+
+/// The same of the silhouette of one view; `None` if that has none.
+pub(crate) fn covered_share_of(
+    view: usize,
+    silhouettes: &[Silhouette],
+    cameras: &[Camera],
+    radius: f64,
+) -> Option<f64> {
+    let own = silhouettes.iter().find(|own| own.view == view)?;
+    Some(covered_of(own, silhouettes, cameras, radius).share())
+}
+
+/// Of how many samples of one silhouette, how many have a place in the hull of the others.
+fn covered_of(
+    own: &Silhouette,
+    silhouettes: &[Silhouette],
+    cameras: &[Camera],
+    radius: f64,
+) -> Tally {
+    let camera = &cameras[own.view];
+    let size = Vector2::new(f64::from(camera.width), f64::from(camera.height));
+    let covered = |sample: &&Vector2<f64>| {
+        let ray = camera.ray_through(&sample.component_mul(&size));
+        places(&ray, BALL * radius)
+            .any(|along| is_in_hull(silhouettes, cameras, own.view, &ray, along))
+    };
+    Tally {
+        explained: own.samples.iter().filter(covered).count(),
+        total: own.samples.len(),
+    }
 }
 
 /// Depths of places along a ray within a ball around the origin.
@@ -220,6 +242,13 @@ mod tests {
         let right = covered_share(&silhouettes, &cameras, 1.0);
         assert!(right > 0.98, "{right}");
         assert!(covered_share(&silhouettes, &cameras, 0.1) < 0.8);
+        let of_view = |cameras: &[Camera]| covered_share_of(3, &silhouettes, cameras, 1.0);
+        assert!(of_view(&cameras).is_some_and(|share| share > 0.98));
+        // The camera of another view.
+        let mut exchanged = cameras.clone();
+        exchanged[3] = cameras[8];
+        assert!(of_view(&exchanged).is_some_and(|share| share < 0.9));
+        assert!(covered_share_of(99, &silhouettes, &cameras, 1.0).is_none());
         cameras.rotate_left(5);
         let wrong = covered_share(&silhouettes, &cameras, 1.0);
         assert!(wrong < 0.85, "{wrong}");
