@@ -196,7 +196,9 @@ impl<'a> Diagnosis<'a> {
         if given.all.total < limits.min_total {
             return vec![self.too_little(&given)];
         }
-        if let Some(best) = self.better_explanation(&given, &trusted, limits.bad_share) {
+        if let Some(best) = (self.better_explanation(&given, &trusted, limits.bad_share))
+            .filter(|best| !self.are_refuted_by_silhouettes(best))
+        {
             return vec![self.explained_by(best, &given)];
         }
         if self.mirrored {
@@ -226,6 +228,27 @@ impl<'a> Diagnosis<'a> {
         findings.push(self.agreeing(&rest, good));
         findings.extend(self.views_apart(&trusted));
         findings
+    }
+
+    /// Whether the given cameras explain the silhouettes, and other ones do not: of something round
+    /// hardly a corner is one.
+    fn are_refuted_by_silhouettes(&self, others: &[Candidate]) -> bool {
+        let silhouettes = &self.gathered.silhouettes;
+        if 2 * silhouettes.len() < self.gathered.views.len() {
+            return false;
+        }
+        let world_from_original = self.scene.original_from_world.without_mirroring().inverse();
+        let share = |cameras: &[Camera]| {
+            let in_world = |camera: &Camera| Camera {
+                center_in_world: world_from_original.apply(&camera.center_in_world),
+                ..*camera
+            };
+            let cameras: Vec<Camera> = cameras.iter().map(in_world).collect();
+            covered_share(silhouettes, &cameras, self.scene.sphere_radius)
+        };
+        let given = share(&self.cameras);
+        let is_worse = |other: &Candidate| share(&other.cameras) < given - MIN_DIFFERENCE;
+        given > MIN_COVERED && others.iter().all(is_worse)
     }
 
     /// Takes trust from views, the worst first, that explain next to nothing
