@@ -5,7 +5,7 @@ use crate::evidence::{Evidence, Gathered, evenly};
 use crate::examination::{Check, Finding, Level, Repair, counted, median, percent};
 use crate::hypothesis::{Hypothesis, PoseOrder};
 use crate::point_transfer::{known_points, transfer_gain};
-use crate::silhouettes::{covered_share, covered_share_of};
+use crate::silhouettes::{Silhouette, covered_share, covered_share_of};
 use neat_core::layout::{CameraAxes, PoseConvention};
 use neat_core::{Camera, Scene};
 use rayon::prelude::*;
@@ -230,24 +230,35 @@ impl<'a> Diagnosis<'a> {
         findings
     }
 
+    /// The silhouettes, if half of the views at least have one.
+    fn silhouettes_of_most(&self) -> Option<&[Silhouette]> {
+        let silhouettes = &self.gathered.silhouettes;
+        (2 * silhouettes.len() >= self.gathered.views.len()).then_some(silhouettes)
+    }
+
+    /// Those of the scene, whose ball is around the origin, not that of the files.
+    fn cameras_in_world(&self) -> Vec<Camera> {
+        self.scene.views.iter().map(|view| view.camera).collect()
+    }
+
     /// Whether the given cameras explain the silhouettes, and other ones do not: of something round
     /// hardly a corner is one.
     fn are_refuted_by_silhouettes(&self, others: &[Candidate]) -> bool {
-        let silhouettes = &self.gathered.silhouettes;
-        if 2 * silhouettes.len() < self.gathered.views.len() {
+        let Some(silhouettes) = self.silhouettes_of_most() else {
             return false;
-        }
-        let world_from_original = self.scene.original_from_world.without_mirroring().inverse();
-        let share = |cameras: &[Camera]| {
-            let in_world = |camera: &Camera| Camera {
-                center_in_world: world_from_original.apply(&camera.center_in_world),
-                ..*camera
-            };
-            let cameras: Vec<Camera> = cameras.iter().map(in_world).collect();
-            covered_share(silhouettes, &cameras, self.scene.sphere_radius)
         };
-        let given = share(&self.cameras);
-        let is_worse = |other: &Candidate| share(&other.cameras) < given - MIN_DIFFERENCE;
+        let world_from_original = self.scene.original_from_world.without_mirroring().inverse();
+        let in_world = |camera: &Camera| Camera {
+            center_in_world: world_from_original.apply(&camera.center_in_world),
+            ..*camera
+        };
+        let share =
+            |cameras: &[Camera]| covered_share(silhouettes, cameras, self.scene.sphere_radius);
+        let given = share(&self.cameras_in_world());
+        let is_worse = |other: &Candidate| {
+            let cameras: Vec<Camera> = other.cameras.iter().map(in_world).collect();
+            share(&cameras) < given - MIN_DIFFERENCE
+        };
         given > MIN_COVERED && others.iter().all(is_worse)
     }
 
@@ -298,16 +309,10 @@ impl<'a> Diagnosis<'a> {
     fn shows_few_corners_but_its_outline(&self, view: usize, trusted: &[bool]) -> bool {
         let given = self.all_given();
         let told = |view: &usize| given.per_view[*view].total as f64;
-        let typical = median(
-            self.gathered
-                .views
-                .iter()
-                .filter(|view| trusted[**view])
-                .map(told),
-        );
-        let cameras: Vec<Camera> = self.scene.views.iter().map(|view| view.camera).collect();
+        let others = self.gathered.views.iter().filter(|view| trusted[**view]);
+        let typical = median(others.map(told));
         let share = || {
-            let silhouettes = &self.gathered.silhouettes;
+            let (silhouettes, cameras) = (&self.gathered.silhouettes, self.cameras_in_world());
             covered_share_of(view, silhouettes, &cameras, self.scene.sphere_radius)
         };
         told(&view) < FEW_CORNERS * typical && share().is_some_and(|share| share > MIN_COVERED)
@@ -328,14 +333,10 @@ impl<'a> Diagnosis<'a> {
                 )
             });
         }
-        let silhouettes = &self.gathered.silhouettes;
-        if 2 * silhouettes.len() < views.len() {
-            return None;
-        }
+        let silhouettes = self.silhouettes_of_most()?;
         let share =
             |cameras: &[Camera]| covered_share(silhouettes, cameras, self.scene.sphere_radius);
-        // Their ball is around the origin of the scene, not of the files.
-        let cameras: Vec<Camera> = self.scene.views.iter().map(|view| view.camera).collect();
+        let cameras = self.cameras_in_world();
         let given = share(&cameras);
         // Things that look the same from everywhere tell nothing.
         let stands_out = |by: usize| {

@@ -211,19 +211,15 @@ impl<'a> Ends<'a> {
             .map(|ends| (ends, self.gain(ends)))
             .collect();
         let rates = gains.iter().map(|([from, to], gain)| gain / (to - from));
-        let least = OF_WHOLE * rates.fold(0.0, f64::max);
+        let best = rates.fold(0.0, f64::max);
         let ends_at_one = |angle: f64| {
             let mut off = (self.stations.iter()).map(|station| wrapped(station - angle).abs());
             off.any(|off| off <= near)
         };
         let is_there = |([from, to], gain): &([f64; 2], f64)| {
             let goes_past = !(ends_at_one(*from) && ends_at_one(*to)) && bounds.len() > 2;
-            let least = if goes_past {
-                PAST_JUNCTION / OF_WHOLE * least
-            } else {
-                least
-            };
-            *gain >= least * (to - from)
+            let share = if goes_past { PAST_JUNCTION } else { OF_WHOLE };
+            *gain >= share * best * (to - from)
         };
         if gains.iter().all(is_there) {
             return vec![self.found.clone()];

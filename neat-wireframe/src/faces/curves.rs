@@ -15,10 +15,10 @@ const POINTS_OF_ARC: usize = 8;
 /// Standard deviation of a junction where none is known, and what is added to the known one, by
 /// the extent of the wireframe: junctions of six solids that the assembler made lie 0.00001 to
 /// 0.0003 off their planes (root mean square).
-pub(super) const JUNCTION_NOISE: f64 = 5e-4;
+const JUNCTION_NOISE: f64 = 5e-4;
 /// The same for points of arcs, whose own covariances are not asked: the radii of the two rims of
 /// the toy's hole differ by 0.003.
-pub(super) const ARC_NOISE: f64 = 3e-3;
+const ARC_NOISE: f64 = 3e-3;
 /// An end of an arc is a junction within so many standard deviations of an arc.
 pub(super) const REACH: f64 = 4.0;
 

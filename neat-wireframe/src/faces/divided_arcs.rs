@@ -3,36 +3,36 @@
 //! Where an edge ends on a rim, the faces on its two sides are bounded by other pieces of that. The
 //! assembler has each arc as a whole, as many of the lines beside it turn out to be none.
 
-use super::curves::{ARC_NOISE, Curves, JUNCTION_NOISE, MeasuredGraph, REACH};
+use super::curves::{Curves, MeasuredGraph, REACH};
 use nalgebra::Vector3;
 use neat_core::CircularArc;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
-/// A junction is on an arc within so many standard deviations of a junction: of 36 of edges on arcs of
+/// A junction is on an arc within so many standard deviations of a junction: of 33 of edges on arcs of
 /// random parts 29 are ends of true curves, and the others are farther off than most of these, judged.
 const ON_ARC: f64 = 3.0;
 
 /// The pieces of the arcs between the junctions of edges on them, each with the index of the arc it is
 /// of, ascending. An arc without any between its ends is one piece, and so is a circle with one.
 pub fn divided_arcs(graph: &MeasuredGraph) -> Vec<(usize, CircularArc)> {
-    let extent = Curves::new(graph).extent;
+    let curves = Curves::new(graph);
     let junctions = &graph.wireframe.junctions;
     let of_edges: BTreeSet<usize> = graph.wireframe.edges.iter().flatten().copied().collect();
     let corners: Vec<Vector3<f64>> = of_edges.iter().map(|corner| junctions[*corner]).collect();
     let pieces = graph.arcs.iter().enumerate().flat_map(|(index, arc)| {
-        let pieces = divided(arc, &corners, extent).into_iter();
+        let pieces = divided(arc, &corners, &curves).into_iter();
         pieces.map(move |piece| (index, piece))
     });
     pieces.collect()
 }
 
-fn divided(arc: &CircularArc, corners: &[Vector3<f64>], extent: f64) -> Vec<CircularArc> {
+fn divided(arc: &CircularArc, corners: &[Vector3<f64>], curves: &Curves) -> Vec<CircularArc> {
     // What is nearer to an end of an arc is that end.
-    let near = REACH * ARC_NOISE * extent / arc.radius;
+    let near = REACH * curves.arc_sigma() / arc.radius;
     let [start, end] = arc.angles;
     let on_arc = (corners.iter())
-        .filter(|corner| arc.distance_to_circle(corner) <= ON_ARC * JUNCTION_NOISE * extent)
+        .filter(|corner| arc.distance_to_circle(corner) <= ON_ARC * curves.junction_sigma())
         .map(|corner| start + (arc.angle_of(corner) - start).rem_euclid(TAU));
     let mut cuts: Vec<f64> = if arc.is_closed() {
         on_arc.collect()
