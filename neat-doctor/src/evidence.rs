@@ -79,7 +79,7 @@ pub(crate) struct Gathered {
     pub evidence: Evidence,
     /// How alike the views i < j look, in the order (0, 1), (0, 2), …, (1, 2), ….
     pub likeness: Vec<f64>,
-    /// Of things without texture before a plain background.
+    /// Of things before a plain background.
     pub silhouettes: Vec<Silhouette>,
 }
 
@@ -117,21 +117,23 @@ pub(crate) fn gather(
     textured: bool,
 ) -> Result<Gathered, SceneError> {
     if textured {
-        let keypoints = working.look_at(&views, |view| {
+        let looked = working.look_at(&views, |view| {
             let (image, factor) = working.of(view)?;
-            Ok(ViewKeypoints {
+            let keypoints = ViewKeypoints {
                 view,
                 factor: f64::from(factor),
                 pixel_center: scene.pixel_center,
                 keypoints: keypoints(&image),
-            })
+            };
+            Ok((keypoints, silhouette(view, &image)))
         })?;
+        let (keypoints, silhouettes): (Vec<_>, Vec<_>) = looked.into_iter().unzip();
         let Matching { common, tracks } = matching(&keypoints);
         return Ok(Gathered {
             views,
             evidence: Evidence::Tracks { tracks, keypoints },
             likeness: common.iter().map(|&n| (1.0 + n as f64).ln()).collect(),
-            silhouettes: Vec::new(),
+            silhouettes: silhouettes.into_iter().flatten().collect(),
         });
     }
     let looked = working.look_at(&views, |view| {
@@ -147,8 +149,7 @@ pub(crate) fn gather(
             .map(|corner| Vector2::new(full(corner.x), full(corner.y)))
             .collect();
         let corners = ViewCorners::new(view, corners, larger_side(&scene.views[view]));
-        let silhouette = has_plain_border(&image).then(|| Silhouette::new(view, &image));
-        Ok((corners, (Thumbnail::new(&image), silhouette)))
+        Ok((corners, (Thumbnail::new(&image), silhouette(view, &image))))
     })?;
     let (corners, others): (Vec<_>, Vec<_>) = looked.into_iter().unzip();
     let (thumbnails, silhouettes): (Vec<_>, Vec<_>) = others.into_iter().unzip();
@@ -162,6 +163,11 @@ pub(crate) fn gather(
         likeness,
         silhouettes: silhouettes.into_iter().flatten().collect(),
     })
+}
+
+/// What stands before a plain background, if there is one.
+fn silhouette(view: usize, image: &GrayImage) -> Option<Silhouette> {
+    has_plain_border(image).then(|| Silhouette::new(view, image))
 }
 
 fn larger_side(view: &View) -> f64 {

@@ -73,7 +73,9 @@ impl Diagnosis<'_> {
             }
         }
         let agreement = &found.last()?.agreement;
-        let clear = agreement.score > CLEARLY * given.score && agreement.share() >= min_share;
+        // Few corners that fit better are no more corners that fit.
+        let explains_more = agreement.share() >= min_share.max(given.share());
+        let clear = agreement.score > CLEARLY * given.score && explains_more;
         (clear && self.holds_for_other_views(&found[0].hypothesis, trusted)).then_some(found)
     }
 

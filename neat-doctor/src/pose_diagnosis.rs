@@ -5,7 +5,7 @@ use crate::evidence::{Evidence, Gathered, evenly};
 use crate::examination::{Check, Finding, Level, Repair, counted, median, percent};
 use crate::hypothesis::{Hypothesis, PoseOrder};
 use crate::point_transfer::{known_points, transfer_gain};
-use crate::silhouettes::{Silhouette, covered_share, covered_share_of};
+use crate::silhouettes::{Silhouette, covered_share, fit_of};
 use neat_core::layout::{CameraAxes, PoseConvention};
 use neat_core::{Camera, Scene};
 use rayon::prelude::*;
@@ -22,9 +22,6 @@ const SIGNIFICANT: f64 = 4.0;
 /// have looks elsewhere than they do, and all that it has may be false. On photographs of a house
 /// from all sides such views have 4 to 21 %, neighbours of three scenes at least 33 %.
 const MIN_TOLD: f64 = 0.25;
-/// A view with fewer corners than this share of what the others have may have none of the thing,
-/// judged: of 36 random parts two views of one have .3, all of their corners false.
-const FEW_CORNERS: f64 = 0.5;
 /// So many views speak for the others.
 const ASKED_VIEWS: usize = 8;
 /// Right cameras explain at least this share of the silhouettes …
@@ -194,7 +191,7 @@ impl<'a> Diagnosis<'a> {
         let trusted = self.trusted(SEARCHED_VIEWS);
         let (given, limits) = (self.given(&trusted), self.limits());
         if given.all.total < limits.min_total {
-            return vec![self.too_little(&given)];
+            return vec![(self.witnessed()).unwrap_or_else(|| self.too_little(&given))];
         }
         if let Some(best) = (self.better_explanation(&given, &trusted, limits.bad_share))
             .filter(|best| !self.are_refuted_by_silhouettes(best))
@@ -207,14 +204,14 @@ impl<'a> Diagnosis<'a> {
         let trusted = self.without_bad_views(self.all_trusted());
         let rest = self.given(&trusted);
         if rest.share() < limits.bad_share {
-            let finding = match self.other_witness() {
-                Some(message) => Finding::new(Check::Poses, Level::Good, message),
-                None if given.all.total < self.gathered.views.len() * limits.min_per_view => {
+            let may_all_be_false = self.gathered.views.len() * limits.min_per_view;
+            return vec![(self.witnessed()).unwrap_or_else(|| {
+                if given.all.total < may_all_be_false {
                     self.too_little(&given)
+                } else {
+                    self.disagreement(&given)
                 }
-                None => self.disagreement(&given),
-            };
-            return vec![finding];
+            })];
         }
         let bad = self.bad_views_beside(&trusted);
         let mut findings = Vec::new();
@@ -293,46 +290,59 @@ impl<'a> Diagnosis<'a> {
     }
 
     /// The views without trust for which nothing else speaks: few tracks may all be false, as at
-    /// the ends of a run of neighbours, and so may few corners, as of something round from above.
+    /// the ends of a run of neighbours, and so may be the corners of something round from above.
     fn bad_views_beside(&self, trusted: &[bool]) -> Vec<usize> {
-        let speaks = |view: usize| match self.evidence() {
-            Evidence::Tracks { .. } => self.shows_known_points(view, trusted),
-            Evidence::Corners(_) => self.shows_few_corners_but_its_outline(view, trusted),
-        };
         (self.gathered.views.iter().copied())
-            .filter(|&view| !trusted[view] && !speaks(view))
+            .filter(|&view| !trusted[view])
+            .filter(|&view| !self.shows_known_points(view, trusted) && !self.fits_its_outline(view))
             .collect()
     }
 
-    /// Whether a view has far fewer corners than the `trusted` ones, and its silhouette lies in the
-    /// hull of all others.
-    fn shows_few_corners_but_its_outline(&self, view: usize, trusted: &[bool]) -> bool {
-        let given = self.all_given();
-        let told = |view: &usize| given.per_view[*view].total as f64;
-        let others = self.gathered.views.iter().filter(|view| trusted[**view]);
-        let typical = median(others.map(told));
-        let share = || {
-            let (silhouettes, cameras) = (&self.gathered.silhouettes, self.cameras_in_world());
-            covered_share_of(view, silhouettes, &cameras, self.scene.sphere_radius)
+    /// Whether the silhouette of a view fits those of all others, and would not if most of their
+    /// cameras had seen it.
+    fn fits_its_outline(&self, view: usize) -> bool {
+        let given = self.cameras_in_world();
+        let share = |camera: Camera| {
+            let mut cameras = given.clone();
+            cameras[view] = camera;
+            let silhouettes = &self.gathered.silhouettes;
+            fit_of(view, silhouettes, &cameras, self.scene.sphere_radius)
         };
-        told(&view) < FEW_CORNERS * typical && share().is_some_and(|share| share > MIN_COVERED)
+        let fits = share(given[view]).filter(|share| *share > MIN_COVERED);
+        fits.is_some_and(|fits| {
+            let others = self.gathered.views.iter().filter(|other| **other != view);
+            let as_seen_by_others = median(others.filter_map(|other| share(given[*other])));
+            as_seen_by_others < fits - MIN_DIFFERENCE
+        })
+    }
+
+    /// That something else speaks for the given cameras.
+    fn witnessed(&self) -> Option<Finding> {
+        let message = self.other_witness()?;
+        Some(Finding::new(Check::Poses, Level::Good, message))
     }
 
     /// What speaks for the given cameras where tracks or corners do not; `None` if nothing does.
     fn other_witness(&self) -> Option<String> {
         let views = &self.gathered.views;
-        if let Evidence::Tracks { .. } = self.evidence() {
+        let by_points = || {
             let asked = evenly(views.len(), ASKED_VIEWS);
             let agree = (asked.par_iter())
                 .filter(|&&index| self.shows_known_points(views[index], &self.all_trusted()))
                 .count();
-            return (4 * agree >= 3 * asked.len()).then(|| {
+            (4 * agree >= 3 * asked.len()).then(|| {
                 format!(
                     "{agree} of {} show points of the others where they should be",
                     counted(asked.len(), "view")
                 )
-            });
-        }
+            })
+        };
+        by_points().or_else(|| self.witness_of_silhouettes())
+    }
+
+    /// That the given cameras explain the silhouettes, and others would not.
+    fn witness_of_silhouettes(&self) -> Option<String> {
+        let views = &self.gathered.views;
         let silhouettes = self.silhouettes_of_most()?;
         let share =
             |cameras: &[Camera]| covered_share(silhouettes, cameras, self.scene.sphere_radius);
@@ -372,6 +382,7 @@ impl<'a> Diagnosis<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gray_image::GrayImage;
     use crate::tracks::{Sighting, Track};
     use nalgebra::{Vector2, Vector3};
     use neat_core::synthetic::{SyntheticScene, generate};
@@ -419,6 +430,45 @@ mod tests {
         };
         let (repair, axes) = (Repair::default(), CameraAxes::OPENCV);
         Diagnosis::new(&scene, &gathered, repair, axes, false).is_plainly_good()
+    }
+
+    #[test]
+    fn silhouettes_speak_for_cameras_where_all_tracks_are_false() {
+        let config = SyntheticScene {
+            views: 24,
+            image_size: 100,
+            ..SyntheticScene::default()
+        };
+        let scene = generate(&config).unwrap().scene;
+        let silhouettes = (scene.views.iter().enumerate()).map(|(index, view)| {
+            let (image, _) = GrayImage::working_copy(&view.image.read().unwrap());
+            Silhouette::new(index, &image)
+        });
+        let tracks = (0..400).map(|index| {
+            Track::new([0, 5, 11].map(|step| Sighting {
+                view: (index + step) % 24,
+                pixel: Vector2::new(scattered(index, step), scattered(index, step + 1)) * 45.0
+                    + Vector2::repeat(50.0),
+                tolerance: 1.0,
+                descriptor: [0; 4],
+            }))
+        });
+        let mut gathered = Gathered {
+            views: (0..24).collect(),
+            evidence: Evidence::Tracks {
+                tracks: tracks.collect(),
+                keypoints: Vec::new(),
+            },
+            likeness: vec![1.0; 24 * 23 / 2],
+            silhouettes: silhouettes.collect(),
+        };
+        let level = |gathered: &Gathered| {
+            let (repair, axes) = (Repair::default(), CameraAxes::OPENCV);
+            Diagnosis::new(&scene, gathered, repair, axes, false).findings()[0].level
+        };
+        assert_eq!(level(&gathered), Level::Good);
+        gathered.silhouettes.clear();
+        assert_ne!(level(&gathered), Level::Good);
     }
 
     #[test]

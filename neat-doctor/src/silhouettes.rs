@@ -7,7 +7,7 @@
 
 use crate::agreement::Tally;
 use crate::gray_image::GrayImage;
-use nalgebra::Vector2;
+use nalgebra::{Vector2, Vector3};
 use neat_core::{Camera, Ray};
 use rayon::prelude::*;
 
@@ -24,6 +24,8 @@ const PLACES: usize = 96;
 const BALL: f64 = 1.5;
 /// One of so many views may disagree about a place.
 const ODD_VIEWS: usize = 20;
+/// Cells beside a silhouette that the hull of the others may fill: it is as coarse as they are.
+const MARGIN: usize = 3;
 
 /// What the image of one view shows of the thing.
 pub(crate) struct Silhouette {
@@ -35,6 +37,8 @@ pub(crate) struct Silhouette {
     inside: Vec<bool>,
     /// Cells of the thing, as shares of width and height.
     samples: Vec<Vector2<f64>>,
+    /// Cells well outside of it, as many of each area.
+    around: Vec<Vector2<f64>>,
 }
 
 impl Silhouette {
@@ -63,25 +67,36 @@ impl Silhouette {
             outside[index] = true;
             open.extend(beside(index, columns, rows));
         }
-        let filled = |index: usize| !outside[index];
-        let cells: Vec<usize> = (0..columns * rows).filter(|index| filled(*index)).collect();
-        let step = cells.len().div_ceil(SAMPLES).max(1);
-        let samples = (cells.iter().step_by(step))
-            .map(|index| {
-                let middle = Vector2::new((index % columns) as f64, (index / columns) as f64);
-                let middle = middle.add_scalar(0.5) * cell as f64;
-                middle.component_div(&Vector2::new(image.width as f64, image.height as f64))
-            })
-            .collect();
-        let inside = (0..columns * rows)
-            .map(|index| filled(index) || beside(index, columns, rows).any(filled))
-            .collect();
+        let filled: Vec<bool> = outside.iter().map(|outside| !outside).collect();
+        let wider = |cells: &[bool]| -> Vec<bool> {
+            (0..cells.len())
+                .map(|index| cells[index] || beside(index, columns, rows).any(|at| cells[at]))
+                .collect()
+        };
+        let inside = wider(&filled);
+        let near = (1..MARGIN).fold(inside.clone(), |near, _| wider(&near));
+        let step = (filled.iter().filter(|is| **is).count())
+            .div_ceil(SAMPLES)
+            .max(1);
+        let sampled = |chosen: &dyn Fn(usize) -> bool| {
+            (0..columns * rows)
+                .filter(|index| chosen(*index))
+                .step_by(step)
+                .map(|index| {
+                    let middle = Vector2::new((index % columns) as f64, (index / columns) as f64);
+                    let middle = middle.add_scalar(0.5) * cell as f64;
+                    middle.component_div(&Vector2::new(image.width as f64, image.height as f64))
+                })
+                .collect()
+        };
+        let (samples, around) = (sampled(&|at| filled[at]), sampled(&|at| !near[at]));
         Self {
             view,
             columns,
             rows,
             inside,
             samples,
+            around,
         }
     }
 
@@ -114,19 +129,32 @@ pub(crate) fn covered_share(silhouettes: &[Silhouette], cameras: &[Camera], radi
     all.share()
 }
 
-/// The same of the silhouette of one view; `None` if that has none.
-pub(crate) fn covered_share_of(
+/// How well the silhouette of one view is that of the hull of the others: what both cover as a
+/// share of what either does. `None` if the view has none.
+pub(crate) fn fit_of(
     view: usize,
     silhouettes: &[Silhouette],
     cameras: &[Camera],
     radius: f64,
 ) -> Option<f64> {
     let own = silhouettes.iter().find(|own| own.view == view)?;
-    Some(covered_of(own, silhouettes, cameras, radius).share())
+    let both = covered_of(own, silhouettes, cameras, radius);
+    let beyond = covered_of_samples(&own.around, own, silhouettes, cameras, radius);
+    Some(both.explained as f64 / (both.total + beyond.explained).max(1) as f64)
 }
 
 /// Of how many samples of one silhouette, how many have a place in the hull of the others.
 fn covered_of(
+    own: &Silhouette,
+    silhouettes: &[Silhouette],
+    cameras: &[Camera],
+    radius: f64,
+) -> Tally {
+    covered_of_samples(&own.samples, own, silhouettes, cameras, radius)
+}
+
+fn covered_of_samples(
+    samples: &[Vector2<f64>],
     own: &Silhouette,
     silhouettes: &[Silhouette],
     cameras: &[Camera],
@@ -137,11 +165,12 @@ fn covered_of(
     let covered = |sample: &&Vector2<f64>| {
         let ray = camera.ray_through(&sample.component_mul(&size));
         places(&ray, BALL * radius)
-            .any(|along| is_in_hull(silhouettes, cameras, own.view, &ray, along))
+            .map(|along| ray.origin + along * ray.direction)
+            .any(|point| is_in_hull(silhouettes, cameras, own.view, &point))
     };
     Tally {
-        explained: own.samples.iter().filter(covered).count(),
-        total: own.samples.len(),
+        explained: samples.iter().filter(covered).count(),
+        total: samples.len(),
     }
 }
 
@@ -156,21 +185,23 @@ fn places(ray: &Ray, radius: f64) -> impl Iterator<Item = f64> {
         .filter(|depth| *depth > 0.0)
 }
 
+/// Whether a silhouette covers a point of space.
+fn shows(silhouette: &Silhouette, cameras: &[Camera], point: &Vector3<f64>) -> bool {
+    let camera = &cameras[silhouette.view];
+    let projection = camera.project(point);
+    let size = Vector2::new(f64::from(camera.width), f64::from(camera.height));
+    projection.depth > 0.0 && silhouette.covers(&projection.pixel.component_div(&size))
+}
+
 fn is_in_hull(
     silhouettes: &[Silhouette],
     cameras: &[Camera],
     own: usize,
-    ray: &Ray,
-    along: f64,
+    point: &Vector3<f64>,
 ) -> bool {
-    let point = ray.origin + along * ray.direction;
     let mut odd = silhouettes.len() / ODD_VIEWS;
     silhouettes.iter().filter(|s| s.view != own).all(|other| {
-        let camera = &cameras[other.view];
-        let projection = camera.project(&point);
-        let size = Vector2::new(f64::from(camera.width), f64::from(camera.height));
-        let seen = projection.depth > 0.0 && other.covers(&projection.pixel.component_div(&size));
-        if seen {
+        if shows(other, cameras, point) {
             return true;
         }
         let may_be_odd = odd > 0;
@@ -182,7 +213,7 @@ fn is_in_hull(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix3, Rotation3, Vector3};
+    use nalgebra::{Matrix3, Rotation3};
     use neat_core::Intrinsics;
 
     const SIZE: u32 = 120;
@@ -242,13 +273,18 @@ mod tests {
         let right = covered_share(&silhouettes, &cameras, 1.0);
         assert!(right > 0.98, "{right}");
         assert!(covered_share(&silhouettes, &cameras, 0.1) < 0.8);
-        let of_view = |cameras: &[Camera]| covered_share_of(3, &silhouettes, cameras, 1.0);
+        let of_view = |cameras: &[Camera]| fit_of(3, &silhouettes, cameras, 1.0);
         assert!(of_view(&cameras).is_some_and(|share| share > 0.98));
         // The camera of another view.
         let mut exchanged = cameras.clone();
         exchanged[3] = cameras[8];
         assert!(of_view(&exchanged).is_some_and(|share| share < 0.9));
-        assert!(covered_share_of(99, &silhouettes, &cameras, 1.0).is_none());
+        // One that shows more than it did.
+        let mut wide = cameras.clone();
+        wide[3].intrinsics.fx *= 1.4;
+        wide[3].intrinsics.fy *= 1.4;
+        assert!(of_view(&wide).is_some_and(|share| share < 0.7));
+        assert!(fit_of(99, &silhouettes, &cameras, 1.0).is_none());
         cameras.rotate_left(5);
         let wrong = covered_share(&silhouettes, &cameras, 1.0);
         assert!(wrong < 0.85, "{wrong}");

@@ -47,6 +47,16 @@ fn solids() -> Vec<Right> {
         of("a U, which hides itself", Solid::UPrism),
         of("a wedge", Solid::Wedge),
         of("a truncated pyramid", Solid::TruncatedPyramid),
+        of("a house", Solid::GableHouse),
+        of("a cylinder", Solid::Cylinder),
+        of("a truncated cone", Solid::TruncatedCone),
+        of("a shaft with a flat", Solid::DShaft),
+        of("a vault", Solid::Arch),
+        of("a link with round ends", Solid::Link),
+        of("a plate with holes", Solid::DrilledPlate),
+        // Hardly a corner of these is one.
+        Right::new("a shaft from many sides", scene(Solid::DShaft, 60)),
+        Right::new("a link from many sides", scene(Solid::Link, 60)),
     ]
 }
 
