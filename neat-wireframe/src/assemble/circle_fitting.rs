@@ -348,7 +348,7 @@ impl Images<'_> {
     }
 
     /// The circle through the edgels within `reach` pixels beside parts of an arc in some views.
-    fn fit_circle(
+    pub(super) fn fit_circle(
         &self,
         arc: &CircularArc,
         parts: &[([f64; 2], Vec<usize>)],

@@ -5,17 +5,17 @@
 //! circle, with as few control points as images need. A spline that an arc follows within the reach of
 //! its edgels is that arc.
 
+use super::arc_between_tangents::BetweenTangents;
 use super::arc_ends::{MIN_RADIUS, OPEN_END};
 use super::arc_joints::wrapped;
 use super::circle_fitting::FoundArc;
 use super::corners::WINDOW_IN_PIXELS;
 use super::edge_samples::Images;
-use super::spline_fitting::{
-    COST, NUMBERS_OF_ARC, NUMBERS_OF_CONTROL, Points, gain_by_length, through_points,
-};
+use super::spline_fitting::{COST, NUMBERS_OF_CONTROL, Points, gain_by_length, through_points};
 use super::splines::DRIFT;
 use nalgebra::Vector3;
 use neat_core::Spline;
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Parts of an arc of which each is asked how well images show it.
@@ -46,7 +46,7 @@ impl Images<'_> {
         if arc.is_closed() || arc.radius < MIN_RADIUS * pixel {
             return None;
         }
-        let of_arc = self.gain_by_angles(found) - COST * NUMBERS_OF_ARC;
+        let rival = self.between_tangents(found)?;
         let fitted = |ends: [End; 2], controls: usize, reaches: &[f64]| {
             let pins = ends.map(|(_, junction)| junction);
             let start = through_points(&points_between(found, ends), controls, false, pins)?;
@@ -55,16 +55,16 @@ impl Images<'_> {
         // Images show more of it than of the arc beside that, where edgels of one are none of the
         // other.
         let is_better = |spline: &Spline| {
-            let numbers = NUMBERS_OF_CONTROL * spline.controls.len() as f64;
-            let worth = self.gain_beside(spline, found) - COST * numbers;
+            let numbers = NUMBERS_OF_CONTROL * spline.controls.len() as f64 - rival.numbers();
+            let worth = self.gain_over(&rival, spline, found) - COST * numbers;
             let last = spline.pieces() as f64;
             let mut places = (0..PLACES).map(|k| (k as f64 + 0.5) / PLACES as f64 * last);
             let leaves = places.any(|place| {
                 let off = arc.distance_to_circle(&spline.point_at(place));
                 off > self.reach * pixel
             });
-            tracing::debug!(worth, of_arc, leaves, "an arc may be a spline");
-            worth > of_arc && leaves
+            tracing::debug!(worth, leaves, "an arc may be a spline");
+            worth > 0.0 && leaves
         };
         let free = arc.angles.map(|angle| (angle, None));
         if !is_better(&fitted(free, TRIED, &FITTING_REACHES[2..])?) {
@@ -101,17 +101,24 @@ impl Images<'_> {
         is_better(&spline).then_some(spline)
     }
 
-    /// What images say about the part of a spline that an arc runs along.
-    fn gain_beside(&self, spline: &Spline, found: &FoundArc) -> f64 {
+    /// How much more images say about the part of a spline that an arc runs along than about its
+    /// rival there, part by part.
+    fn gain_over(&self, rival: &BetweenTangents, spline: &Spline, found: &FoundArc) -> f64 {
         let arc = &found.arc;
-        let is_beside = |[from, to]: &[f64; 2]| {
-            let middle = spline.point_at(0.5 * (from + to));
-            arc.contains(arc.angle_of(&middle), 0.0)
+        let middle = 0.5 * (arc.angles[0] + arc.angles[1]);
+        let angle_at = |place: f64| {
+            let angle = arc.angle_of(&spline.point_at(place));
+            middle + wrapped(angle - middle)
         };
-        let parts = self.evidence_along(spline, found.pixel, None);
-        let beside = parts.iter().filter(|(places, _)| is_beside(places));
-        let gain = beside.map(|(_, evidence)| evidence.gain).sum();
-        gain_by_length(gain, spline.length(), found.pixel)
+        let gains = self.evidence_along(spline, found.pixel, None);
+        let more: Vec<f64> = (gains.par_iter())
+            .filter_map(|([from, to], evidence)| {
+                let angles = [angle_at(*from), angle_at(*to)];
+                let is_beside = arc.contains(angle_at(0.5 * (from + to)), 0.0);
+                is_beside.then(|| evidence.gain - self.gain_between_tangents(rival, angles))
+            })
+            .collect();
+        gain_by_length(more.iter().sum(), spline.length(), found.pixel)
     }
 
     /// Where the curve may start and end: at junctions near the circle, from the part of the arc that

@@ -18,6 +18,7 @@
 //!
 //! All steps work in a world whose scene ball is the unit ball around the origin.
 
+mod arc_between_tangents;
 mod arc_covariance;
 mod arc_crossings;
 mod arc_ends;

@@ -317,12 +317,6 @@ impl Images<'_> {
         (worth >= of_arcs).then_some(best)
     }
 
-    /// What they say about all of an arc.
-    pub(super) fn gain_by_angles(&self, FoundArc { arc, pixel, .. }: &FoundArc) -> f64 {
-        let gain = self.gain_along(arc, arc.angles, *pixel, None);
-        gain_by_length(gain, arc.length(), *pixel)
-    }
-
     /// What the images say about the arcs of a chain.
     fn gain_of_arcs(&self, chain: &Chain, arcs: &[FoundArc]) -> f64 {
         let pixel = chain.pixel(arcs);
@@ -428,6 +422,22 @@ mod tests {
         ends.sort_by(|a, b| b.x.total_cmp(&a.x));
         assert_eq!(ends, junctions);
         assert!(farthest_from(ellipse, &found[0]) < 0.003);
+    }
+
+    #[test]
+    fn an_arc_that_runs_on_along_its_tangents_is_no_spline() {
+        // A circle's quarter, and so much of the lines that it touches.
+        for along in [0.06, 0.15] {
+            let curve = |place: f64| {
+                let angle = place.clamp(0.0, 0.5 * PI);
+                let (sine, cosine) = angle.sin_cos();
+                let at = Vector3::new(0.4 * cosine, 0.4 * sine, 0.1);
+                at + (place - angle) * 0.4 * Vector3::new(-sine, cosine, 0.0)
+            };
+            let places = [-0.5 * along, 0.5 * PI + along];
+            let (left, found) = splines(curve, &places, 0.0, &[curve(0.0)]);
+            assert_eq!((left, found.len()), (1, 0), "{along}");
+        }
     }
 
     #[test]
