@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use neat_core::CircularArc;
 use rayon::prelude::*;
 
-/// A tangent takes this share of an arc at most, at each end …
+/// A tangent takes this share of an arc at most, at each end, judged …
 const MOST: f64 = 0.25;
 /// … and is sought in steps of such shares, so many each way.
 const STEPS: [(f64, i32); 3] = [(0.0625, 4), (0.031_25, 1), (0.015_625, 1)];

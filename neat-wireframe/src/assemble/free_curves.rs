@@ -46,28 +46,34 @@ impl Images<'_> {
         if arc.is_closed() || arc.radius < MIN_RADIUS * pixel {
             return None;
         }
-        let rival = self.between_tangents(found)?;
         let fitted = |ends: [End; 2], controls: usize, reaches: &[f64]| {
             let pins = ends.map(|(_, junction)| junction);
             let start = through_points(&points_between(found, ends), controls, false, pins)?;
             self.fitted(start, pins, *pixel, reaches)
         };
-        // Images show more of it than of the arc beside that, where edgels of one are none of the
-        // other.
+        // Where edgels of one are none of the other.
+        let leaves_arc = |spline: &Spline| {
+            let last = spline.pieces() as f64;
+            let mut places = (0..PLACES).map(|k| (k as f64 + 0.5) / PLACES as f64 * last);
+            places.any(|place| {
+                let off = arc.distance_to_circle(&spline.point_at(place));
+                off > self.reach * pixel
+            })
+        };
+        let free = arc.angles.map(|angle| (angle, None));
+        let first = fitted(free, TRIED, &FITTING_REACHES[2..])?;
+        if !leaves_arc(&first) {
+            return None;
+        }
+        let rival = self.between_tangents(found)?;
+        // Images show more of it beside the arc than of the rival.
         let is_better = |spline: &Spline| {
             let numbers = NUMBERS_OF_CONTROL * spline.controls.len() as f64 - rival.numbers();
             let worth = self.gain_over(&rival, spline, found) - COST * numbers;
-            let last = spline.pieces() as f64;
-            let mut places = (0..PLACES).map(|k| (k as f64 + 0.5) / PLACES as f64 * last);
-            let leaves = places.any(|place| {
-                let off = arc.distance_to_circle(&spline.point_at(place));
-                off > self.reach * pixel
-            });
-            tracing::debug!(worth, leaves, "an arc may be a spline");
-            worth > 0.0 && leaves
+            tracing::debug!(worth, "an arc may be a spline");
+            worth > 0.0
         };
-        let free = arc.angles.map(|angle| (angle, None));
-        if !is_better(&fitted(free, TRIED, &FITTING_REACHES[2..])?) {
+        if !is_better(&first) {
             return None;
         }
         // Where it hardly is the curve another one may run on, and nothing speaks for an end without
@@ -98,7 +104,7 @@ impl Images<'_> {
             });
         let (_, ends, _) = best(&mut pairs)?;
         let (.., spline) = best(&mut CONTROLS.map(|controls| (ends, controls)))?;
-        is_better(&spline).then_some(spline)
+        (leaves_arc(&spline) && is_better(&spline)).then_some(spline)
     }
 
     /// How much more images say about the part of a spline that an arc runs along than about its
