@@ -24,6 +24,8 @@ const SIGNIFICANT: f64 = 4.0;
 const MIN_TOLD: f64 = 0.25;
 /// So many views speak for the others.
 const ASKED_VIEWS: usize = 8;
+/// In the hull of fewer silhouettes than these, judged, what any cameras see may have a place.
+const MIN_SILHOUETTES: usize = 6;
 /// Right cameras explain at least this share of the silhouettes …
 const MIN_COVERED: f64 = 0.95;
 /// … and by so much more than the same cameras in another order.
@@ -227,10 +229,11 @@ impl<'a> Diagnosis<'a> {
         findings
     }
 
-    /// The silhouettes, if half of the views at least have one.
+    /// The silhouettes, if half of the views at least have one, and so many that they have a hull.
     fn silhouettes_of_most(&self) -> Option<&[Silhouette]> {
         let silhouettes = &self.gathered.silhouettes;
-        (2 * silhouettes.len() >= self.gathered.views.len()).then_some(silhouettes)
+        let are_most = 2 * silhouettes.len() >= self.gathered.views.len();
+        (are_most && silhouettes.len() >= MIN_SILHOUETTES).then_some(silhouettes)
     }
 
     /// Those of the scene, whose ball is around the origin, not that of the files.
