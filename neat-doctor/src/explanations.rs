@@ -188,9 +188,8 @@ mod tests {
     use super::*;
     use crate::corner_consensus::{CornerEvidence, ViewCorners};
     use crate::evidence::{Evidence, Gathered};
-    use crate::examination::Repair;
     use crate::lens::straightened;
-    use neat_core::layout::CameraAxes;
+    use crate::pose_diagnosis::tests::diagnosis;
     use neat_core::synthetic::{SyntheticScene, generate};
 
     #[test]
@@ -216,9 +215,8 @@ mod tests {
                 likeness: Vec::new(),
                 silhouettes: Vec::new(),
             };
-            let (repair, axes) = (Repair::default(), CameraAxes::OPENCV);
-            let diagnosis = Diagnosis::new(&data.scene, &gathered, repair, axes, false);
-            diagnosis.holds_for_other_views(&Hypothesis::Lens(0.1), &[true; 40])
+            diagnosis(&data.scene, &gathered)
+                .holds_for_other_views(&Hypothesis::Lens(0.1), &[true; 40])
         };
         assert!(holds([0.16, 0.16]));
         assert!(!holds([0.16, -0.1]));

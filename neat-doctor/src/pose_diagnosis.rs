@@ -295,9 +295,9 @@ impl<'a> Diagnosis<'a> {
     /// The views without trust for which nothing else speaks: few tracks may all be false, as at
     /// the ends of a run of neighbours, and so may be the corners of something round from above.
     fn bad_views_beside(&self, trusted: &[bool]) -> Vec<usize> {
-        (self.gathered.views.iter().copied())
-            .filter(|&view| !trusted[view])
-            .filter(|&view| !self.shows_known_points(view, trusted) && !self.fits_its_outline(view))
+        let speaks = |view| self.shows_known_points(view, trusted) || self.fits_its_outline(view);
+        (self.gathered.views.par_iter().copied())
+            .filter(|&view| !trusted[view] && !speaks(view))
             .collect()
     }
 
@@ -383,12 +383,18 @@ impl<'a> Diagnosis<'a> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::gray_image::GrayImage;
     use crate::tracks::{Sighting, Track};
     use nalgebra::{Vector2, Vector3};
     use neat_core::synthetic::{SyntheticScene, generate};
+
+    /// With what was gathered of a scene that was read as it is.
+    pub(crate) fn diagnosis<'a>(scene: &'a Scene, gathered: &'a Gathered) -> Diagnosis<'a> {
+        let (repair, axes) = (Repair::default(), CameraAxes::OPENCV);
+        Diagnosis::new(scene, gathered, repair, axes, false)
+    }
 
     /// Numbers in [-1, 1] that look like chance.
     fn scattered(index: usize, salt: usize) -> f64 {
@@ -431,8 +437,7 @@ mod tests {
             likeness: Vec::new(),
             silhouettes: Vec::new(),
         };
-        let (repair, axes) = (Repair::default(), CameraAxes::OPENCV);
-        Diagnosis::new(&scene, &gathered, repair, axes, false).is_plainly_good()
+        diagnosis(&scene, &gathered).is_plainly_good()
     }
 
     #[test]
@@ -465,10 +470,7 @@ mod tests {
             likeness: vec![1.0; 24 * 23 / 2],
             silhouettes: silhouettes.collect(),
         };
-        let level = |gathered: &Gathered| {
-            let (repair, axes) = (Repair::default(), CameraAxes::OPENCV);
-            Diagnosis::new(&scene, gathered, repair, axes, false).findings()[0].level
-        };
+        let level = |gathered: &Gathered| diagnosis(&scene, gathered).findings()[0].level;
         assert_eq!(level(&gathered), Level::Good);
         gathered.silhouettes.clear();
         assert_ne!(level(&gathered), Level::Good);

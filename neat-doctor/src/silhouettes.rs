@@ -78,9 +78,9 @@ impl Silhouette {
         let step = (filled.iter().filter(|is| **is).count())
             .div_ceil(SAMPLES)
             .max(1);
-        let sampled = |chosen: &dyn Fn(usize) -> bool| {
-            (0..columns * rows)
-                .filter(|index| chosen(*index))
+        let sampled = |cells: &[bool], chosen: bool| {
+            (0..cells.len())
+                .filter(|index| cells[*index] == chosen)
                 .step_by(step)
                 .map(|index| {
                     let middle = Vector2::new((index % columns) as f64, (index / columns) as f64);
@@ -89,7 +89,7 @@ impl Silhouette {
                 })
                 .collect()
         };
-        let (samples, around) = (sampled(&|at| filled[at]), sampled(&|at| !near[at]));
+        let (samples, around) = (sampled(&filled, true), sampled(&near, false));
         Self {
             view,
             columns,
@@ -122,7 +122,7 @@ fn beside(index: usize, columns: usize, rows: usize) -> impl Iterator<Item = usi
 /// The share of all silhouettes that has a place in the hull of the others, within a ball
 /// around the origin. `cameras` are those of all views of the scene.
 pub(crate) fn covered_share(silhouettes: &[Silhouette], cameras: &[Camera], radius: f64) -> f64 {
-    let of_one = |own: &Silhouette| covered_of(own, silhouettes, cameras, radius);
+    let of_one = |own: &Silhouette| covered_of(&own.samples, own, silhouettes, cameras, radius);
     let counts: Vec<Tally> = silhouettes.par_iter().map(of_one).collect();
     let mut all = Tally::default();
     counts.into_iter().for_each(|of_one| all += of_one);
@@ -138,22 +138,14 @@ pub(crate) fn fit_of(
     radius: f64,
 ) -> Option<f64> {
     let own = silhouettes.iter().find(|own| own.view == view)?;
-    let both = covered_of(own, silhouettes, cameras, radius);
-    let beyond = covered_of_samples(&own.around, own, silhouettes, cameras, radius);
+    let covered = |samples| covered_of(samples, own, silhouettes, cameras, radius);
+    let (both, beyond) = (covered(&own.samples), covered(&own.around));
     Some(both.explained as f64 / (both.total + beyond.explained).max(1) as f64)
 }
 
-/// Of how many samples of one silhouette, how many have a place in the hull of the others.
+/// Of how many samples of the view of one silhouette, how many have a place in the hull of the
+/// others.
 fn covered_of(
-    own: &Silhouette,
-    silhouettes: &[Silhouette],
-    cameras: &[Camera],
-    radius: f64,
-) -> Tally {
-    covered_of_samples(&own.samples, own, silhouettes, cameras, radius)
-}
-
-fn covered_of_samples(
     samples: &[Vector2<f64>],
     own: &Silhouette,
     silhouettes: &[Silhouette],

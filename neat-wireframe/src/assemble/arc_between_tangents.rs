@@ -15,7 +15,7 @@ use rayon::prelude::*;
 const MOST: f64 = 0.25;
 /// … and is sought in steps of such shares, so many each way.
 const STEPS: [(f64, i32); 3] = [(0.0625, 4), (0.031_25, 1), (0.015_625, 1)];
-/// Fits to what is left of the arc.
+/// Fits to what is left of the arc, which lies within a reach of its edgels already.
 const FITS: usize = 2;
 
 /// An arc, which runs on along its tangents before and after it.
@@ -51,8 +51,7 @@ impl Images<'_> {
                 arc = self.fitted_to_its_own(arc, found.pixel)?;
             }
             let curve = BetweenTangents { arc, tangents };
-            let gains = parts.iter();
-            let gains = gains.map(|part| self.gain_between_tangents(&curve, *part));
+            let gains = (parts.iter()).map(|part| self.gain_between_tangents(&curve, *part));
             let gain = gain_by_length(gains.sum(), found.arc.length(), found.pixel);
             Some((gain - COST * curve.numbers(), cuts, curve))
         };
@@ -66,13 +65,11 @@ impl Images<'_> {
                     (k != 0 && (0.0..=MOST).contains(&cuts[end])).then_some(cuts)
                 });
                 let tried: Vec<[f64; 2]> = cuts.collect();
-                let found: Vec<_> = tried.into_par_iter().filter_map(cut).collect();
-                best = found.into_iter().fold(
-                    best,
-                    |best, other| {
-                        if other.0 > best.0 { other } else { best }
-                    },
-                );
+                for other in tried.into_par_iter().filter_map(cut).collect::<Vec<_>>() {
+                    if other.0 > best.0 {
+                        best = other;
+                    }
+                }
             }
         }
         Some(best.2)
