@@ -1,11 +1,15 @@
-//! Edges that no pair of views can place, since all cameras lie in one plane with them, or
-//! nearly: where 2D segments run from corner to corner, corners that other edges have placed.
+//! Edges between corners that other edges have placed.
+//!
+//! No pair of views can place an edge if all cameras lie in one plane with it, or nearly: it is
+//! asked for where 2D segments run from corner to corner. A short edge may have no 2D segment at
+//! all: corners near each other are asked in any case.
 
 use super::arc_tubes::KnownArcs;
 use super::claimed_edgels::claim_edgels;
 use super::corners::{Corners, MAX_GAP};
 use super::edge_samples::Images;
 use crate::projection::project_in_front;
+use crate::statistics::upper_median;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,6 +20,13 @@ const END_DISTANCE: f64 = 5.0;
 /// Views in which a 2D segment must run between the two.
 const MIN_VIEWS: usize = 2;
 
+/// Corners so many pixels from each other are asked whether an edge runs between them: between those
+/// farther apart some view has a 2D segment. With 30 and 120 the faces of random parts with truth
+/// are the same to two thousandths; pairs however far apart cut edges that are joined later.
+const NEAR: f64 = 60.0;
+/// Nothing of an edge between two corners is open, but which two of them.
+const FREE_VIEWS: usize = 1;
+
 /// Adds the edges between corners that edgels which no line has speak for; returns how many.
 pub(super) fn complete_edges(
     images: &Images,
@@ -25,6 +36,7 @@ pub(super) fn complete_edges(
 ) -> usize {
     let known: BTreeSet<[usize; 2]> = corners.pairs().collect();
     let mut pairs = drawn_pairs(images, corners);
+    pairs.extend(near_junctions(corners));
     pairs.retain(|pair| !known.contains(pair));
     let found = supported(images, corners, pairs, taken, (min_evidence, arcs));
     drop_pieces(images, corners, &found);
@@ -37,20 +49,29 @@ pub(super) fn complete_edges(
 pub(super) fn supported(
     images: &Images,
     corners: &Corners,
-    pairs: Vec<[usize; 2]>,
+    pairs: BTreeSet<[usize; 2]>,
     taken: &mut [Vec<bool>],
     (least, arcs): (f64, &KnownArcs),
 ) -> Vec<([usize; 2], f64)> {
     let junctions = &corners.junctions;
     let line = |[a, b]: [usize; 2]| LineSegment3::new(junctions[a], junctions[b]);
+    let evidence = |pair: [usize; 2], taken: &[Vec<bool>]| {
+        images.evidence_of(
+            &line(pair),
+            |_| Some(line(pair)),
+            Some(taken),
+            least,
+            FREE_VIEWS,
+        )
+    };
     let mut weighed: Vec<(f64, [usize; 2])> = (pairs.into_par_iter())
-        .map(|pair| (images.evidence(&line(pair), Some(taken), least).gain, pair))
+        .map(|pair| (evidence(pair, taken).gain, pair))
         .filter(|(gain, pair)| *gain > least && !arcs.explain(images, &line(*pair), least))
         .collect();
     weighed.sort_by(|(a, i), (b, j)| b.total_cmp(a).then(i.cmp(j)));
     let mut found = Vec::new();
     for (_, pair) in weighed {
-        let evidence = images.evidence(&line(pair), Some(taken), least);
+        let evidence = evidence(pair, taken);
         if evidence.gain > least {
             claim_edgels(images, &line(pair), taken);
             found.push((pair, images.pixel_size(&line(pair), evidence.views())));
@@ -88,7 +109,7 @@ fn drop_pieces(images: &Images, corners: &mut Corners, edges: &[([usize; 2], f64
 }
 
 /// Pairs of junctions, ascending, between which 2D segments run in enough views.
-fn drawn_pairs(images: &Images, corners: &Corners) -> Vec<[usize; 2]> {
+fn drawn_pairs(images: &Images, corners: &Corners) -> BTreeSet<[usize; 2]> {
     let of_views: Vec<BTreeSet<[usize; 2]>> = (images.views.par_iter())
         .map(|view| {
             // Of each end of each segment the nearest corner, and how far it is.
@@ -125,18 +146,38 @@ fn drawn_pairs(images: &Images, corners: &Corners) -> Vec<[usize; 2]> {
         .collect()
 }
 
+/// Pairs of junctions, ascending, that are few pixels from each other.
+fn near_junctions(corners: &Corners) -> impl Iterator<Item = [usize; 2]> {
+    let junctions = &corners.junctions;
+    let reach = NEAR * upper_median(&mut corners.pixels.clone());
+    let is_near = move |[a, b]: &[usize; 2]| (junctions[*a] - junctions[*b]).norm() <= reach;
+    (0..junctions.len())
+        .flat_map(|a| (a + 1..junctions.len()).map(move |b| [a, b]))
+        .filter(is_near)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::assemble::corners::find_corners;
     use crate::assemble::test_views::{TestViews, chosen, cube_edge};
+    use crate::assemble::view_segments::PreparedView;
+    use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
 
     /// All edges of the cube but `left_out`, and what has the edgels.
     fn without(images: &Images, left_out: usize) -> (Corners, Vec<Vec<bool>>) {
+        without_edge(images, left_out, cube_edge)
+    }
+
+    fn without_edge(
+        images: &Images,
+        left_out: usize,
+        edge: impl Fn(usize) -> LineSegment3,
+    ) -> (Corners, Vec<Vec<bool>>) {
         let mut taken = images.nothing_taken();
         let lines: Vec<_> = (0..12)
-            .filter(|edge| *edge != left_out)
-            .map(|edge| chosen(images, &cube_edge(edge)))
+            .filter(|k| *k != left_out)
+            .map(|k| chosen(images, &edge(k)))
             .collect();
         for line in &lines {
             claim_edgels(images, &line.line, &mut taken);
@@ -154,6 +195,29 @@ mod tests {
         assert_eq!(complete_edges(&images, &mut corners, &mut taken, limits), 1);
         assert_eq!(corners.ends.len(), 12);
         assert_eq!(complete_edges(&images, &mut corners, &mut taken, limits), 0);
+    }
+
+    #[test]
+    fn short_edges_need_no_2d_segment() {
+        let (junctions, edges) = cube();
+        let added = |scale: f64| {
+            let small: Vec<_> = junctions.iter().map(|corner| scale * corner).collect();
+            let cameras = cameras_on_sphere(20);
+            let seen = TestViews::of_edges(&cameras, &small, &edges);
+            let without_segments: Vec<_> = (views_of_edges(&cameras, &small, &edges).iter())
+                .map(|view| PreparedView::new(view, 1.0, f64::INFINITY))
+                .collect();
+            let images = Images {
+                views: &without_segments,
+                ..seen.images()
+            };
+            let edge = |k: usize| cube_edge(k).map(|end| scale * end);
+            let (mut corners, mut taken) = without_edge(&images, 7, edge);
+            let limits = (3.0, &KnownArcs::new(&[], &[]));
+            complete_edges(&images, &mut corners, &mut taken, limits)
+        };
+        assert_eq!(added(0.1), 1);
+        assert_eq!(added(1.0), 0, "what is longer has segments");
     }
 
     #[test]

@@ -57,7 +57,7 @@ pub(super) fn close_slabs(
     let found = supported(
         &images,
         corners,
-        pairs,
+        pairs.into_iter().collect(),
         taken,
         (min_evidence - EXPECTED, arcs),
     );
