@@ -20,7 +20,8 @@ const REACH: f64 = 1.0;
 const ROUNDING: f64 = 1.5;
 /// Of what lies across the end of a slab so much less evidence is asked, in nats: on photographs
 /// with truth a third is an edge, and of other ends near each other one in thirty, which is 2.4
-/// nats more. With 1.5 of them 57 % of what is found there are edges, with 2.5 nats 47 %.
+/// nats more. With 1.5 of them 57 % of what is found there are edges, with 2.5 nats 47 %, when the
+/// two views that say most did not count.
 const EXPECTED: f64 = 1.5;
 /// Edges side by side have this cosine: about 10°.
 const MIN_COSINE_ALONG: f64 = 0.985;
