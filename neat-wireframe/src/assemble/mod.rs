@@ -62,6 +62,7 @@ mod line_kind;
 mod line_selection;
 mod neighbours;
 mod outlines;
+mod pocket_floors;
 mod pose_fitting;
 mod profiles;
 mod progress;
@@ -114,6 +115,7 @@ use line_continuation::{continue_lines, meet_in_slivers};
 use line_selection::{Selection, select_lines, sure_lines};
 use nalgebra::{Matrix4, Vector3};
 use neat_core::{EdgelMap, LineSegment2, Spline};
+use pocket_floors::add_floors;
 use pose_fitting::fit_poses;
 use profiles::place_curves;
 use progress::part;
@@ -383,6 +385,7 @@ fn graph_of(
     move_free_ends(&images, &lines, &mut corners);
     end_on_arcs(&images, &mut corners, arcs);
     report.completed_edges = complete_edges(&images, &mut corners, taken, (least, known));
+    report.completed_edges += add_floors(&images, &mut corners, taken, arcs);
     report.completed_edges += close_slabs(&images, &mut corners, taken, (least, known));
     if let Some(light) = photographs.zip(response) {
         report.completed_edges += close_by_light(&images, light, &lines, &mut corners);

@@ -1,0 +1,504 @@
+//! Floors of pockets: the edges of a plane once more at another depth.
+//!
+//! Few views look down into a pocket, and each sees other edges of its floor: too few for any one
+//! of them. But one number, the depth, says where all of them are, and what stands on the corners
+//! of the rim ends there. Edgels that nothing explains propose depths, the images decide about all
+//! edges of a depth together.
+
+use super::circle_fitting::FoundArc;
+use super::claimed_edgels::claim_edgels;
+use super::corners::Corners;
+use super::edge_samples::Images;
+use crate::statistics::upper_median;
+use nalgebra::{Vector2, Vector3};
+use neat_core::LineSegment3;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What an edge of a floor or on a corner of the rim has to say before it counts, in nats: that it
+/// is one of those that are there.
+const OF_EDGE: f64 = 1.5;
+/// What all of them together have to say for a depth beyond that, in nats: about as many planes and
+/// depths are asked as this is unlikely …
+const OF_DEPTH: f64 = 8.0;
+/// … and the edges of the floor alone: what stands on corners may be longer than the pocket is deep.
+/// Without it a right floor on random parts with truth comes with as many wrong ones.
+const OF_FLOOR: f64 = 6.0;
+/// Edgels are proposals for so many depths of a plane at most: those for which most of them speak.
+const MAX_DEPTHS: usize = 4;
+/// Nothing is larger than the largest image, in pixels.
+const MAX_SPAN: f64 = 1e5;
+/// Whole projections of edges by which edgels of all views have to speak for a depth, beyond those
+/// that do for any.
+const MIN_VOTES: f64 = 1.5;
+/// A view shows parts of an edge at a depth from this share on.
+const MIN_SHARE: f64 = 0.4;
+/// Edges have more edgels than this, in pixels: one alone says nothing.
+const MIN_PIXELS: f64 = 6.0;
+/// Edgels of a floor lie at most at this angle to it in the image (sine, about 15°): those of short
+/// edges are less sure than those that a line takes.
+const MAX_SINE: f64 = 0.25;
+/// Depths tried around each proposal, as multiples of half a pixel: nearer ones show the same edgels.
+const STEPS: i32 = 3;
+/// Smoothing leaves no two edges nearer to each other, in pixels: junctions nearer than this to a
+/// corner of the floor are that corner, and no floor is so near to its rim.
+const APART: f64 = 3.0;
+/// Junctions so many pixels from a plane lie in it.
+const IN_PLANE: f64 = 1.5;
+/// Edges that meet under a smaller angle tell no plane, about 17° (sine).
+const MIN_SINE_OF_PLANE: f64 = 0.3;
+/// Cosine of the angle up to which directions are one: about 1.8° for what stands on a plane …
+const UPRIGHT: f64 = 0.9995;
+/// … and 1.1° for normals.
+const SAME_NORMAL: f64 = 0.9998;
+
+/// Adds the floors of pockets that edgels which nothing has speak for, and what stands on the
+/// corners of their rims; returns how many edges.
+pub(super) fn add_floors(
+    images: &Images,
+    corners: &mut Corners,
+    taken: &mut [Vec<bool>],
+    arcs: &[FoundArc],
+) -> usize {
+    let pixel = upper_median(&mut corners.pixels.clone());
+    let mut of_any = taken.to_vec();
+    for arc in arcs {
+        images.claim_arc(arc, &mut of_any);
+    }
+    let planes = planes(corners, pixel);
+    let free = free_edgels(images, &of_any);
+    let weighed = |plane| {
+        let sweep = Sweep {
+            images,
+            corners,
+            taken: &of_any,
+            plane,
+            pixel,
+        };
+        let depths = sweep.depths(&free);
+        let best = depths.into_iter().filter_map(move |depth| {
+            let near = (-STEPS..=STEPS).map(|step| depth + 0.5 * f64::from(step) * pixel);
+            let floors = near.filter_map(|depth| Some((sweep.floor(depth)?.gain, depth)));
+            floors.max_by(|(a, _), (b, _)| a.total_cmp(b))
+        });
+        best.map(|(gain, depth)| (gain, depth, plane)).collect()
+    };
+    let weighed: Vec<Vec<(f64, f64, &Plane)>> = planes.par_iter().map(weighed).collect();
+    let mut weighed = weighed.concat();
+    weighed.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
+    let before = corners.ends.len();
+    for (_, depth, plane) in weighed {
+        // What has been added may have its edgels and its corners.
+        let sweep = Sweep {
+            images,
+            corners,
+            taken: &of_any,
+            plane,
+            pixel,
+        };
+        if let Some(floor) = sweep.floor(depth) {
+            for line in add_floor(corners, &floor, depth * plane.normal, pixel) {
+                claim_edgels(images, &line, taken);
+                claim_edgels(images, &line, &mut of_any);
+            }
+        }
+    }
+    corners.ends.len() - before
+}
+
+/// Adds the edges of a floor that lies by `shift` from its rim; returns them.
+fn add_floor(
+    corners: &mut Corners,
+    floor: &Floor,
+    shift: Vector3<f64>,
+    pixel: f64,
+) -> Vec<LineSegment3> {
+    let known = corners.junctions.len();
+    let mut new: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut add = |end: usize| {
+        let junctions = &mut corners.junctions;
+        if end < known {
+            return end;
+        }
+        *new.entry(end).or_insert_with(|| {
+            junctions.push(junctions[end - known] + shift);
+            junctions.len() - 1
+        })
+    };
+    let pairs = (floor.pieces.iter()).map(|piece| (piece.ends.map(&mut add), pixel));
+    let pairs: Vec<([usize; 2], f64)> = pairs.collect();
+    let first = corners.ends.len();
+    corners.add(&pairs);
+    (first..corners.ends.len())
+        .map(|line| corners.edge(line))
+        .collect()
+}
+
+/// An edgel that nothing has.
+struct FreeEdgel {
+    ray: Vector3<f64>,
+    /// Unit normal of the plane that its tangent and the camera's centre span.
+    plane_normal: Vector3<f64>,
+}
+
+/// Those of each view.
+fn free_edgels(images: &Images, taken: &[Vec<bool>]) -> Vec<Vec<FreeEdgel>> {
+    let of_view = |view: usize| {
+        let (camera, map) = (&images.views[view].camera, &images.maps[view]);
+        let free = (0..map.len()).filter(|edgel| !taken[view][*edgel]);
+        let with_rays = free.filter_map(|edgel| {
+            let edgel = map.get(edgel);
+            let pixel: Vector2<f64> = edgel.position.cast();
+            let along = Vector2::new(-edgel.normal.y, edgel.normal.x).cast();
+            let [ray, beside] = [pixel, pixel + along].map(|p| camera.ray_through(&p).direction);
+            Some(FreeEdgel {
+                ray,
+                plane_normal: ray.cross(&beside).try_normalize(0.0)?,
+            })
+        });
+        with_rays.collect()
+    };
+    (0..images.views.len())
+        .into_par_iter()
+        .map(of_view)
+        .collect()
+}
+
+/// Edges in a plane on which some edge stands.
+struct Plane {
+    normal: Vector3<f64>,
+    /// The edges in it.
+    edges: Vec<usize>,
+    /// Their corners.
+    corners: BTreeSet<usize>,
+}
+
+/// The planes of edges that meet.
+fn planes(corners: &Corners, pixel: f64) -> Vec<Plane> {
+    let junctions = &corners.junctions;
+    let edges = 0..corners.ends.len();
+    let along: Vec<Vector3<f64>> = (edges.clone())
+        .map(|edge| {
+            let edge = corners.edge(edge);
+            (edge.end - edge.start).normalize()
+        })
+        .collect();
+    let mut planes: Vec<Plane> = Vec::new();
+    let mut at: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (edge, ends) in corners.ends.iter().enumerate() {
+        for end in ends {
+            at.entry(*end).or_default().push(edge);
+        }
+    }
+    for (corner, edges_at) in &at {
+        let place = &junctions[*corner];
+        let is_in = |normal: &Vector3<f64>, junction: usize| {
+            normal.dot(&(junctions[junction] - place)).abs() < IN_PLANE * pixel
+        };
+        for (i, a) in edges_at.iter().enumerate() {
+            for b in &edges_at[..i] {
+                let across = along[*a].cross(&along[*b]);
+                if across.norm() < MIN_SINE_OF_PLANE {
+                    continue;
+                }
+                let normal = across.normalize();
+                let is_known = |plane: &Plane| {
+                    plane.normal.dot(&normal).abs() > SAME_NORMAL
+                        && plane.corners.first().is_some_and(|j| is_in(&normal, *j))
+                };
+                let stands = |edge: &Vector3<f64>| edge.dot(&normal).abs() > UPRIGHT;
+                if planes.iter().any(is_known) || !along.iter().any(stands) {
+                    continue;
+                }
+                let in_it = |edge: &usize| corners.ends[*edge].iter().all(|j| is_in(&normal, *j));
+                let edges: Vec<usize> = edges.clone().filter(in_it).collect();
+                planes.push(Plane {
+                    normal,
+                    corners: edges.iter().flat_map(|edge| corners.ends[*edge]).collect(),
+                    edges,
+                });
+            }
+        }
+    }
+    planes
+}
+
+/// An edge that a depth asks for.
+#[derive(Clone, Copy)]
+struct Piece {
+    /// Junctions; the number of these more than a corner of the plane stands for what lies over it.
+    ends: [usize; 2],
+    /// What the images say for it beyond [`OF_EDGE`], in nats.
+    gain: f64,
+    is_floor: bool,
+}
+
+/// What the images show of the edges of a plane at some depth.
+struct Floor {
+    gain: f64,
+    pieces: Vec<Piece>,
+}
+
+/// The edges of a plane, to be moved along its normal.
+struct Sweep<'a> {
+    images: &'a Images<'a>,
+    corners: &'a Corners,
+    /// The edgels that lines and arcs have.
+    taken: &'a [Vec<bool>],
+    plane: &'a Plane,
+    pixel: f64,
+}
+
+impl Sweep<'_> {
+    /// The depths for which most free edgels speak, all within what the junctions span.
+    fn depths(&self, free: &[Vec<FreeEdgel>]) -> Vec<f64> {
+        let normal = &self.plane.normal;
+        let Some(corner) = self.plane.corners.first() else {
+            return Vec::new();
+        };
+        let junctions = &self.corners.junctions;
+        let depth = |junction| normal.dot(&(junction - junctions[*corner])) / self.pixel;
+        let (low, high) = (junctions.iter().map(depth))
+            .fold((0.0f64, 0.0f64), |(low, high), d| (low.min(d), high.max(d)));
+        let bins = Bins {
+            first: low.floor() - 2.0,
+            count: (high - low).min(MAX_SPAN).ceil() as usize + 5,
+        };
+        let mut votes = vec![0.0; bins.count];
+        for edge in &self.plane.edges {
+            self.vote(&self.corners.edge(*edge), free, &bins, &mut votes);
+        }
+        let usual = upper_median(&mut votes.clone());
+        let is_peak = |k: &usize| {
+            votes[*k] - usual >= MIN_VOTES
+                && votes[*k] >= votes[k - 1]
+                && votes[*k] > votes[k + 1]
+                && bins.depth(*k).abs() > APART
+        };
+        let mut peaks: Vec<usize> = (1..bins.count - 1).filter(is_peak).collect();
+        peaks.sort_by(|a, b| votes[*b].total_cmp(&votes[*a]));
+        peaks.truncate(MAX_DEPTHS);
+        let in_world = |peak| bins.depth(peak) * self.pixel;
+        peaks.into_iter().map(in_world).collect()
+    }
+
+    /// What free edgels say for depths at which an edge of the plane would be once more: they lie on
+    /// the wall that stands on it, and along it.
+    fn vote(&self, edge: &LineSegment3, free: &[Vec<FreeEdgel>], bins: &Bins, votes: &mut [f64]) {
+        let normal = &self.plane.normal;
+        let length = edge.length();
+        let along = (edge.end - edge.start) / length;
+        let across = normal.cross(&along);
+        let mut shares = vec![0.0; bins.count];
+        for (view, free) in self.images.views.iter().zip(free) {
+            let center = view.camera.center_in_world;
+            let to_wall = across.dot(&(edge.start - center));
+            shares.fill(0.0);
+            for FreeEdgel { ray, plane_normal } in free {
+                let off = plane_normal.dot(&along).abs();
+                if off > MAX_SINE {
+                    continue;
+                }
+                let on_wall = center + to_wall / across.dot(ray) * ray;
+                let from_start = on_wall - edge.start;
+                let is_beside = (0.0..=length).contains(&along.dot(&from_start));
+                let bin = bins.of(normal.dot(&from_start) / self.pixel);
+                let across_ray = (along - along.dot(ray) * ray).norm();
+                if let Some(bin) = bin
+                    && is_beside
+                    && (on_wall - center).dot(ray) > 0.0
+                    && off <= MAX_SINE * across_ray
+                {
+                    let pixels = length * across_ray / view.pixel_size_at(&on_wall);
+                    shares[bin] += pixels.max(MIN_PIXELS).recip();
+                }
+            }
+            for k in 1..bins.count - 1 {
+                let share: f64 = shares[k - 1..=k + 1].iter().sum();
+                if share > MIN_SHARE {
+                    votes[k] += share.min(1.0);
+                }
+            }
+        }
+    }
+
+    /// What the images show at a depth, if it is a floor: joined to what is known by edges on the
+    /// corners of the rim, or by ends at known junctions, and without ends of its own.
+    fn floor(&self, depth: f64) -> Option<Floor> {
+        let corners = self.corners;
+        let shift = depth * self.plane.normal;
+        let known = corners.junctions.len();
+        let over: BTreeMap<usize, usize> = (self.plane.corners.iter())
+            .map(|corner| {
+                let place = corners.junctions[*corner] + shift;
+                let is_there = |j: &Vector3<f64>| (j - place).norm() < APART * self.pixel;
+                let there = corners.junctions.iter().position(is_there);
+                (*corner, there.unwrap_or(known + corner))
+            })
+            .collect();
+        let is_edge: BTreeSet<[usize; 2]> = corners.pairs().collect();
+        let piece = |ends: [usize; 2], line: LineSegment3, is_floor: bool| {
+            let [a, b] = ends;
+            if a == b || is_edge.contains(&[a.min(b), a.max(b)]) {
+                return None;
+            }
+            let taken = Some(self.taken);
+            let evidence = self
+                .images
+                .evidence_of(&line, |_| Some(line), taken, OF_EDGE, 0);
+            let gain = evidence.gain - OF_EDGE;
+            (gain > 0.0).then_some(Piece {
+                ends,
+                gain,
+                is_floor,
+            })
+        };
+        let at_depth = |edge: &usize| {
+            let ends = corners.ends[*edge].map(|end| over[&end]);
+            piece(ends, corners.edge(*edge).map(|end| end + shift), true)
+        };
+        let mut pieces: Vec<Piece> = self.plane.edges.iter().filter_map(at_depth).collect();
+        if of_floor(&pieces) <= OF_FLOOR {
+            return None;
+        }
+        let on_corner = |(corner, over): (&usize, &usize)| {
+            let place = corners.junctions[*corner];
+            piece(
+                [*corner, *over],
+                LineSegment3::new(place, place + shift),
+                false,
+            )
+        };
+        pieces.extend(over.iter().filter_map(on_corner));
+        let pieces = joined(closed(pieces, known), known);
+        let gain = pieces.iter().map(|piece| piece.gain).sum();
+        (of_floor(&pieces) > OF_FLOOR && gain > OF_DEPTH).then_some(Floor { gain, pieces })
+    }
+}
+
+/// Depths by pixels.
+struct Bins {
+    /// The depth where the first one begins.
+    first: f64,
+    count: usize,
+}
+
+impl Bins {
+    fn of(&self, depth: f64) -> Option<usize> {
+        let bin = depth - self.first;
+        (0.0..self.count as f64)
+            .contains(&bin)
+            .then_some(bin as usize)
+    }
+
+    /// The middle of a bin.
+    fn depth(&self, bin: usize) -> f64 {
+        self.first + bin as f64 + 0.5
+    }
+}
+
+fn of_floor(pieces: &[Piece]) -> f64 {
+    let floor = pieces.iter().filter(|piece| piece.is_floor);
+    floor.map(|piece| piece.gain).sum()
+}
+
+/// Pieces without those that end where nothing else does, but for `known` junctions.
+fn closed(mut pieces: Vec<Piece>, known: usize) -> Vec<Piece> {
+    loop {
+        let mut degrees: BTreeMap<usize, usize> = BTreeMap::new();
+        for end in pieces.iter().flat_map(|piece| piece.ends) {
+            *degrees.entry(end).or_default() += 1;
+        }
+        let before = pieces.len();
+        pieces.retain(|piece| {
+            let mut ends = piece.ends.iter();
+            ends.all(|end| *end < known || degrees[end] > 1)
+        });
+        if pieces.len() == before {
+            return pieces;
+        }
+    }
+}
+
+/// Pieces without those that nothing joins to `known` junctions.
+fn joined(mut pieces: Vec<Piece>, known: usize) -> Vec<Piece> {
+    let mut reached: BTreeSet<usize> = (0..known).collect();
+    loop {
+        let before = reached.len();
+        for piece in &pieces {
+            if piece.ends.iter().any(|end| reached.contains(end)) {
+                reached.extend(piece.ends);
+            }
+        }
+        if reached.len() == before {
+            break;
+        }
+    }
+    pieces.retain(|piece| reached.contains(&piece.ends[0]));
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::corners::find_corners;
+    use crate::assemble::test_views::{TestViews, chosen};
+    use crate::assemble::view_segments::PreparedView;
+    use crate::test_scenes::{cameras_on_sphere, cube, views_of_edges};
+    use nalgebra::Rotation3;
+
+    /// How many edges are added to the top of a cube and a post beside it, where the floor is seen
+    /// turned by so much, each other edge in two of 21 views, and edges on the corners of the rim if
+    /// `uprights`.
+    fn added(turn: f64, uprights: bool) -> usize {
+        let (mut junctions, mut edges) = cube();
+        let top = junctions.clone();
+        let about_z = Rotation3::from_axis_angle(&Vector3::z_axis(), turn);
+        for corner in junctions.iter_mut().filter(|corner| corner.z < 0.0) {
+            *corner = about_z * *corner;
+        }
+        edges.push([junctions.len(), junctions.len() + 1]);
+        junctions.extend([-0.5, 0.5].map(|z| Vector3::new(0.8, 0.1, z)));
+        let is_known =
+            |[a, b]: &[usize; 2]| *a >= top.len() || (top[*a].z > 0.0 && top[*b].z > 0.0);
+        let is_upright = |[a, b]: &[usize; 2]| top[*a].z * top[*b].z < 0.0;
+        let mut views = views_of_edges(&cameras_on_sphere(21), &junctions, &edges);
+        for (view, observation) in views.iter_mut().enumerate() {
+            observation.segments.retain(|segment| {
+                let edge = &edges[segment.edge];
+                is_known(edge)
+                    || (segment.edge % 10 == view % 10 && (uprights || !is_upright(edge)))
+            });
+        }
+        let prepared = views.iter().map(|view| PreparedView::new(view, 1.0, 1.0));
+        let seen = TestViews::of(prepared.collect());
+        let images = seen.images();
+        let mut taken = images.nothing_taken();
+        let known = edges.iter().filter(|edge| is_known(edge));
+        let lines: Vec<_> = known
+            .map(|[a, b]| chosen(&images, &LineSegment3::new(junctions[*a], junctions[*b])))
+            .collect();
+        for line in &lines {
+            claim_edgels(&images, &line.line, &mut taken);
+        }
+        let mut corners = find_corners(&images, &lines, (&[], &[]));
+        assert_eq!([corners.ends.len(), corners.junctions.len()], [5, 6]);
+        let count = add_floors(&images, &mut corners, &mut taken, &[]);
+        assert_eq!(corners.ends.len(), 5 + count);
+        let is_true = |place: &Vector3<f64>| junctions.iter().any(|j| (j - place).norm() < 0.01);
+        assert!(corners.junctions.iter().all(is_true));
+        assert_eq!(add_floors(&images, &mut corners, &mut taken, &[]), 0);
+        count
+    }
+
+    #[test]
+    fn few_views_of_each_edge_tell_a_floor_together() {
+        assert_eq!(added(0.0, true), 8);
+        assert_eq!(
+            added(0.2, true),
+            0,
+            "another square is no floor of this rim"
+        );
+        assert_eq!(added(0.0, false), 0, "nothing joins the floor to its rim");
+    }
+}
