@@ -24,6 +24,8 @@ const OF_DEPTH: f64 = 8.0;
 /// … and the edges of the floor alone: what stands on corners may be longer than the pocket is deep.
 /// Without it a right floor on random parts with truth comes with as many wrong ones.
 const OF_FLOOR: f64 = 6.0;
+/// One edge alone is no floor: that of its depth would be the only one.
+const MIN_EDGES: usize = 2;
 /// Edgels are proposals for so many depths of a plane at most: those for which most of them speak.
 const MAX_DEPTHS: usize = 4;
 /// Nothing is larger than the largest image, in pixels.
@@ -371,8 +373,14 @@ impl Sweep<'_> {
         };
         pieces.extend(over.iter().filter_map(on_corner));
         let pieces = joined(closed(pieces, known), known);
+        let place = |end: usize| {
+            let over = |corner: usize| corners.junctions[corner] + shift;
+            (corners.junctions.get(end).copied()).unwrap_or_else(|| over(end - known))
+        };
+        let pieces = straight(pieces, known, place);
         let gain = pieces.iter().map(|piece| piece.gain).sum();
-        (of_floor(&pieces) > OF_FLOOR && gain > OF_DEPTH).then_some(Floor { gain, pieces })
+        let says_enough = of_floor(&pieces) > OF_FLOOR && gain > OF_DEPTH;
+        (pieces.len() >= MIN_EDGES && says_enough).then_some(Floor { gain, pieces })
     }
 }
 
@@ -418,6 +426,35 @@ fn closed(mut pieces: Vec<Piece>, known: usize) -> Vec<Piece> {
             return pieces;
         }
     }
+}
+
+/// Pieces that go straight on at a new corner where nothing else ends are one: what cuts the rim there
+/// need not cut the floor.
+fn straight(
+    mut pieces: Vec<Piece>,
+    known: usize,
+    place: impl Fn(usize) -> Vector3<f64>,
+) -> Vec<Piece> {
+    let ends: BTreeSet<usize> = pieces.iter().flat_map(|piece| piece.ends).collect();
+    for corner in ends.into_iter().filter(|end| *end >= known) {
+        let at: Vec<usize> = (0..pieces.len())
+            .filter(|piece| pieces[*piece].ends.contains(&corner))
+            .collect();
+        let [a, b] = at[..] else {
+            continue;
+        };
+        let far = [a, b].map(|piece| pieces[piece].ends.into_iter().find(|end| *end != corner));
+        let [Some(start), Some(end)] = far else {
+            continue;
+        };
+        let [u, v] = [start, end].map(|end| (place(end) - place(corner)).normalize());
+        if u.dot(&v) < -UPRIGHT {
+            pieces[a].ends = [start, end];
+            pieces[a].gain += pieces[b].gain;
+            pieces.remove(b);
+        }
+    }
+    pieces
 }
 
 /// Pieces without those that nothing joins to `known` junctions.
@@ -500,5 +537,26 @@ mod tests {
             "another square is no floor of this rim"
         );
         assert_eq!(added(0.0, false), 0, "nothing joins the floor to its rim");
+    }
+
+    #[test]
+    fn what_cuts_the_rim_need_not_cut_the_floor() {
+        let places = [0.0, 1.0, 2.0, 3.0].map(|x| Vector3::new(x, 0.0, 0.0));
+        let piece = |ends: [usize; 2]| Piece {
+            ends,
+            gain: 2.0,
+            is_floor: true,
+        };
+        let pieces = || [[0, 1], [2, 1], [2, 3]].map(piece).to_vec();
+        let ends = |known: usize, places: &[Vector3<f64>; 4]| -> Vec<[usize; 2]> {
+            let pieces = straight(pieces(), known, |end| places[end]);
+            assert_eq!(of_floor(&pieces), 6.0);
+            pieces.iter().map(|piece| piece.ends).collect()
+        };
+        assert_eq!(ends(1, &places), [[0, 3]]);
+        assert_eq!(ends(2, &places), [[0, 1], [1, 3]]);
+        let mut bent = places;
+        bent[2].y = 0.5;
+        assert_eq!(ends(0, &bent).len(), 3);
     }
 }
