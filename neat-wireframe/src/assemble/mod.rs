@@ -62,6 +62,7 @@ mod line_kind;
 mod line_selection;
 mod neighbours;
 mod outlines;
+mod pocket_depths;
 mod pocket_floors;
 mod pose_fitting;
 mod profiles;

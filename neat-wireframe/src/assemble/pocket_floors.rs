@@ -9,8 +9,9 @@ use super::circle_fitting::FoundArc;
 use super::claimed_edgels::claim_edgels;
 use super::corners::Corners;
 use super::edge_samples::Images;
+use super::pocket_depths::{APART, Rim, free_edgels};
 use crate::statistics::upper_median;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,33 +19,16 @@ use std::collections::{BTreeMap, BTreeSet};
 /// What an edge of a floor or on a corner of the rim has to say before it counts, in nats: that it
 /// is one of those that are there.
 const OF_EDGE: f64 = 1.5;
-/// What all of them together have to say for a depth beyond that, in nats: about as many planes and
-/// depths are asked as this is unlikely …
+/// What all of them together have to say for a depth beyond that, in nats: of a house two
+/// thousand planes and depths are asked …
 const OF_DEPTH: f64 = 8.0;
 /// … and the edges of the floor alone: what stands on corners may be longer than the pocket is deep.
-/// Without it a right floor on random parts with truth comes with as many wrong ones.
+/// Without it nine parts with truth lose half a point of F.
 const OF_FLOOR: f64 = 6.0;
 /// One edge alone is no floor: that of its depth would be the only one.
 const MIN_EDGES: usize = 2;
-/// Edgels are proposals for so many depths of a plane at most: those for which most of them speak.
-const MAX_DEPTHS: usize = 4;
-/// Nothing is larger than the largest image, in pixels.
-const MAX_SPAN: f64 = 1e5;
-/// Whole projections of edges by which edgels of all views have to speak for a depth, beyond those
-/// that do for any.
-const MIN_VOTES: f64 = 1.5;
-/// A view shows parts of an edge at a depth from this share on.
-const MIN_SHARE: f64 = 0.4;
-/// Edges have more edgels than this, in pixels: one alone says nothing.
-const MIN_PIXELS: f64 = 6.0;
-/// Edgels of a floor lie at most at this angle to it in the image (sine, about 15°): those of short
-/// edges are less sure than those that a line takes.
-const MAX_SINE: f64 = 0.25;
 /// Depths tried around each proposal, as multiples of half a pixel: nearer ones show the same edgels.
 const STEPS: i32 = 3;
-/// Smoothing leaves no two edges nearer to each other, in pixels: junctions nearer than this to a
-/// corner of the floor are that corner, and no floor is so near to its rim.
-const APART: f64 = 3.0;
 /// Junctions so many pixels from a plane lie in it.
 const IN_PLANE: f64 = 1.5;
 /// Edges that meet under a smaller angle tell no plane, about 17° (sine).
@@ -77,7 +61,7 @@ pub(super) fn add_floors(
             plane,
             pixel,
         };
-        let depths = sweep.depths(&free);
+        let depths = sweep.rim().depths(images, &free);
         let best = depths.into_iter().filter_map(move |depth| {
             let near = (-STEPS..=STEPS).map(|step| depth + 0.5 * f64::from(step) * pixel);
             let floors = near.filter_map(|depth| Some((sweep.floor(depth)?.gain, depth)));
@@ -133,36 +117,6 @@ fn add_floor(
     corners.add(&pairs);
     (first..corners.ends.len())
         .map(|line| corners.edge(line))
-        .collect()
-}
-
-/// An edgel that nothing has.
-struct FreeEdgel {
-    ray: Vector3<f64>,
-    /// Unit normal of the plane that its tangent and the camera's centre span.
-    plane_normal: Vector3<f64>,
-}
-
-/// Those of each view.
-fn free_edgels(images: &Images, taken: &[Vec<bool>]) -> Vec<Vec<FreeEdgel>> {
-    let of_view = |view: usize| {
-        let (camera, map) = (&images.views[view].camera, &images.maps[view]);
-        let free = (0..map.len()).filter(|edgel| !taken[view][*edgel]);
-        let with_rays = free.filter_map(|edgel| {
-            let edgel = map.get(edgel);
-            let pixel: Vector2<f64> = edgel.position.cast();
-            let along = Vector2::new(-edgel.normal.y, edgel.normal.x).cast();
-            let [ray, beside] = [pixel, pixel + along].map(|p| camera.ray_through(&p).direction);
-            Some(FreeEdgel {
-                ray,
-                plane_normal: ray.cross(&beside).try_normalize(0.0)?,
-            })
-        });
-        with_rays.collect()
-    };
-    (0..images.views.len())
-        .into_par_iter()
-        .map(of_view)
         .collect()
 }
 
@@ -252,75 +206,24 @@ struct Sweep<'a> {
 }
 
 impl Sweep<'_> {
-    /// The depths for which most free edgels speak, all within what the junctions span.
-    fn depths(&self, free: &[Vec<FreeEdgel>]) -> Vec<f64> {
-        let normal = &self.plane.normal;
-        let Some(corner) = self.plane.corners.first() else {
-            return Vec::new();
-        };
+    /// Pockets are no deeper than what the junctions span.
+    fn rim(&self) -> Rim {
+        let Plane {
+            normal,
+            edges,
+            corners,
+        } = self.plane;
         let junctions = &self.corners.junctions;
-        let depth = |junction| normal.dot(&(junction - junctions[*corner])) / self.pixel;
-        let (low, high) = (junctions.iter().map(depth))
-            .fold((0.0f64, 0.0f64), |(low, high), d| (low.min(d), high.max(d)));
-        let bins = Bins {
-            first: low.floor() - 2.0,
-            count: (high - low).min(MAX_SPAN).ceil() as usize + 5,
+        let depth = |junction: &Vector3<f64>| {
+            let corner = corners.first().map_or(junction, |first| &junctions[*first]);
+            normal.dot(&(junction - corner)) / self.pixel
         };
-        let mut votes = vec![0.0; bins.count];
-        for edge in &self.plane.edges {
-            self.vote(&self.corners.edge(*edge), free, &bins, &mut votes);
-        }
-        let usual = upper_median(&mut votes.clone());
-        let is_peak = |k: &usize| {
-            votes[*k] - usual >= MIN_VOTES
-                && votes[*k] >= votes[k - 1]
-                && votes[*k] > votes[k + 1]
-                && bins.depth(*k).abs() > APART
-        };
-        let mut peaks: Vec<usize> = (1..bins.count - 1).filter(is_peak).collect();
-        peaks.sort_by(|a, b| votes[*b].total_cmp(&votes[*a]));
-        peaks.truncate(MAX_DEPTHS);
-        let in_world = |peak| bins.depth(peak) * self.pixel;
-        peaks.into_iter().map(in_world).collect()
-    }
-
-    /// What free edgels say for depths at which an edge of the plane would be once more: they lie on
-    /// the wall that stands on it, and along it.
-    fn vote(&self, edge: &LineSegment3, free: &[Vec<FreeEdgel>], bins: &Bins, votes: &mut [f64]) {
-        let normal = &self.plane.normal;
-        let length = edge.length();
-        let along = (edge.end - edge.start) / length;
-        let across = normal.cross(&along);
-        let mut shares = vec![0.0; bins.count];
-        for (view, free) in self.images.views.iter().zip(free) {
-            let center = view.camera.center_in_world;
-            let to_wall = across.dot(&(edge.start - center));
-            shares.fill(0.0);
-            for FreeEdgel { ray, plane_normal } in free {
-                let off = plane_normal.dot(&along).abs();
-                if off > MAX_SINE {
-                    continue;
-                }
-                let on_wall = center + to_wall / across.dot(ray) * ray;
-                let from_start = on_wall - edge.start;
-                let is_beside = (0.0..=length).contains(&along.dot(&from_start));
-                let bin = bins.of(normal.dot(&from_start) / self.pixel);
-                let across_ray = (along - along.dot(ray) * ray).norm();
-                if let Some(bin) = bin
-                    && is_beside
-                    && (on_wall - center).dot(ray) > 0.0
-                    && off <= MAX_SINE * across_ray
-                {
-                    let pixels = length * across_ray / view.pixel_size_at(&on_wall);
-                    shares[bin] += pixels.max(MIN_PIXELS).recip();
-                }
-            }
-            for k in 1..bins.count - 1 {
-                let share: f64 = shares[k - 1..=k + 1].iter().sum();
-                if share > MIN_SHARE {
-                    votes[k] += share.min(1.0);
-                }
-            }
+        let depths = junctions.iter().map(depth);
+        Rim {
+            edges: edges.iter().map(|edge| self.corners.edge(*edge)).collect(),
+            normal: *normal,
+            span: depths.fold([0.0; 2], |[low, high], d| [low.min(d), high.max(d)]),
+            pixel: self.pixel,
         }
     }
 
@@ -330,6 +233,7 @@ impl Sweep<'_> {
         let corners = self.corners;
         let shift = depth * self.plane.normal;
         let known = corners.junctions.len();
+        // A junction as near to a corner of the floor as no two edges are is that corner.
         let over: BTreeMap<usize, usize> = (self.plane.corners.iter())
             .map(|corner| {
                 let place = corners.junctions[*corner] + shift;
@@ -338,10 +242,10 @@ impl Sweep<'_> {
                 (*corner, there.unwrap_or(known + corner))
             })
             .collect();
-        let is_edge: BTreeSet<[usize; 2]> = corners.pairs().collect();
         let piece = |ends: [usize; 2], line: LineSegment3, is_floor: bool| {
             let [a, b] = ends;
-            if a == b || is_edge.contains(&[a.min(b), a.max(b)]) {
+            let pair = [a.min(b), a.max(b)];
+            if a == b || corners.pairs().any(|edge| edge == pair) {
                 return None;
             }
             let taken = Some(self.taken);
@@ -381,27 +285,6 @@ impl Sweep<'_> {
         let gain = pieces.iter().map(|piece| piece.gain).sum();
         let says_enough = of_floor(&pieces) > OF_FLOOR && gain > OF_DEPTH;
         (pieces.len() >= MIN_EDGES && says_enough).then_some(Floor { gain, pieces })
-    }
-}
-
-/// Depths by pixels.
-struct Bins {
-    /// The depth where the first one begins.
-    first: f64,
-    count: usize,
-}
-
-impl Bins {
-    fn of(&self, depth: f64) -> Option<usize> {
-        let bin = depth - self.first;
-        (0.0..self.count as f64)
-            .contains(&bin)
-            .then_some(bin as usize)
-    }
-
-    /// The middle of a bin.
-    fn depth(&self, bin: usize) -> f64 {
-        self.first + bin as f64 + 0.5
     }
 }
 
