@@ -8,9 +8,11 @@ use super::circle_fitting::FoundArc;
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
 use super::rounded_corners::MIN_SHORT_IN_PIXELS;
+use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Vector3};
 use neat_core::LineSegment3;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Lines meet where so many reaches lie between them at most. More bend lines to corners that
 /// are not theirs; 1.25 lose corners of parts.
@@ -56,6 +58,22 @@ impl Corners {
     /// The junctions of each line, ascending.
     pub(super) fn pairs(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         self.ends.iter().map(|[a, b]| [*a.min(b), *a.max(b)])
+    }
+
+    /// Median size of a pixel at the lines.
+    pub(super) fn pixel(&self) -> f64 {
+        upper_median(&mut self.pixels.clone())
+    }
+
+    /// For each junction the lines that end there.
+    pub(super) fn lines_at(&self) -> BTreeMap<usize, Vec<usize>> {
+        let mut lines_at: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (line, ends) in self.ends.iter().enumerate() {
+            for end in ends {
+                lines_at.entry(*end).or_default().push(line);
+            }
+        }
+        lines_at
     }
 
     /// How many lines end at each junction.

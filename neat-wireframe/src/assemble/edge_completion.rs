@@ -9,7 +9,6 @@ use super::claimed_edgels::claim_edgels;
 use super::corners::{Corners, MAX_GAP};
 use super::edge_samples::Images;
 use crate::projection::project_in_front;
-use crate::statistics::upper_median;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -86,12 +85,7 @@ pub(super) fn supported(
 fn drop_pieces(images: &Images, corners: &mut Corners, edges: &[([usize; 2], f64)]) {
     let junctions = &corners.junctions;
     let degrees = corners.degrees();
-    let mut lines_at: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (line, ends) in corners.ends.iter().enumerate() {
-        for end in ends {
-            lines_at.entry(*end).or_default().push(line);
-        }
-    }
+    let lines_at = corners.lines_at();
     let mut dropped = vec![false; corners.ends.len()];
     for (pair, _) in edges {
         let edge = LineSegment3::new(junctions[pair[0]], junctions[pair[1]]);
@@ -150,7 +144,7 @@ fn drawn_pairs(images: &Images, corners: &Corners) -> BTreeSet<[usize; 2]> {
 /// Pairs of junctions, ascending, that are few pixels from each other.
 fn near_junctions(corners: &Corners) -> impl Iterator<Item = [usize; 2]> {
     let junctions = &corners.junctions;
-    let reach = NEAR * upper_median(&mut corners.pixels.clone());
+    let reach = NEAR * corners.pixel();
     let is_near = move |[a, b]: &[usize; 2]| (junctions[*a] - junctions[*b]).norm() <= reach;
     (0..junctions.len())
         .flat_map(|a| (a + 1..junctions.len()).map(move |b| [a, b]))

@@ -1,14 +1,14 @@
 //! Depths of pockets that edgels propose: one that nothing has would lie, if it were of the floor, on
 //! the wall that stands on an edge of the rim, and along it. There its ray says how deep.
 
+use super::curves::BESIDE_IN_PIXELS;
 use super::edge_samples::Images;
+use super::view_segments::PreparedView;
 use crate::statistics::upper_median;
 use nalgebra::{Vector2, Vector3};
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 
-/// Smoothing leaves no two edges nearer to each other, in pixels: no floor is so near to its rim.
-pub(super) const APART: f64 = 3.0;
 /// Edgels are proposals for so many depths of a plane at most: those for which most of them speak.
 const MAX_DEPTHS: usize = 4;
 /// Nothing is larger than the largest image, in pixels.
@@ -72,15 +72,38 @@ impl Rim {
             count: (high - low).min(MAX_SPAN).ceil() as usize + 5,
         };
         let mut votes = vec![0.0; bins.count];
-        for edge in &self.edges {
-            self.vote(edge, images, free, &bins, &mut votes);
+        let mut shares = vec![0.0; self.edges.len() * bins.count];
+        for (view, free) in images.views.iter().zip(free) {
+            let walls: Vec<Wall> = (self.edges.iter())
+                .map(|edge| Wall::new(edge, &self.normal, view))
+                .collect();
+            shares.fill(0.0);
+            // All walls look at an edgel while it is at hand.
+            for edgel in free {
+                for (wall, shares) in walls.iter().zip(shares.chunks_exact_mut(bins.count)) {
+                    let Some(place) = wall.place_of(edgel) else {
+                        continue;
+                    };
+                    if let Some(bin) = bins.of(wall.depth(&place) / self.pixel) {
+                        shares[bin] += wall.pixels(&place).max(MIN_PIXELS).recip();
+                    }
+                }
+            }
+            for shares in shares.chunks_exact(bins.count) {
+                for k in 1..bins.count - 1 {
+                    let share: f64 = shares[k - 1..=k + 1].iter().sum();
+                    if share > MIN_SHARE {
+                        votes[k] += share.min(1.0);
+                    }
+                }
+            }
         }
         let usual = upper_median(&mut votes.clone());
         let is_peak = |k: &usize| {
             votes[*k] - usual >= MIN_VOTES
                 && votes[*k] >= votes[k - 1]
                 && votes[*k] > votes[k + 1]
-                && bins.depth(*k).abs() > APART
+                && bins.depth(*k).abs() > BESIDE_IN_PIXELS
         };
         let mut peaks: Vec<usize> = (1..bins.count - 1).filter(is_peak).collect();
         peaks.sort_by(|a, b| votes[*b].total_cmp(&votes[*a]));
@@ -88,52 +111,72 @@ impl Rim {
         let in_world = |peak| bins.depth(peak) * self.pixel;
         peaks.into_iter().map(in_world).collect()
     }
+}
 
-    /// What free edgels say for depths at which an edge of the plane would be once more: they lie on
-    /// the wall that stands on it, and along it.
-    fn vote(
-        &self,
-        edge: &LineSegment3,
-        images: &Images,
-        free: &[Vec<FreeEdgel>],
-        bins: &Bins,
-        votes: &mut [f64],
-    ) {
-        let normal = &self.normal;
+/// The wall that stands on an edge, as a view sees it.
+struct Wall<'a> {
+    view: &'a PreparedView,
+    edge: &'a LineSegment3,
+    normal: Vector3<f64>,
+    along: Vector3<f64>,
+    length: f64,
+    /// Unit normal of the wall, and how far the camera is from it.
+    across: Vector3<f64>,
+    distance: f64,
+    /// Normals of the planes of the camera's centre and what stands on the two ends: rays between
+    /// these are at different sides of both.
+    sides: [Vector3<f64>; 2],
+}
+
+/// Where an edgel would lie on a wall.
+struct OnWall {
+    place: Vector3<f64>,
+    /// Sine of the angle between the wall's edge and the ray.
+    sine: f64,
+}
+
+impl<'a> Wall<'a> {
+    fn new(edge: &'a LineSegment3, normal: &Vector3<f64>, view: &'a PreparedView) -> Self {
         let length = edge.length();
         let along = (edge.end - edge.start) / length;
         let across = normal.cross(&along);
-        let mut shares = vec![0.0; bins.count];
-        for (view, free) in images.views.iter().zip(free) {
-            let center = view.camera.center_in_world;
-            let to_wall = across.dot(&(edge.start - center));
-            shares.fill(0.0);
-            for FreeEdgel { ray, plane_normal } in free {
-                let off = plane_normal.dot(&along).abs();
-                if off > MAX_SINE {
-                    continue;
-                }
-                let on_wall = center + to_wall / across.dot(ray) * ray;
-                let from_start = on_wall - edge.start;
-                let is_beside = (0.0..=length).contains(&along.dot(&from_start));
-                let bin = bins.of(normal.dot(&from_start) / self.pixel);
-                let across_ray = (along - along.dot(ray) * ray).norm();
-                if let Some(bin) = bin
-                    && is_beside
-                    && (on_wall - center).dot(ray) > 0.0
-                    && off <= MAX_SINE * across_ray
-                {
-                    let pixels = length * across_ray / view.pixel_size_at(&on_wall);
-                    shares[bin] += pixels.max(MIN_PIXELS).recip();
-                }
-            }
-            for k in 1..bins.count - 1 {
-                let share: f64 = shares[k - 1..=k + 1].iter().sum();
-                if share > MIN_SHARE {
-                    votes[k] += share.min(1.0);
-                }
-            }
+        let center = view.camera.center_in_world;
+        Self {
+            view,
+            edge,
+            normal: *normal,
+            along,
+            length,
+            across,
+            distance: across.dot(&(edge.start - center)),
+            sides: edge.ends().map(|end| normal.cross(&(end - center))),
         }
+    }
+
+    /// Where an edgel lies that runs along the edge.
+    fn place_of(&self, edgel: &FreeEdgel) -> Option<OnWall> {
+        let FreeEdgel { ray, plane_normal } = edgel;
+        // Nearly all edgels end here.
+        let [start, end] = &self.sides;
+        if (start.dot(ray) > 0.0) == (end.dot(ray) > 0.0) {
+            return None;
+        }
+        let off = plane_normal.dot(&self.along).abs();
+        let sine = (self.along - self.along.dot(ray) * ray).norm();
+        let distance = self.distance / self.across.dot(ray);
+        (off <= MAX_SINE * sine && distance > 0.0).then(|| OnWall {
+            place: self.view.camera.center_in_world + distance * ray,
+            sine,
+        })
+    }
+
+    fn depth(&self, at: &OnWall) -> f64 {
+        self.normal.dot(&(at.place - self.edge.start))
+    }
+
+    /// The length of the edge as the view would see it there, in pixels.
+    fn pixels(&self, at: &OnWall) -> f64 {
+        self.length * at.sine / self.view.pixel_size_at(&at.place)
     }
 }
 

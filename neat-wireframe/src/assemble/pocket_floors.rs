@@ -8,9 +8,9 @@
 use super::circle_fitting::FoundArc;
 use super::claimed_edgels::claim_edgels;
 use super::corners::Corners;
+use super::curves::BESIDE_IN_PIXELS;
 use super::edge_samples::Images;
-use super::pocket_depths::{APART, Rim, free_edgels};
-use crate::statistics::upper_median;
+use super::pocket_depths::{Rim, free_edgels};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -46,7 +46,7 @@ pub(super) fn add_floors(
     taken: &mut [Vec<bool>],
     arcs: &[FoundArc],
 ) -> usize {
-    let pixel = upper_median(&mut corners.pixels.clone());
+    let pixel = corners.pixel();
     let mut of_any = taken.to_vec();
     for arc in arcs {
         images.claim_arc(arc, &mut of_any);
@@ -56,34 +56,22 @@ pub(super) fn add_floors(
     let weighed = |plane| {
         let sweep = Sweep {
             images,
-            corners,
-            taken: &of_any,
             plane,
             pixel,
         };
-        let depths = sweep.rim().depths(images, &free);
-        let best = depths.into_iter().filter_map(move |depth| {
-            let near = (-STEPS..=STEPS).map(|step| depth + 0.5 * f64::from(step) * pixel);
-            let floors = near.filter_map(|depth| Some((sweep.floor(depth)?.gain, depth)));
-            floors.max_by(|(a, _), (b, _)| a.total_cmp(b))
-        });
-        best.map(|(gain, depth)| (gain, depth, plane)).collect()
+        let depths = sweep.rim(corners).depths(images, &free);
+        let best =
+            (depths.into_iter()).filter_map(|depth| sweep.best_near(depth, corners, &of_any));
+        best.map(|(gain, depth)| (gain, depth, sweep)).collect()
     };
-    let weighed: Vec<Vec<(f64, f64, &Plane)>> = planes.par_iter().map(weighed).collect();
+    let weighed: Vec<Vec<(f64, f64, Sweep)>> = planes.par_iter().map(weighed).collect();
     let mut weighed = weighed.concat();
     weighed.sort_by(|(a, ..), (b, ..)| b.total_cmp(a));
     let before = corners.ends.len();
-    for (_, depth, plane) in weighed {
+    for (_, depth, sweep) in weighed {
         // What has been added may have its edgels and its corners.
-        let sweep = Sweep {
-            images,
-            corners,
-            taken: &of_any,
-            plane,
-            pixel,
-        };
-        if let Some(floor) = sweep.floor(depth) {
-            for line in add_floor(corners, &floor, depth * plane.normal, pixel) {
+        if let Some(floor) = sweep.floor(depth, corners, &of_any) {
+            for line in add_floor(corners, &floor, depth * sweep.plane.normal, pixel) {
                 claim_edgels(images, &line, taken);
                 claim_edgels(images, &line, &mut of_any);
             }
@@ -140,40 +128,33 @@ fn planes(corners: &Corners, pixel: f64) -> Vec<Plane> {
         })
         .collect();
     let mut planes: Vec<Plane> = Vec::new();
-    let mut at: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for (edge, ends) in corners.ends.iter().enumerate() {
-        for end in ends {
-            at.entry(*end).or_default().push(edge);
-        }
-    }
-    for (corner, edges_at) in &at {
-        let place = &junctions[*corner];
+    for (corner, lines) in corners.lines_at() {
+        let place = &junctions[corner];
         let is_in = |normal: &Vector3<f64>, junction: usize| {
             normal.dot(&(junctions[junction] - place)).abs() < IN_PLANE * pixel
         };
-        for (i, a) in edges_at.iter().enumerate() {
-            for b in &edges_at[..i] {
-                let across = along[*a].cross(&along[*b]);
-                if across.norm() < MIN_SINE_OF_PLANE {
-                    continue;
-                }
-                let normal = across.normalize();
-                let is_known = |plane: &Plane| {
-                    plane.normal.dot(&normal).abs() > SAME_NORMAL
-                        && plane.corners.first().is_some_and(|j| is_in(&normal, *j))
-                };
-                let stands = |edge: &Vector3<f64>| edge.dot(&normal).abs() > UPRIGHT;
-                if planes.iter().any(is_known) || !along.iter().any(stands) {
-                    continue;
-                }
-                let in_it = |edge: &usize| corners.ends[*edge].iter().all(|j| is_in(&normal, *j));
-                let edges: Vec<usize> = edges.clone().filter(in_it).collect();
-                planes.push(Plane {
-                    normal,
-                    corners: edges.iter().flat_map(|edge| corners.ends[*edge]).collect(),
-                    edges,
-                });
+        let pairs = (0..lines.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
+        for [a, b] in pairs.map(|pair| pair.map(|k| along[lines[k]])) {
+            let across = a.cross(&b);
+            if across.norm() < MIN_SINE_OF_PLANE {
+                continue;
             }
+            let normal = across.normalize();
+            let is_known = |plane: &Plane| {
+                plane.normal.dot(&normal).abs() > SAME_NORMAL
+                    && plane.corners.first().is_some_and(|j| is_in(&normal, *j))
+            };
+            let stands = |edge: &Vector3<f64>| edge.dot(&normal).abs() > UPRIGHT;
+            if planes.iter().any(is_known) || !along.iter().any(stands) {
+                continue;
+            }
+            let in_it = |edge: &usize| corners.ends[*edge].iter().all(|j| is_in(&normal, *j));
+            let edges: Vec<usize> = edges.clone().filter(in_it).collect();
+            planes.push(Plane {
+                normal,
+                corners: edges.iter().flat_map(|edge| corners.ends[*edge]).collect(),
+                edges,
+            });
         }
     }
     planes
@@ -196,48 +177,52 @@ struct Floor {
 }
 
 /// The edges of a plane, to be moved along its normal.
+#[derive(Clone, Copy)]
 struct Sweep<'a> {
     images: &'a Images<'a>,
-    corners: &'a Corners,
-    /// The edgels that lines and arcs have.
-    taken: &'a [Vec<bool>],
     plane: &'a Plane,
     pixel: f64,
 }
 
 impl Sweep<'_> {
     /// Pockets are no deeper than what the junctions span.
-    fn rim(&self) -> Rim {
-        let Plane {
-            normal,
-            edges,
-            corners,
-        } = self.plane;
-        let junctions = &self.corners.junctions;
+    fn rim(&self, corners: &Corners) -> Rim {
+        let Plane { normal, edges, .. } = self.plane;
+        let junctions = &corners.junctions;
         let depth = |junction: &Vector3<f64>| {
-            let corner = corners.first().map_or(junction, |first| &junctions[*first]);
+            let first = self.plane.corners.first();
+            let corner = first.map_or(junction, |first| &junctions[*first]);
             normal.dot(&(junction - corner)) / self.pixel
         };
         let depths = junctions.iter().map(depth);
         Rim {
-            edges: edges.iter().map(|edge| self.corners.edge(*edge)).collect(),
+            edges: edges.iter().map(|edge| corners.edge(*edge)).collect(),
             normal: *normal,
             span: depths.fold([0.0; 2], |[low, high], d| [low.min(d), high.max(d)]),
             pixel: self.pixel,
         }
     }
 
+    /// Of the depths around a proposal that are floors, what the images say for the best one, and it.
+    fn best_near(&self, depth: f64, corners: &Corners, taken: &[Vec<bool>]) -> Option<(f64, f64)> {
+        (-STEPS..=STEPS)
+            .map(|step| depth + 0.5 * f64::from(step) * self.pixel)
+            .filter_map(|depth| Some((self.floor(depth, corners, taken)?.gain, depth)))
+            .max_by(|(a, _), (b, _)| a.total_cmp(b))
+    }
+
     /// What the images show at a depth, if it is a floor: joined to what is known by edges on the
-    /// corners of the rim, or by ends at known junctions, and without ends of its own.
-    fn floor(&self, depth: f64) -> Option<Floor> {
-        let corners = self.corners;
+    /// corners of the rim, or by ends at known junctions, and without ends of its own. Edgels that
+    /// lines and arcs have are `taken`.
+    fn floor(&self, depth: f64, corners: &Corners, taken: &[Vec<bool>]) -> Option<Floor> {
         let shift = depth * self.plane.normal;
         let known = corners.junctions.len();
         // A junction as near to a corner of the floor as no two edges are is that corner.
         let over: BTreeMap<usize, usize> = (self.plane.corners.iter())
             .map(|corner| {
                 let place = corners.junctions[*corner] + shift;
-                let is_there = |j: &Vector3<f64>| (j - place).norm() < APART * self.pixel;
+                let is_there =
+                    |j: &Vector3<f64>| (j - place).norm() < BESIDE_IN_PIXELS * self.pixel;
                 let there = corners.junctions.iter().position(is_there);
                 (*corner, there.unwrap_or(known + corner))
             })
@@ -248,10 +233,8 @@ impl Sweep<'_> {
             if a == b || corners.pairs().any(|edge| edge == pair) {
                 return None;
             }
-            let taken = Some(self.taken);
-            let evidence = self
-                .images
-                .evidence_of(&line, |_| Some(line), taken, OF_EDGE, 0);
+            let images = self.images;
+            let evidence = images.evidence_of(&line, |_| Some(line), Some(taken), OF_EDGE, 0);
             let gain = evidence.gain - OF_EDGE;
             (gain > 0.0).then_some(Piece {
                 ends,

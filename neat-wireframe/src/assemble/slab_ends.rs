@@ -7,7 +7,6 @@ use super::edge_completion::supported;
 use super::edge_samples::Images;
 use super::line_selection::ChosenLine;
 use super::profiles::{Asked, Photographs, Response, light_across};
-use crate::statistics::upper_median;
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
@@ -80,7 +79,7 @@ pub(super) fn close_by_light(
         piece: LineSegment3::new(corners.junctions[*a], corners.junctions[*b]),
         views: (views_of[*a].intersection(&views_of[*b]).copied()).collect(),
     };
-    let pixel = upper_median(&mut corners.pixels.clone());
+    let pixel = corners.pixel();
     let ends = slab_ends(corners);
     let mut pairs = without_chords(&corners.junctions, ends.keys().copied().collect());
     pairs.retain(|pair| asked(pair).piece.length() <= MAX_WIDTH * pixel);
