@@ -132,15 +132,16 @@ const MIN_VIEWS: usize = 2;
 
 /// Shares of the time after which lines are proposed, the sure ones known, all selected and arcs
 /// followed: about those of a house.
-const PROPOSED: f64 = 0.03;
-const SURE: f64 = 0.12;
-const SELECTED: f64 = 0.4;
-const FOLLOWED: f64 = 0.5;
+const PROPOSED: f64 = 0.01;
+const SURE: f64 = 0.08;
+const SELECTED: f64 = 0.37;
+const FOLLOWED: f64 = 0.45;
 /// Likewise, of the time for the graph, after which lines are cut where arcs begin, continued, and
-/// placed by profiles.
-const ENDED: f64 = 0.05;
-const CONTINUED: f64 = 0.13;
-const PLACED: f64 = 0.95;
+/// placed by profiles, and floors of pockets are found.
+const ENDED: f64 = 0.01;
+const CONTINUED: f64 = 0.02;
+const PLACED: f64 = 0.43;
+const WITH_FLOORS: f64 = 0.91;
 
 /// What is known of a structure. All but the views may be missing.
 #[derive(Clone, Copy, Default)]
@@ -387,6 +388,7 @@ fn graph_of(
     end_on_arcs(&images, &mut corners, arcs);
     report.completed_edges = complete_edges(&images, &mut corners, taken, (least, known));
     report.completed_edges += add_floors(&images, &mut corners, taken, arcs);
+    progress(WITH_FLOORS)?;
     report.completed_edges += close_slabs(&images, &mut corners, taken, (least, known));
     if let Some(light) = photographs.zip(response) {
         report.completed_edges += close_by_light(&images, light, &lines, &mut corners);
