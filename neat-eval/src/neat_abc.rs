@@ -15,8 +15,8 @@ use crate::counts::WireframeCounts;
 use crate::table::Table;
 use neat_core::Wireframe3d;
 use neat_wireframe::metrics::{
-    Matching, MetricsError, NearPairs, PrecisionRecall, SegmentDistance, junction_distances,
-    precision_recall, segment_distances,
+    IdealBaseline, Matching, MetricsError, NearPairs, PrecisionRecall, SegmentDistance,
+    junction_distances, precision_recall, segment_distances,
 };
 use neat_wireframe::validity::check_wireframe;
 use serde::{Deserialize, Serialize};
@@ -51,6 +51,9 @@ pub struct NeatAbcScores {
     pub wireframe: GraphScores,
     /// The graph before the visibility check, where it was given.
     pub before_visibility: Option<GraphScores>,
+    /// What of the truth the 2D wireframes of its views would allow, where these were given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ideal_baseline: Option<IdealBaseline>,
 }
 
 /// Agreement of one graph with a true one, one entry per threshold.
@@ -77,9 +80,31 @@ impl NeatAbcScores {
             graph.table(format!("{name}: {counts}. Truth: {truth}; {matching}."))
         };
         let before = self.before_visibility.iter();
+        let ideal = self.ideal_baseline.iter();
         std::iter::once(table("Wireframe", &self.wireframe))
             .chain(before.map(|before| table("Before the visibility check", before)))
+            .chain(ideal.map(|ideal| self.ideal_table(ideal)))
             .collect()
+    }
+
+    /// The right half of Table 6.
+    fn ideal_table(&self, ideal: &IdealBaseline) -> Table {
+        let row = |name: &str, of: usize, found: usize| {
+            let rate = found as f64 / of as f64;
+            let rate = if of == 0 {
+                "-".into()
+            } else {
+                format!("{rate:.3}")
+            };
+            vec![name.to_owned(), of.to_string(), found.to_string(), rate]
+        };
+        let title = "Ideal baseline: what a 2D junction, or both ends of a 2D segment, shows within 5 px in any view.";
+        let mut table = Table::new(title, &["", "true", "shown", "rate"]);
+        table.rows = vec![
+            row("junctions", self.truth.junctions, ideal.junctions),
+            row("segments", self.truth.segments, ideal.segments),
+        ];
+        table
     }
 }
 
@@ -144,6 +169,7 @@ impl NeatAbc {
             before_visibility: before_visibility
                 .map(|before| self.compare(before, truth))
                 .transpose()?,
+            ideal_baseline: None,
         })
     }
 

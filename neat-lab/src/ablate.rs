@@ -8,7 +8,7 @@ use crate::error::LabError;
 use nalgebra::Vector3;
 use neat_core::{Scene, Wireframe3d, file, with_causes};
 use neat_eval::image_quality::psnr;
-use neat_eval::{GraphScores, NeatAbc, NeatSurface, ScannedSurface};
+use neat_eval::{NeatAbc, NeatSurface, ScannedSurface, SceneTruth, SurfaceAndCreases};
 use neat_field::region_pixels::RegionPixels;
 use neat_pipeline::config::{Choice, Config, FieldUse, apply_overrides};
 use neat_pipeline::distill::distill;
@@ -21,7 +21,6 @@ use neat_pipeline::run_dir::Existing;
 use neat_pipeline::scene::spread_views;
 use neat_train::TrainedField;
 use neat_wireframe::export::write_json;
-use neat_wireframe::metrics::PrecisionRecall;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use table::{Note, Row};
@@ -39,9 +38,56 @@ pub struct Truth {
     pub wireframe: Option<Wireframe3d>,
     /// Points of the true surface, in the same frame.
     pub surface: Option<Vec<Vector3<f64>>>,
+    /// Exact surface and creases of a rendered scene, in the same frame.
+    pub rendered: Option<SceneTruth>,
     /// Distance within which junctions and segments count as found, in the unit of
-    /// the user's files.
+    /// the user's files; for a rendered scene in metres times its scale.
     pub threshold: f64,
+}
+
+impl Truth {
+    /// A row with the scores of `wireframe`, and nothing else.
+    fn scores(&self, wireframe: &Wireframe3d) -> Result<Row, LabError> {
+        let mut row = Row::default();
+        if let Some(rendered) = &self.rendered {
+            let protocol = SurfaceAndCreases {
+                thresholds: vec![self.threshold],
+                ..SurfaceAndCreases::default()
+            };
+            let scores = protocol.evaluate(wireframe, rendered)?;
+            let shares = scores.thresholds.first();
+            row.junction_precision = shares.and_then(|shares| shares.junction_precision);
+            row.junction_recall = shares.and_then(|shares| shares.junction_recall);
+            row.segment_precision = shares.and_then(|shares| shares.length_on_crease);
+            row.segment_recall = shares.and_then(|shares| shares.completeness);
+            row.junction_accuracy = scores.junction_accuracy.map(|distance| distance.mean);
+            row.segment_accuracy = scores.segment_accuracy.map(|distance| distance.mean);
+        }
+        if let Some(truth) = &self.wireframe {
+            let protocol = NeatAbc {
+                thresholds: vec![self.threshold],
+                ..NeatAbc::default()
+            };
+            let scores = protocol.evaluate(wireframe, None, truth)?.wireframe;
+            let junctions = scores.junctions.first();
+            let segments = scores.segments_max.first();
+            row.junction_precision = junctions.map(|scores| scores.precision);
+            row.junction_recall = junctions.map(|scores| scores.recall);
+            row.segment_precision = segments.map(|scores| scores.precision);
+            row.segment_recall = segments.map(|scores| scores.recall);
+        }
+        if let Some(points) = &self.surface {
+            let surface = ScannedSurface {
+                points: points.clone(),
+                mask: None,
+                ground_plane: None,
+            };
+            let scores = NeatSurface::blended_mvs().evaluate(wireframe, &surface)?;
+            row.junction_accuracy = scores.junction_accuracy;
+            row.segment_accuracy = scores.segment_accuracy;
+        }
+        Ok(row)
+    }
 }
 
 /// Runs every variant, each in a folder of its own in `options.out`, and returns
@@ -228,29 +274,6 @@ fn row(
     truth: &Truth,
     distillation_seconds: f64,
 ) -> Result<Row, LabError> {
-    let protocol = NeatAbc {
-        thresholds: vec![truth.threshold],
-        ..NeatAbc::default()
-    };
-    let scores = (truth.wireframe.as_ref())
-        .map(|truth| protocol.evaluate(wireframe, None, truth))
-        .transpose()?;
-    let first = |of: fn(&GraphScores) -> &Vec<PrecisionRecall>| {
-        let scores = scores.as_ref()?;
-        of(&scores.wireframe).first().copied()
-    };
-    let junctions = first(|graph| &graph.junctions);
-    let segments = first(|graph| &graph.segments_max);
-    let surface = (truth.surface.as_ref())
-        .map(|points| {
-            let surface = ScannedSurface {
-                points: points.clone(),
-                mask: None,
-                ground_plane: None,
-            };
-            NeatSurface::blended_mvs().evaluate(wireframe, &surface)
-        })
-        .transpose()?;
     Ok(Row {
         training_seconds: (variant.trains)
             .then(|| run.manifest.seconds.get(&Stage::Train).copied())
@@ -258,19 +281,13 @@ fn row(
         distillation_seconds: Some(distillation_seconds),
         junctions: Some(wireframe.junctions.len()),
         segments: Some(wireframe.edges.len()),
-        junction_precision: junctions.map(|scores| scores.precision),
-        junction_recall: junctions.map(|scores| scores.recall),
-        segment_precision: segments.map(|scores| scores.precision),
-        segment_recall: segments.map(|scores| scores.recall),
-        junction_accuracy: surface.and_then(|scores| scores.junction_accuracy),
-        segment_accuracy: surface.and_then(|scores| scores.segment_accuracy),
         psnr: (run.field.as_ref())
             .filter(|_| variant.trains)
             .and_then(|field| mean_psnr(&run.scene, field)),
         mask_ratio: (variant.trains)
             .then(|| masked_out(&run.scene, config))
             .flatten(),
-        ..Row::default()
+        ..truth.scores(wireframe)?
     })
 }
 
@@ -305,7 +322,48 @@ fn masked_out(scene: &Scene, config: &Config) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use neat_eval::TriangleMesh;
     use neat_pipeline::config::{BackEnd, Preset};
+
+    /// Of a square, one side, and one that hovers 0.3 above another.
+    #[test]
+    fn a_rendered_scene_is_scored_by_the_length_of_its_creases() {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let corners = corners.map(|[x, y]| Vector3::new(x, y, 0.0)).to_vec();
+        let truth = Truth {
+            rendered: Some(SceneTruth {
+                wireframe: Wireframe3d {
+                    junctions: corners.clone(),
+                    edges: vec![[0, 1], [1, 2], [2, 3], [3, 0]],
+                },
+                surface: TriangleMesh {
+                    vertices: corners.clone(),
+                    triangles: vec![[0, 1, 2], [0, 2, 3]],
+                },
+                ..SceneTruth::default()
+            }),
+            threshold: 0.05,
+            ..Truth::default()
+        };
+        let lifted = |corner: usize| corners[corner] + Vector3::new(0.0, 0.0, 0.3);
+        let found = Wireframe3d {
+            junctions: vec![corners[0], corners[1], lifted(2), lifted(3)],
+            edges: vec![[0, 1], [2, 3]],
+        };
+        let row = truth.scores(&found).unwrap();
+        let shares = [
+            (row.junction_precision, 0.5),
+            (row.junction_recall, 0.5),
+            (row.segment_precision, 0.5),
+            (row.segment_recall, 0.25),
+            (row.junction_accuracy, 0.15),
+            (row.segment_accuracy, 0.15),
+        ];
+        for (found, expected) in shares {
+            // Lengths are sampled: a corner belongs to the sides on both its sides.
+            assert!((found.unwrap() - expected).abs() < 0.02, "{row:?}");
+        }
+    }
 
     #[test]
     fn variants_that_change_nothing_are_known() {

@@ -9,6 +9,7 @@ use crate::{interrupt, output};
 use clap::Args;
 use neat_core::ground_truth::read_wireframe;
 use neat_core::ply::read_points;
+use neat_eval::SceneTruth;
 use neat_lab::ablate::table::to_markdown;
 use neat_lab::ablate::{Truth, ablate};
 use neat_pipeline::event::Event;
@@ -21,8 +22,8 @@ use std::path::PathBuf;
 /// Reconstructs the scene as configured and then once for every variant of tables 2, 3 and 4
 /// of the paper, without either kind of supervision, and with each step of the back end
 /// switched off. OUT then holds a folder for every variant, and ablation.md and ablation.csv
-/// with times, counts, precision and recall (with --gt), distances from a surface (with
-/// --points), PSNR and the share of pixels that were not used.
+/// with times, counts, precision and recall (with --gt or --truth), distances from a surface
+/// (with --points or --truth), PSNR and the share of pixels that were not used.
 ///
 /// After Ctrl-C the same command continues: finished variants are not trained again. A variant
 /// that changes nothing in the configuration takes over the numbers of the first row, and one that
@@ -31,6 +32,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   neat ablate SCENE --out ABLATION --gt SCENE/gt_wireframe.json
+  neat ablate SCENE --out ABLATION --truth SCENE --threshold 0.05
   neat ablate SCENE --out ABLATION --points scan.ply --preset paper-dtu --time-budget 2h")]
 pub struct AblateArgs {
     /// Folder of the scene
@@ -46,7 +48,11 @@ pub struct AblateArgs {
     /// Points on the true surface as PLY, for ACC-J and ACC-L
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
-    /// Distance within which junctions and segments count as found
+    /// Rendered scene with its folder `truth`, for precision and recall by the length of
+    /// creases, and for ACC-J and ACC-L
+    #[arg(long, value_name = "SCENE", conflicts_with_all = ["gt", "points"])]
+    truth: Option<PathBuf>,
+    /// Distance within which junctions and segments count as found; of --truth times its scale
     #[arg(long, value_name = "D", value_parser = positive, default_value_t = 0.01)]
     threshold: f64,
     #[command(flatten)]
@@ -67,6 +73,7 @@ impl AblateArgs {
         let truth = Truth {
             wireframe: self.gt.as_deref().map(read_wireframe).transpose()?,
             surface: self.points.as_deref().map(read_points).transpose()?,
+            rendered: self.truth.as_deref().map(SceneTruth::read).transpose()?,
             threshold: self.threshold,
         };
         let config = self.method.config()?;

@@ -7,7 +7,7 @@ use crate::output;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use neat_core::ply::read_points;
-use neat_core::{LoadOptions, SceneError, View, file, load_scene};
+use neat_core::{LoadOptions, SceneError, Similarity, View, Wireframe3d, file, load_scene};
 use neat_eval::{
     EvalError, EvaluationInput, EvaluationOptions, EvaluationReport, FoundFace, GroundPlane,
     NeatAbc, ObservationMask, Protocol, ScannedSurface, SceneTruth, Scores, TrueFace, TruthKind,
@@ -19,7 +19,7 @@ use neat_pipeline::scene::{load_options, prepare_scene};
 use neat_wireframe::ViewObservation;
 use neat_wireframe::metrics::Matching;
 use neat_wireframe::metrics::{
-    SupportedTruthConfig, required_views, supported_truth, without_curves,
+    SupportedTruthConfig, ideal_baseline, required_views, supported_truth, without_curves,
 };
 use std::path::{Path, PathBuf};
 
@@ -135,6 +135,22 @@ fn protocol_parser() -> impl TypedValueParser<Value = Protocol> {
     PossibleValuesParser::new(values).try_map(|name| name.parse::<Protocol>())
 }
 
+/// What the 2D wireframes of a scene say.
+struct SceneViews<'a> {
+    path: &'a Path,
+    /// In the frame of the prepared scene.
+    observed: Vec<ViewObservation>,
+    original_from_world: Similarity,
+}
+
+impl SceneViews<'_> {
+    /// A truth in the frame of the views.
+    fn truth_in_world(&self, truth: &Wireframe3d) -> Wireframe3d {
+        let world_from_original = self.original_from_world.inverse();
+        truth.map(|point| world_from_original.apply(point))
+    }
+}
+
 impl EvalArgs {
     pub fn run(self) -> Result<(), CliError> {
         let protocols = self.protocols();
@@ -145,7 +161,14 @@ impl EvalArgs {
             .map(|protocol| Ok(EvaluationReport::new(protocol.evaluate(&inputs, &options)?)))
             .collect::<Result<Vec<_>, EvalError>>()?;
         if let Some(scene) = &self.scene {
-            reports.push(self.supported_report(scene, &inputs)?);
+            let views = self.read_views(scene)?;
+            let truth = views.truth_in_world(&inputs.truth.wireframe);
+            for report in &mut reports {
+                if let Scores::NeatAbc(scores) = &mut report.scores {
+                    scores.ideal_baseline = Some(ideal_baseline(&truth, &views.observed));
+                }
+            }
+            reports.push(self.supported_report(&views, &truth, &inputs)?);
         }
         let json = || {
             let texts: Vec<String> = reports.iter().map(EvaluationReport::to_json).collect();
@@ -320,12 +343,8 @@ impl EvalArgs {
         }
     }
 
-    /// neat-abc against the part of the truth that the 2D wireframes of a scene support.
-    fn supported_report(
-        &self,
-        scene: &Path,
-        inputs: &EvaluationInput,
-    ) -> Result<EvaluationReport, CliError> {
+    /// The 2D wireframes of a scene, as `--scene` asks for them.
+    fn read_views<'a>(&self, path: &'a Path) -> Result<SceneViews<'a>, CliError> {
         let config = Preset::default().config();
         let cache = self.cache.open();
         let resources = Resources {
@@ -333,18 +352,27 @@ impl EvalArgs {
             memory_limit: default_limit(),
             ..Resources::default()
         };
-        let prepared = prepare_scene(scene, &config, None, resources, &mut |_| ())?;
-        let views = ViewObservation::from_scene(&prepared.scene, config.data.min_segment_score);
-        let required = required_views(views.len());
-        let world_from_original = prepared.scene.original_from_world.inverse();
+        let prepared = prepare_scene(path, &config, None, resources, &mut |_| ())?;
+        Ok(SceneViews {
+            path,
+            observed: ViewObservation::from_scene(&prepared.scene, config.data.min_segment_score),
+            original_from_world: prepared.scene.original_from_world,
+        })
+    }
+
+    /// neat-abc against the part of the truth, here in the frame of the views, that these
+    /// support.
+    fn supported_report(
+        &self,
+        views: &SceneViews<'_>,
+        truth_in_world: &Wireframe3d,
+        inputs: &EvaluationInput,
+    ) -> Result<EvaluationReport, CliError> {
+        let required = required_views(views.observed.len());
+        let config = SupportedTruthConfig::default();
+        let supported = supported_truth(truth_in_world, &views.observed, required, &config)
+            .map(|point| views.original_from_world.apply(point));
         let truth = &inputs.truth.wireframe;
-        let supported = supported_truth(
-            &truth.map(|point| world_from_original.apply(point)),
-            &views,
-            required,
-            &SupportedTruthConfig::default(),
-        )
-        .map(|point| prepared.scene.original_from_world.apply(point));
         let published = NeatAbc::default();
         let neat = NeatAbc {
             thresholds: self.thresholds.clone().unwrap_or(published.thresholds),
@@ -361,7 +389,7 @@ impl EvalArgs {
         Ok(EvaluationReport {
             source: format!(
                 "against what at least {required} views of {} support; left out as pieces of curved rims: {} junctions, {} segments",
-                scene.display(),
+                views.path.display(),
                 straight.junctions_on_curves,
                 straight.edges_on_curves
             ),

@@ -24,9 +24,10 @@ pub struct Row {
     pub junction_precision: Option<f64>,
     /// Recall of the junctions.
     pub junction_recall: Option<f64>,
-    /// Precision of the segments, by the larger end distance.
+    /// Precision of the segments, by the larger end distance; of a rendered scene the
+    /// share of their length that lies on creases.
     pub segment_precision: Option<f64>,
-    /// Recall of the segments.
+    /// Recall of the segments; of a rendered scene the share of the creases' length.
     pub segment_recall: Option<f64>,
     /// Mean distance of the junctions from the surface, ACC-J.
     pub junction_accuracy: Option<f64>,

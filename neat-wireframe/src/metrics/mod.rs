@@ -3,6 +3,7 @@
 //! is no truth. The published protocols that these make up are in `neat-eval`.
 
 mod distance_matrix;
+mod ideal_baseline;
 mod image_evidence;
 mod near_pairs;
 mod precision_recall;
@@ -10,6 +11,7 @@ mod supported_truth;
 mod surface_distance;
 
 pub use distance_matrix::{DistanceMatrix, MatchedPair};
+pub use ideal_baseline::{IdealBaseline, ideal_baseline};
 pub(crate) use image_evidence::visible_projection;
 pub use image_evidence::{ImageEvidence, ImageEvidenceConfig, image_evidence};
 pub use near_pairs::NearPairs;
