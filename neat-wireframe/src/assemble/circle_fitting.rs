@@ -27,7 +27,7 @@ const MAX_SECTORS: f64 = 400.0;
 /// Rounds of growth: a sector is a circle of 240 after five, which leaves some to settle.
 const MAX_ROUNDS: usize = 12;
 /// Reaches of the fits of a round.
-const FITTING_REACHES: [f64; 2] = [1.5, 1.0];
+pub(super) const FITTING_REACHES: [f64; 2] = [1.5, 1.0];
 /// Fewer edgels determine no circle.
 const MIN_EDGELS: usize = 20;
 /// What keeps a parameter where no edgel tells of it.

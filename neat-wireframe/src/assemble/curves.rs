@@ -2,6 +2,7 @@
 
 use super::circle_fitting::FoundArc;
 use super::claimed_edgels::claim_edgels;
+use super::coaxial_rims::coaxial_rims;
 use super::config::AssembleConfig;
 use super::curve_pieces::curve_pieces;
 use super::edge_samples::Images;
@@ -13,6 +14,7 @@ use super::rounded_corners::rounded_corners;
 use super::small_circles::small_circles;
 use super::view_segments::PreparedView;
 use super::wander::retain_steady;
+use nalgebra::Vector3;
 use neat_core::{CircularArc, LineSegment3};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -69,9 +71,17 @@ pub(super) fn find_arcs(
     let mut arcs = chosen_arcs(images, grown, taken.clone(), config.min_evidence);
     let merged = images.merge_arcs(arcs.clone());
     if merged.len() < arcs.len() {
-        arcs = chosen_arcs(images, merged, taken, config.min_evidence);
+        arcs = chosen_arcs(images, merged, taken.clone(), config.min_evidence);
     }
     arcs.extend(circles);
+    for arc in &arcs {
+        images.claim_arc(arc, &mut taken);
+    }
+    let ends = selection.lines.iter().flat_map(|found| found.line.ends());
+    let places: Vec<Vector3<f64>> = ends
+        .chain(arcs.iter().map(|found| found.arc.center))
+        .collect();
+    arcs.extend(coaxial_rims(images, &arcs, &places, taken));
     retain_steady(images, &mut arcs);
     ControlFlow::Continue(arcs)
 }
@@ -170,7 +180,6 @@ mod tests {
     use super::*;
     use crate::assemble::circle_fitting::tests::found;
     use crate::assemble::test_views::{TestViews, cube_edge};
-    use nalgebra::Vector3;
 
     #[test]
     fn an_arc_that_no_pixel_tells_from_a_line_is_one() {

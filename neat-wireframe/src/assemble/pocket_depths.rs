@@ -1,58 +1,15 @@
 //! Depths of pockets that edgels propose: one that nothing has would lie, if it were of the floor, on
 //! the wall that stands on an edge of the rim, and along it. There its ray says how deep.
 
-use super::curves::BESIDE_IN_PIXELS;
+use super::depth_votes::{DepthVotes, FreeEdgel};
 use super::edge_samples::Images;
 use super::view_segments::PreparedView;
-use crate::statistics::upper_median;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 use neat_core::LineSegment3;
-use rayon::prelude::*;
 
-/// Edgels are proposals for so many depths of a plane at most: those for which most of them speak.
-const MAX_DEPTHS: usize = 4;
-/// Nothing is larger than the largest image, in pixels.
-const MAX_SPAN: f64 = 1e5;
-/// Whole projections of edges by which edgels of all views have to speak for a depth, beyond those
-/// that do for any.
-const MIN_VOTES: f64 = 1.5;
-/// A view shows parts of an edge at a depth from this share on.
-const MIN_SHARE: f64 = 0.4;
-/// Edges have more edgels than this, in pixels: one alone says nothing.
-const MIN_PIXELS: f64 = 6.0;
 /// Edgels of a floor lie at most at this angle to it in the image (sine, about 15°): those of short
 /// edges are less sure than those that a line takes.
 const MAX_SINE: f64 = 0.25;
-
-/// An edgel that nothing has.
-pub(super) struct FreeEdgel {
-    ray: Vector3<f64>,
-    /// Unit normal of the plane that its tangent and the camera's centre span.
-    plane_normal: Vector3<f64>,
-}
-
-/// Those of each view.
-pub(super) fn free_edgels(images: &Images, taken: &[Vec<bool>]) -> Vec<Vec<FreeEdgel>> {
-    let of_view = |view: usize| {
-        let (camera, map) = (&images.views[view].camera, &images.maps[view]);
-        let free = (0..map.len()).filter(|edgel| !taken[view][*edgel]);
-        let with_rays = free.filter_map(|edgel| {
-            let edgel = map.get(edgel);
-            let pixel: Vector2<f64> = edgel.position.cast();
-            let along = Vector2::new(-edgel.normal.y, edgel.normal.x).cast();
-            let [ray, beside] = [pixel, pixel + along].map(|p| camera.ray_through(&p).direction);
-            Some(FreeEdgel {
-                ray,
-                plane_normal: ray.cross(&beside).try_normalize(0.0)?,
-            })
-        });
-        with_rays.collect()
-    };
-    (0..images.views.len())
-        .into_par_iter()
-        .map(of_view)
-        .collect()
-}
 
 /// The edges of a plane, and how far from it a floor may be.
 pub(super) struct Rim {
@@ -66,50 +23,23 @@ pub(super) struct Rim {
 impl Rim {
     /// The depths for which most free edgels of all views speak.
     pub(super) fn depths(&self, images: &Images, free: &[Vec<FreeEdgel>]) -> Vec<f64> {
-        let [low, high] = self.span;
-        let bins = Bins {
-            first: low.floor() - 2.0,
-            count: (high - low).min(MAX_SPAN).ceil() as usize + 5,
-        };
-        let mut votes = vec![0.0; bins.count];
-        let mut shares = vec![0.0; self.edges.len() * bins.count];
+        let mut votes = DepthVotes::new(self.span, self.edges.len());
         for (view, free) in images.views.iter().zip(free) {
             let walls: Vec<Wall> = (self.edges.iter())
                 .map(|edge| Wall::new(edge, &self.normal, view))
                 .collect();
-            shares.fill(0.0);
             // All walls look at an edgel while it is at hand.
             for edgel in free {
-                for (wall, shares) in walls.iter().zip(shares.chunks_exact_mut(bins.count)) {
-                    let Some(place) = wall.place_of(edgel) else {
-                        continue;
-                    };
-                    if let Some(bin) = bins.of(wall.depth(&place) / self.pixel) {
-                        shares[bin] += wall.pixels(&place).max(MIN_PIXELS).recip();
+                for (edge, wall) in walls.iter().enumerate() {
+                    if let Some(place) = wall.place_of(edgel) {
+                        votes.add(edge, wall.depth(&place) / self.pixel, wall.pixels(&place));
                     }
                 }
             }
-            for shares in shares.chunks_exact(bins.count) {
-                for k in 1..bins.count - 1 {
-                    let share: f64 = shares[k - 1..=k + 1].iter().sum();
-                    if share > MIN_SHARE {
-                        votes[k] += share.min(1.0);
-                    }
-                }
-            }
+            votes.end_view();
         }
-        let usual = upper_median(&mut votes.clone());
-        let is_peak = |k: &usize| {
-            votes[*k] - usual >= MIN_VOTES
-                && votes[*k] >= votes[k - 1]
-                && votes[*k] > votes[k + 1]
-                && bins.depth(*k).abs() > BESIDE_IN_PIXELS
-        };
-        let mut peaks: Vec<usize> = (1..bins.count - 1).filter(is_peak).collect();
-        peaks.sort_by(|a, b| votes[*b].total_cmp(&votes[*a]));
-        peaks.truncate(MAX_DEPTHS);
-        let in_world = |peak| bins.depth(peak) * self.pixel;
-        peaks.into_iter().map(in_world).collect()
+        let in_world = |depth| depth * self.pixel;
+        votes.peaks().into_iter().map(in_world).collect()
     }
 }
 
@@ -177,26 +107,5 @@ impl<'a> Wall<'a> {
     /// The length of the edge as the view would see it there, in pixels.
     fn pixels(&self, at: &OnWall) -> f64 {
         self.length * at.sine / self.view.pixel_size_at(&at.place)
-    }
-}
-
-/// Depths by pixels.
-struct Bins {
-    /// The depth where the first one begins.
-    first: f64,
-    count: usize,
-}
-
-impl Bins {
-    fn of(&self, depth: f64) -> Option<usize> {
-        let bin = depth - self.first;
-        (0.0..self.count as f64)
-            .contains(&bin)
-            .then_some(bin as usize)
-    }
-
-    /// The middle of a bin.
-    fn depth(&self, bin: usize) -> f64 {
-        self.first + bin as f64 + 0.5
     }
 }
