@@ -20,6 +20,7 @@ import os
 import pathlib
 import sys
 
+from measure_objects import scenes_with_truth
 from measuring import call, reconstruct, settings
 
 PAPER_BACK_END = ["--set", "distill.back_end=paper"]
@@ -82,12 +83,8 @@ def ablations(options):
 
 def objects(options):
     """Precision, recall and the ideal baseline of every object (table 6)."""
-    scenes = sorted(path.parent for path in options.data.glob("*/gt_wireframe.json")
-                    if json.loads(path.read_text())["lines"])
-    if options.objects:
-        scenes = [scene for scene in scenes if scene.name in options.objects.split(",")]
     results = {}
-    for scene in scenes:
+    for scene in scenes_with_truth(options):
         run = options.out / "objects" / scene.name
         reconstruct(options.neat, scene, run, options.seed, "--no-doctor", "--preset",
                     options.preset, *PAPER_BACK_END, *settings(options.set))
