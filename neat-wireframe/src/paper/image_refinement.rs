@@ -1,33 +1,23 @@
-//! Junctions moved to where the 2D segments are that chose them, and told from places where
-//! segments were cut. Not in the paper.
+//! A graph of junctions and edges where the images have them, from what a field renders. Not
+//! in the paper.
 //!
-//! The field says which 2D segments of all views show one edge: those whose NEAT lines end
-//! at the same two junctions. No segment is matched to another. Where the edge lies, the
-//! segments then say better than the field: a segment is off by less than a pixel, a
+//! The field says which 2D segments of all views show one edge, and which of their ends one
+//! corner: those that it puts at one place. No segment is matched to another. Where that place
+//! is, the segments then say better than the field: a segment is off by less than a pixel, a
 //! rendered one by several.
 
-use super::attraction::attracted_ends;
-use super::corner_evidence::corner_evidence;
-use super::junction_merging::{AttractingJunction, EndKey, EndScatter, merged};
+use super::edge_candidates::{Candidate, Search, candidates, projected};
+use super::edge_choice::{edge_evidence, shown};
 use super::neat_lines::NeatLine;
-use crate::ViewObservation;
+use super::rendered_lines::{RenderedLine, rendered_lines};
+use super::settling::{Attracted, Ends, SettledJunction};
+use super::visibility::VisibilityConfig;
 use crate::bundle_adjustment::{EdgeObservation, Loss, ObservedEdge, bundle_adjust};
-use crate::observation::end_key;
-use crate::projection::project_in_front;
-use crate::statistics::upper_median;
-use nalgebra::{Vector2, Vector3};
-use neat_core::LineSegment2;
-use rayon::prelude::*;
+use crate::{ViewObservation, Wireframe3d};
+use nalgebra::Vector3;
+use neat_core::LineSegment3;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
 
-// Guesses: halved or doubled, each of these and of the settings changes the mean F of segments
-// on nine fields of seven objects by less than 0.01, that of junctions by 0.013 at most. That
-// was before corners were told from cuts, and copies from corners.
-
-/// Lines are asked for their junctions so often: moved and merged ones attract others. With
-/// two and four all is the same.
-const ROUNDS: usize = 3;
 /// What residuals of the fit count.
 const LOSS: Loss = Loss {
     // Detected lines lie nearer to their edge.
@@ -35,17 +25,25 @@ const LOSS: Loss = Loss {
     // Beside that of its line: ends scatter farther, along the line.
     end_weight: 0.3,
 };
+/// Edges are asked for so often: once junctions lie where they join the first ones, more 2D
+/// segments lie on them.
+const PASSES: usize = 3;
+/// A line may pass its junction farther in space than ends go in the image, as
+/// depth is what a field knows least.
+const LINE_REACH: f64 = 4.0 / 3.0;
+/// Five times what half of the 2D segments of an edge lie beside it: pixels. Where
+/// more is allowed, chance explains too much.
+const MAX_OFFSET: f64 = 2.5;
 
-/// How junctions are fitted to the images.
+/// How junctions and edges are fitted to the images.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ImageRefinementConfig {
     /// Whether they are. The published code has no such step. All NEAT lines take part
     /// then, supported or not, and all junctions, whatever votes they have.
     pub enabled: bool,
-    /// A 2D segment speaks for an edge if both ends lie nearer to the projected junctions
-    /// than this, in pixels: as far as a field may be off. Junctions nearer to each other than
-    /// this may be one corner.
+    /// A junction attracts the end of a 2D segment that is nearer to it than this, in pixels:
+    /// as far as a field may be off.
     pub max_end_distance: f64,
 }
 
@@ -53,213 +51,213 @@ impl Default for ImageRefinementConfig {
     fn default() -> Self {
         Self {
             enabled: false,
-            max_end_distance: 10.0,
+            max_end_distance: 6.0,
         }
     }
 }
 
-/// Moves and merges `junctions` until the edges between them lie on the 2D segments of the
-/// NEAT lines that they attract, and leaves out those between which segments are cut: with the
-/// number of 2D segments of each. Junctions that attract none are left out.
+/// What the images make of a field.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct ImageGraph {
+    /// All junctions that may have edges, and the edges.
+    pub(super) wireframe: Wireframe3d,
+    /// In how many views each junction explains an end.
+    pub(super) junction_views: Vec<usize>,
+    /// How many views show each edge.
+    pub(super) edge_views: Vec<usize>,
+    /// Places at which ends meet.
+    pub(super) settled: usize,
+    /// Pairs of junctions that were asked.
+    pub(super) candidates: usize,
+}
+
+/// The edges that the 2D segments of `lines_by_view` show, between `junctions` and those that
+/// their ends ask for besides, all moved to where the images have them.
 pub(super) fn refine_by_images(
     junctions: Vec<Vector3<f64>>,
     views: &[ViewObservation],
     lines_by_view: &[Vec<NeatLine>],
     config: &ImageRefinementConfig,
-) -> Vec<(Vector3<f64>, usize)> {
-    let round = |junctions: &[Vector3<f64>]| {
-        let attracted = attracted_segments(junctions, views, lines_by_view, config);
-        let edges = observed_edges(&attracted, views);
-        let junctions = bundle_adjust(&edges, junctions, LOSS).junctions;
-        let scatter = EndScatter {
-            scale: LOSS.cauchy_scale_in_pixels,
-            gate: config.max_end_distance,
-        };
-        merged(attracting(&junctions, &attracted, views), views, scatter)
-    };
-    let places = |refined: &[(Vector3<f64>, usize)]| -> Vec<Vector3<f64>> {
-        refined.iter().map(|(place, _)| *place).collect()
-    };
-    let mut refined: Vec<_> = junctions.into_iter().map(|place| (place, 0)).collect();
-    for _ in 0..ROUNDS {
-        refined = round(&places(&refined));
-    }
-    // What the others attracted goes to these, or nowhere.
-    round(&ends_of_edges(
-        &places(&refined),
+    visibility: &VisibilityConfig,
+) -> ImageGraph {
+    let lines = rendered_lines(views, lines_by_view);
+    let ends = Ends::new(&lines, views, config.max_end_distance);
+    let mut places = ends.settle(junctions);
+    places.extend(ends.unexplained(&places));
+    places = ends.settle(places);
+    let scene = FieldScene {
+        lines: &lines,
+        ends: &ends,
         views,
-        lines_by_view,
-        config,
-    ))
-}
-
-/// The junctions at which 2D segments end because a corner is there, and those that 2D segments
-/// join to one: an edge may end where nothing else does, or something hides it, but one between
-/// two places that are no corners is a piece of something longer.
-fn ends_of_edges(
-    junctions: &[Vector3<f64>],
-    views: &[ViewObservation],
-    lines_by_view: &[Vec<NeatLine>],
-    config: &ImageRefinementConfig,
-) -> Vec<Vector3<f64>> {
-    let attracted = attracted_segments(junctions, views, lines_by_view, config);
-    let is_corner = |junction: &AttractingJunction| {
-        let distance = |((view, _), end): (&EndKey, &Vector2<f64>)| {
-            let pixel = project_in_front(&views[*view].camera, &junction.place)?;
-            Some((pixel - end).norm())
-        };
-        let distances: Vec<f64> = junction.ends.iter().filter_map(distance).collect();
-        // Nearer ends than what the fit takes for noise tell no more of a corner: junctions
-        // that became one had each its own.
-        let scale = LOSS.cauchy_scale_in_pixels;
-        corner_evidence(&distances, config.max_end_distance, scale) > 0.0
+        visibility,
+        search: Search {
+            reach: LINE_REACH * config.max_end_distance,
+            max_squared_distance: visibility.max_squared_distance,
+            max_offset: MAX_OFFSET,
+        },
     };
-    let attracting = attracting(junctions, &attracted, views);
-    let is_corner: Vec<bool> = attracting.iter().map(is_corner).collect();
-    let mut kept = is_corner.clone();
-    for AttractedSegment { junctions, .. } in &attracted {
-        let [a, b] = *junctions;
-        kept[a] |= is_corner[b];
-        kept[b] |= is_corner[a];
+    let mut graph = ImageGraph::default();
+    for _ in 0..PASSES {
+        (places, graph) = scene.edges(places);
     }
-    let told = junctions.iter().zip(kept);
-    told.filter(|(_, kept)| *kept)
-        .map(|(place, _)| *place)
-        .collect()
+    graph.sorted()
 }
 
-/// The edges between junctions that 2D segments show from end to end, each once, sorted: what
-/// [`attract`](super::attract) makes of lines, without those that end elsewhere in the image.
-pub(super) fn attracted_edges(
-    junctions: &[Vector3<f64>],
-    views: &[ViewObservation],
-    lines_by_view: &[Vec<NeatLine>],
-    config: &ImageRefinementConfig,
-) -> Vec<[usize; 2]> {
-    let attracted = attracted_segments(junctions, views, lines_by_view, config);
-    let edges: BTreeSet<[usize; 2]> = attracted.iter().map(|segment| segment.junctions).collect();
-    edges.into_iter().collect()
-}
-
-/// A 2D segment whose NEAT line two junctions attract.
-struct AttractedSegment {
-    view: usize,
-    /// In ascending order.
-    junctions: [usize; 2],
-    /// From the first junction to the second.
-    detection: LineSegment2,
-}
-
-/// The 2D segments of all views whose lines are attracted, and that end near the junctions.
-fn attracted_segments(
-    junctions: &[Vector3<f64>],
-    views: &[ViewObservation],
-    lines_by_view: &[Vec<NeatLine>],
-    config: &ImageRefinementConfig,
-) -> Vec<AttractedSegment> {
-    let of_view = |(view, lines): (usize, &Vec<NeatLine>)| -> Vec<AttractedSegment> {
-        let attracted =
-            |line| attracted_segment(junctions, views, view, line, config.max_end_distance);
-        lines.iter().filter_map(attracted).collect()
-    };
-    let by_view: Vec<_> = (lines_by_view.par_iter().enumerate())
-        .map(of_view)
-        .collect();
-    by_view.into_iter().flatten().collect()
-}
-
-/// The 2D segment of a line that is attracted; `None` if it does not end where the junctions lie.
-fn attracted_segment(
-    junctions: &[Vector3<f64>],
-    views: &[ViewObservation],
-    view: usize,
-    line: &NeatLine,
-    max_end_distance: f64,
-) -> Option<AttractedSegment> {
-    let ViewObservation {
-        camera, segments, ..
-    } = &views[view];
-    let mut ends = attracted_ends(&line.segment, junctions)?;
-    let mut detection = segments[line.segment_in_view].segment;
-    if ends[0] > ends[1] {
-        ends.reverse();
-        detection = detection.reversed();
-    }
-    let near = |junction: usize, end: Vector2<f64>| {
-        let pixel = project_in_front(camera, &junctions[junction]);
-        pixel.is_some_and(|pixel| (pixel - end).norm() < max_end_distance)
-    };
-    let [start, end] = ends;
-    let is_near = start != end && near(start, detection.start) && near(end, detection.end);
-    is_near.then_some(AttractedSegment {
-        view,
-        junctions: ends,
-        detection,
-    })
-}
-
-/// The edges between junctions, each with the 2D segments that it attracts.
-fn observed_edges(attracted: &[AttractedSegment], views: &[ViewObservation]) -> Vec<ObservedEdge> {
-    let mut edges: BTreeMap<[usize; 2], Vec<EdgeObservation>> = BTreeMap::new();
-    for segment in attracted {
-        let observation = EdgeObservation {
-            camera: views[segment.view].camera,
-            detection: segment.detection,
-            ends: segment.detection.ends().map(Some),
-            weight: 1.0,
-        };
-        edges
-            .entry(segment.junctions)
-            .or_default()
-            .push(observation);
-    }
-    let observed = |(junctions, observations)| ObservedEdge {
-        junctions,
-        observations,
-    };
-    edges.into_iter().map(observed).collect()
-}
-
-/// All junctions with the ends of the 2D segments that they attract.
-fn attracting(
-    junctions: &[Vector3<f64>],
-    attracted: &[AttractedSegment],
-    views: &[ViewObservation],
-) -> Vec<AttractingJunction> {
-    let mut ends = vec![BTreeMap::new(); junctions.len()];
-    // Of each segment the length of a pixel at the junction.
-    let mut pixels = vec![Vec::new(); junctions.len()];
-    for segment in attracted {
-        let camera = &views[segment.view].camera;
-        for (junction, end) in segment.junctions.into_iter().zip(segment.detection.ends()) {
-            ends[junction].insert(end_key(segment.view, &end), end);
-            let depth = camera.project(&junctions[junction]).depth;
-            pixels[junction].push(depth / camera.intrinsics.fx);
+impl ImageGraph {
+    /// Junctions by x, y and z, and edges by their junctions, whatever found them first.
+    fn sorted(self) -> Self {
+        let places = self.wireframe.junctions;
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_by(|a, b| {
+            let by_axis = |axis: usize| places[*a][axis].total_cmp(&places[*b][axis]);
+            by_axis(0).then(by_axis(1)).then(by_axis(2))
+        });
+        let mut renamed = vec![0; places.len()];
+        for (new, old) in order.iter().enumerate() {
+            renamed[*old] = new;
+        }
+        let mut edges: Vec<([usize; 2], usize)> = (self.wireframe.edges.iter())
+            .zip(self.edge_views)
+            .map(|([a, b], views)| {
+                let [a, b] = [renamed[*a], renamed[*b]];
+                ([a.min(b), a.max(b)], views)
+            })
+            .collect();
+        edges.sort_unstable();
+        let (edges, edge_views) = edges.into_iter().unzip();
+        Self {
+            wireframe: Wireframe3d {
+                junctions: order.iter().map(|old| places[*old]).collect(),
+                edges,
+            },
+            junction_views: order.iter().map(|old| self.junction_views[*old]).collect(),
+            edge_views,
+            ..self
         }
     }
-    let attracting = |((place, ends), mut pixels): ((&Vector3<f64>, _), Vec<f64>)| {
-        let segments = pixels.len();
-        let pixel = match segments {
-            0 => 0.0,
-            _ => upper_median(&mut pixels),
+}
+
+/// What edges are asked of.
+struct FieldScene<'a> {
+    lines: &'a [RenderedLine],
+    ends: &'a Ends<'a>,
+    views: &'a [ViewObservation],
+    visibility: &'a VisibilityConfig,
+    search: Search,
+}
+
+impl FieldScene<'_> {
+    /// Where the junctions lie once the edges between them are fitted, and these edges.
+    fn edges(&self, mut places: Vec<Vector3<f64>>) -> (Vec<Vector3<f64>>, ImageGraph) {
+        let VisibilityConfig {
+            min_views,
+            min_segment_score,
+            ..
+        } = *self.visibility;
+        let settled = self.ends.settled(&places);
+        // What fewer views show than an edge is no end of one.
+        let is_shown = |junction: &SettledJunction| junction.views >= min_views;
+        let asked: Vec<usize> = (0..places.len())
+            .filter(|junction| is_shown(&settled[*junction]))
+            .collect();
+        let of_asked = |settled: &[SettledJunction]| -> Vec<SettledJunction> {
+            asked
+                .iter()
+                .map(|junction| settled[*junction].clone())
+                .collect()
         };
-        AttractingJunction {
-            place: *place,
-            ends,
-            segments,
-            pixel,
+        let candidates = candidates(self.lines, &of_asked(&settled), self.views, self.search);
+        let number = candidates.len();
+        let mut edges = shown(candidates, self.lines, min_views, min_segment_score);
+        let adjusted = self.adjusted(&edges, &places, &asked);
+        for (junction, place) in asked.iter().zip(adjusted) {
+            places[*junction] = place;
         }
-    };
-    (junctions.iter().zip(ends).zip(pixels))
-        .map(attracting)
-        .collect()
+        let junctions = of_asked(&self.ends.settled(&places));
+        edges.retain(|(edge, _)| {
+            let ends = edge.junctions.map(|junction| &junctions[junction]);
+            ends.into_iter().all(is_shown) && self.evidence(edge, ends) > 0.0
+        });
+        let graph = ImageGraph {
+            wireframe: Wireframe3d {
+                junctions: junctions.iter().map(|junction| junction.place).collect(),
+                edges: edges.iter().map(|(edge, _)| edge.junctions).collect(),
+            },
+            junction_views: junctions.iter().map(|junction| junction.views).collect(),
+            edge_views: edges.iter().map(|(_, views)| *views).collect(),
+            settled: places.len(),
+            candidates: number,
+        };
+        (places, graph)
+    }
+
+    /// Places of the junctions that were asked, with the edges between them on their 2D
+    /// segments.
+    fn adjusted(
+        &self,
+        edges: &[(Candidate, usize)],
+        places: &[Vector3<f64>],
+        asked: &[usize],
+    ) -> Vec<Vector3<f64>> {
+        let attracted = self.ends.attracted(places);
+        let starts: Vec<Vector3<f64>> = asked.iter().map(|junction| places[*junction]).collect();
+        let observed = |(edge, _): &(Candidate, usize)| {
+            let [a, b] = edge.junctions.map(|junction| starts[junction]);
+            let joined = edge.junctions.map(|junction| asked[junction]);
+            let observation = |index: usize| {
+                let line = &self.lines[index];
+                let projected = projected(&LineSegment3::new(a, b), &self.views[line.view])?;
+                let mut detection = line.detection;
+                let mut ends = [attracted[2 * index], attracted[2 * index + 1]];
+                let runs = detection.end - detection.start;
+                if runs.dot(&(projected.end - projected.start)) < 0.0 {
+                    detection = detection.reversed();
+                    ends.reverse();
+                }
+                let end = |side: usize| {
+                    let is_there = |attracted: Attracted| attracted.junction == joined[side];
+                    ends[side]
+                        .is_some_and(is_there)
+                        .then(|| detection.ends()[side])
+                };
+                Some(EdgeObservation {
+                    camera: self.views[line.view].camera,
+                    detection,
+                    ends: [end(0), end(1)],
+                    weight: 1.0,
+                })
+            };
+            let lines = edge.observations.iter().map(|observation| observation.line);
+            ObservedEdge {
+                junctions: edge.junctions,
+                observations: lines.filter_map(observation).collect(),
+            }
+        };
+        let observed: Vec<ObservedEdge> = edges.iter().map(observed).collect();
+        bundle_adjust(&observed, &starts, LOSS).junctions
+    }
+
+    /// What speaks for an edge: its line and, if none of its ends is a corner, that too.
+    fn evidence(&self, edge: &Candidate, [a, b]: [&SettledJunction; 2]) -> f64 {
+        let line = LineSegment3::new(a.place, b.place);
+        edge_evidence(
+            &line,
+            &edge.observations,
+            self.lines,
+            self.views,
+            MAX_OFFSET,
+        ) + a.corner_evidence.max(b.corner_evidence).min(0.0)
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::corner_evidence::corner_evidence;
     use super::*;
+    use crate::projection::project_in_front;
     use crate::test_scenes::{Noise, cameras_on_sphere, cube, views_of_edges};
-    use neat_core::{LineSegment3, ScoredSegment2};
+    use neat_core::{LineSegment2, ScoredSegment2};
+    use std::collections::BTreeSet;
 
     /// The views of a cube, and NEAT lines whose ends are off by up to `error`.
     fn field_of_cube(error: f64) -> (Vec<ViewObservation>, Vec<Vec<NeatLine>>) {
@@ -280,6 +278,39 @@ mod tests {
         (views, lines)
     }
 
+    fn refined(
+        junctions: Vec<Vector3<f64>>,
+        views: &[ViewObservation],
+        lines: &[Vec<NeatLine>],
+        min_views: usize,
+    ) -> ImageGraph {
+        let visibility = VisibilityConfig {
+            max_squared_distance: 25.0,
+            min_views,
+            ..Default::default()
+        };
+        let config = ImageRefinementConfig::default();
+        refine_by_images(junctions, views, lines, &config, &visibility)
+    }
+
+    /// The junctions that edges join.
+    fn used(graph: &ImageGraph) -> BTreeSet<usize> {
+        graph.wireframe.edges.iter().flatten().copied().collect()
+    }
+
+    fn assert_is_cube(graph: &ImageGraph) {
+        let (corners, edges) = cube();
+        assert_eq!(graph.wireframe.edges.len(), edges.len());
+        let used = used(graph);
+        assert_eq!(used.len(), corners.len());
+        for junction in used {
+            let place = graph.wireframe.junctions[junction];
+            let off = corners.iter().map(|corner| (place - corner).norm());
+            let off = off.fold(f64::INFINITY, f64::min);
+            assert!(off < 1e-3, "{off}");
+        }
+    }
+
     #[test]
     fn junctions_come_to_the_corners_that_the_images_show_and_copies_go() {
         let (views, lines) = field_of_cube(0.02);
@@ -290,16 +321,10 @@ mod tests {
         for _ in 0..3 {
             junctions.extend(corners.iter().map(|corner| corner + 0.01 * noise.vector()));
         }
-        let config = ImageRefinementConfig::default();
-        let refined = refine_by_images(junctions, &views, &lines, &config);
-        assert_eq!(refined.len(), corners.len());
-        // Three edges meet in each corner, and 12 views see them.
-        assert!(refined.iter().all(|(_, segments)| *segments == 36));
-        for corner in &corners {
-            let off = |(junction, _): &(Vector3<f64>, usize)| (junction - corner).norm();
-            let nearest = refined.iter().map(off).fold(f64::INFINITY, f64::min);
-            assert!(nearest < 1e-3, "{nearest}");
-        }
+        let graph = refined(junctions, &views, &lines, 2);
+        assert!(graph.junction_views.iter().all(|views| *views == 12));
+        assert!(graph.edge_views.iter().all(|views| *views == 12));
+        assert_is_cube(&graph);
     }
 
     /// Adds the 2D segment between two points to a view, and its line.
@@ -319,37 +344,34 @@ mod tests {
         });
     }
 
-    /// Adds the rim of a hole to the views of a cube: twelve chords, cut elsewhere in each.
+    /// Adds the rim of a hole to the views of a cube: eight chords, cut elsewhere in each.
     fn add_rim(views: &mut [ViewObservation], lines: &mut [Vec<NeatLine>]) {
         let mut noise = Noise(3);
         for (view, lines) in views.iter_mut().zip(lines) {
             let turn = noise.uniform();
-            for chord in 0..12 {
-                add(view, lines, [chord, chord + 1].map(|cut| on_rim(cut, turn)));
+            let cuts: Vec<_> = (0..8)
+                .map(|cut| on_rim(cut, turn + 0.2 * noise.uniform()))
+                .collect();
+            for cut in 0..8 {
+                add(view, lines, [cuts[cut], cuts[(cut + 1) % 8]]);
             }
         }
     }
 
-    /// One of twelve places on the rim, all of which are moved along by `turn` of a radian.
+    /// One of eight places on the rim, all of which are moved along by `turn` of a radian.
     fn on_rim(place: usize, turn: f64) -> Vector3<f64> {
-        let (sin, cos) = (place as f64 * std::f64::consts::TAU / 12.0 + turn).sin_cos();
-        Vector3::new(0.25 * cos, 0.25 * sin, 0.5)
+        let (sin, cos) = (place as f64 * std::f64::consts::TAU / 8.0 + turn).sin_cos();
+        Vector3::new(0.45 * cos, 0.45 * sin, 0.5)
     }
 
     #[test]
-    fn cuts_of_a_rim_are_no_corners() {
+    fn chords_of_a_rim_are_no_edges() {
         let (mut views, mut lines) = field_of_cube(0.01);
         add_rim(&mut views, &mut lines);
         let (corners, _) = cube();
         let mut junctions = corners.clone();
-        junctions.extend((0..12).map(|place| on_rim(place, 0.0)));
-        let config = ImageRefinementConfig::default();
-        let refined = refine_by_images(junctions, &views, &lines, &config);
-        assert_eq!(refined.len(), corners.len());
-        for (junction, _) in &refined {
-            let off = corners.iter().map(|corner| (junction - corner).norm());
-            assert!(off.fold(f64::INFINITY, f64::min) < 1e-3);
-        }
+        junctions.extend((0..8).map(|place| on_rim(place, 0.0)));
+        assert_is_cube(&refined(junctions, &views, &lines, 3));
     }
 
     #[test]
@@ -364,23 +386,44 @@ mod tests {
             far_ends.push(view.camera.project(&cut).pixel - view.camera.project(&end).pixel);
             add(view, lines, [corner, cut]);
         }
-        let config = ImageRefinementConfig::default();
         let distances: Vec<f64> = far_ends.iter().map(|end| end.norm()).collect();
-        assert!(corner_evidence(&distances, config.max_end_distance, 1.0) < 0.0);
+        assert!(corner_evidence(&distances, 6.0, 0.5) < 0.0);
         junctions.push(end);
-        let refined = refine_by_images(junctions, &views, &lines, &config);
-        assert_eq!(refined.len(), 9);
+        let graph = refined(junctions, &views, &lines, 2);
+        assert_eq!(graph.wireframe.edges.len(), 13);
     }
 
     #[test]
-    fn segments_far_from_the_junctions_say_nothing() {
-        let (views, lines) = field_of_cube(0.0);
+    fn ends_propose_junctions_that_the_field_has_not_perceived() {
+        let (views, lines) = field_of_cube(0.005);
         let (corners, _) = cube();
-        let shifted: Vec<_> = (corners.iter())
-            .map(|corner| corner + Vector3::new(0.0, 0.0, 0.2))
-            .collect();
-        let config = ImageRefinementConfig::default();
-        assert!(refine_by_images(shifted, &views, &lines, &config).is_empty());
-        assert!(refine_by_images(corners, &[], &[], &config).is_empty());
+        assert_is_cube(&refined(corners[..3].to_vec(), &views, &lines, 2));
+        assert_is_cube(&refined(Vec::new(), &views, &lines, 2));
+    }
+
+    #[test]
+    fn an_edge_that_is_cut_in_half_of_the_views_is_one() {
+        let (mut views, mut lines) = field_of_cube(0.005);
+        let mut noise = Noise(8);
+        for (view, lines) in views.iter_mut().zip(&mut lines).step_by(2) {
+            // The first edge becomes two segments, with a gap somewhere else in each.
+            let whole = lines[0].segment;
+            let cut = 0.5 + 0.25 * noise.uniform();
+            lines.remove(0);
+            view.segments[0].score = 0.0;
+            for [from, to] in [[0.0, cut - 0.03], [cut + 0.03, 1.0]] {
+                add(view, lines, [from, to].map(|at| whole.point_at(at)));
+            }
+        }
+        let (corners, _) = cube();
+        let graph = refined(corners, &views, &lines, 2);
+        assert_eq!(used(&graph).len(), 8);
+        assert_eq!(graph.wireframe.edges.len(), 12);
+    }
+
+    #[test]
+    fn nothing_becomes_nothing() {
+        let (corners, _) = cube();
+        assert_eq!(refined(corners, &[], &[], 2), ImageGraph::default());
     }
 }

@@ -3,12 +3,15 @@
 
 mod attraction;
 mod corner_evidence;
+mod edge_candidates;
+mod edge_choice;
 mod image_refinement;
 mod junction_merging;
 mod junction_refinement;
 mod junction_voting;
-mod line_visibility;
 mod neat_lines;
+mod rendered_lines;
+mod settling;
 mod visibility;
 
 pub use attraction::{AttractionConfig, attract, attracted_ends};
@@ -22,10 +25,8 @@ pub use visibility::{VisibilityConfig, seeing_views, squared_reprojection_distan
 
 use crate::used_junctions::UsedJunctions;
 use crate::{SignedDistance, ViewObservation, Wireframe3d};
-use image_refinement::{attracted_edges, refine_by_images};
-use line_visibility::views_that_show;
+use image_refinement::{ImageGraph, refine_by_images};
 use nalgebra::Vector3;
-use neat_core::LineSegment3;
 use neat_core::assignment::AssignmentError;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -181,92 +182,96 @@ impl PaperBackEndConfig {
             .zip(rays)
             .map(|(view, rays)| neat_lines(view, rays, &self.neat_lines))
             .collect();
-        let votes = vote_for_junctions(&refined, &lines_by_view, &self.junction_voting)?;
-        let kept = self.kept_junctions(&refined, &votes, views, &lines_by_view);
-        let (positions, junction_votes): (Vec<_>, Vec<_>) =
-            distinct_and_sorted(kept).into_iter().unzip();
-        let supported: Vec<_> = lines_by_view
-            .iter()
-            .flatten()
-            .filter(|line| self.image_refinement.enabled || line.is_supported(&self.neat_lines))
-            .map(|line| line.segment)
-            .collect();
-        let (attracted, seen) = self.attracted(positions, &supported, views, &lines_by_view);
-        let (edges, visible_views): (Vec<_>, Vec<_>) = attracted
-            .edges
-            .iter()
-            .zip(seen)
-            .filter(|(_, seen)| *seen >= self.visibility.min_views)
-            .unzip();
-        let counts = PaperBackEndCounts {
+        let from_lines = PaperBackEndCounts {
             rays: rays.iter().map(Vec::len).sum(),
             non_finite_rays: rays.iter().flatten().filter(|ray| !ray.is_finite()).count(),
             lines: lines_by_view.iter().map(Vec::len).sum(),
-            supported_lines: supported.len(),
             junctions: junctions.len(),
             refined_junctions: refined.len(),
-            voted_junctions: votes.len(),
-            kept_junctions: attracted.junctions.len(),
-            attracted_edges: attracted.edges.len(),
-            visible_edges: edges.len(),
+            ..PaperBackEndCounts::default()
         };
-        debug!(?counts, "paper back end");
-        let mut result = PaperWireframe {
-            wireframe: Wireframe3d {
-                junctions: attracted.junctions,
-                edges,
-            },
-            junction_votes,
-            visible_views,
-            counts,
+        let mut result = match self.image_refinement.enabled {
+            true => self.by_images(refined, views, &lines_by_view, from_lines),
+            false => self.by_votes(&refined, views, &lines_by_view, from_lines)?,
         };
+        debug!(counts = ?result.counts, "paper back end");
         if !self.keep_isolated_junctions {
             result.drop_isolated_junctions();
         }
         Ok(result)
     }
 
-    /// The edges between junctions, and in how many views each is seen.
-    fn attracted(
-        &self,
-        junctions: Vec<Vector3<f64>>,
-        supported: &[LineSegment3],
-        views: &[ViewObservation],
-        lines_by_view: &[Vec<NeatLine>],
-    ) -> (Wireframe3d, Vec<usize>) {
-        let by_images = &self.image_refinement;
-        let edges = if by_images.enabled {
-            attracted_edges(&junctions, views, lines_by_view, by_images)
-        } else {
-            attract(supported, &junctions, &self.attraction)
-        };
-        let attracted = Wireframe3d { junctions, edges };
-        let segments = attracted.segments();
-        let seen = if by_images.enabled {
-            views_that_show(&segments, views, lines_by_view, &self.visibility)
-        } else {
-            seeing_views(&segments, views, &self.visibility)
-        };
-        (attracted, seen)
-    }
-
-    /// The junctions that lines go to, each with its votes or 2D segments.
-    fn kept_junctions(
+    /// As published: junctions that have votes, and edges that supported lines turn into.
+    fn by_votes(
         &self,
         refined: &[Vector3<f64>],
-        votes: &[JunctionVotes],
         views: &[ViewObservation],
         lines_by_view: &[Vec<NeatLine>],
-    ) -> Vec<(Vector3<f64>, usize)> {
-        let by_images = &self.image_refinement;
-        if by_images.enabled {
-            return refine_by_images(refined.to_vec(), views, lines_by_view, by_images);
-        }
-        votes
-            .iter()
+        counts: PaperBackEndCounts,
+    ) -> Result<PaperWireframe, PaperBackEndError> {
+        let votes = vote_for_junctions(refined, lines_by_view, &self.junction_voting)?;
+        let kept = (votes.iter())
             .filter(|v| v.votes >= self.junction_voting.min_votes)
-            .map(|v| (refined[v.junction], v.votes))
-            .collect()
+            .map(|v| (refined[v.junction], v.votes));
+        let (junctions, junction_votes): (Vec<_>, Vec<_>) =
+            distinct_and_sorted(kept.collect()).into_iter().unzip();
+        let supported: Vec<_> = (lines_by_view.iter().flatten())
+            .filter(|line| line.is_supported(&self.neat_lines))
+            .map(|line| line.segment)
+            .collect();
+        let edges = attract(&supported, &junctions, &self.attraction);
+        let attracted = Wireframe3d { junctions, edges };
+        let seen = seeing_views(&attracted.segments(), views, &self.visibility);
+        let (edges, visible_views): (Vec<_>, Vec<_>) = (attracted.edges.iter().zip(seen))
+            .filter(|(_, seen)| *seen >= self.visibility.min_views)
+            .unzip();
+        Ok(PaperWireframe {
+            junction_votes,
+            visible_views,
+            counts: PaperBackEndCounts {
+                supported_lines: supported.len(),
+                voted_junctions: votes.len(),
+                kept_junctions: attracted.junctions.len(),
+                attracted_edges: attracted.edges.len(),
+                visible_edges: edges.len(),
+                ..counts
+            },
+            wireframe: Wireframe3d {
+                junctions: attracted.junctions,
+                edges,
+            },
+        })
+    }
+
+    /// By the ends and segments of the images. All lines count as supported.
+    fn by_images(
+        &self,
+        refined: Vec<Vector3<f64>>,
+        views: &[ViewObservation],
+        lines_by_view: &[Vec<NeatLine>],
+        counts: PaperBackEndCounts,
+    ) -> PaperWireframe {
+        let by_images = &self.image_refinement;
+        let ImageGraph {
+            wireframe,
+            junction_views,
+            edge_views,
+            settled,
+            candidates,
+        } = refine_by_images(refined, views, lines_by_view, by_images, &self.visibility);
+        PaperWireframe {
+            counts: PaperBackEndCounts {
+                supported_lines: counts.lines,
+                voted_junctions: settled,
+                kept_junctions: wireframe.junctions.len(),
+                attracted_edges: candidates,
+                visible_edges: wireframe.edges.len(),
+                ..counts
+            },
+            wireframe,
+            junction_votes: junction_views,
+            visible_views: edge_views,
+        }
     }
 }
 
