@@ -226,7 +226,7 @@ fn the_preset_neat_finds_the_edges_by_its_field() {
     };
     let preset = ["--preset", "neat"];
     scene
-        .run("reconstruct", "200")
+        .run("reconstruct", "400")
         .args(preset)
         .assert()
         .success();

@@ -59,10 +59,27 @@ fn only_trains(key: &str) -> bool {
 /// How the keys of settings begin that do nothing, and why.
 fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)> {
     let mut idle = match plan.back_end() {
-        BackEnd::Paper => vec![
-            ("distill.assembler.", PAPER_RUNS),
-            ("distill.partners", PAPER_RUNS),
-        ],
+        BackEnd::Paper => {
+            let mut idle = vec![
+                ("distill.assembler.", PAPER_RUNS),
+                ("distill.partners", PAPER_RUNS),
+            ];
+            match plan.config().distill.paper.image_refinement.enabled {
+                true => idle.extend([
+                    ("distill.paper.junction_voting.", IMAGES_ASKED),
+                    ("distill.paper.attraction.", IMAGES_ASKED),
+                    (
+                        "distill.paper.neat_lines.max_support_distance",
+                        IMAGES_ASKED,
+                    ),
+                ]),
+                false => idle.push((
+                    "distill.paper.image_refinement.max_end_distance",
+                    "distill.paper.image_refinement.enabled is off",
+                )),
+            }
+            idle
+        }
         BackEnd::Assembler if plan.config().distill.partners == Partners::Field => {
             let keys = [
                 "distill.paper.junction",
@@ -121,6 +138,8 @@ fn idle_settings(plan: &Plan, given: Given) -> Vec<(&'static str, &'static str)>
 
 pub(crate) const NO_FIELD: &str = "no field is trained: --train trains one";
 const PAPER_RUNS: &str = "the wireframe is assembled by the paper's back end";
+const IMAGES_ASKED: &str =
+    "distill.paper.image_refinement asks the images what junctions and edges are";
 const ASSEMBLER_RUNS: &str = "the wireframe is made by the assembler";
 
 #[cfg(test)]
@@ -150,6 +169,15 @@ mod tests {
             format!("distill.paper.visibility.min_views = 3 has no effect: {ASSEMBLER_RUNS}");
         let no_mask = format!("train.loss.mask = 0.7 has no effect: {NO_FIELD}");
         assert_eq!(told(&sets), [no_paper, no_mask]);
+        let by_images = told(&[
+            "distill.back_end=paper",
+            "data.background=black",
+            "distill.paper.image_refinement.enabled=true",
+            "distill.paper.junction_voting.min_votes=3",
+        ]);
+        let no_votes =
+            format!("distill.paper.junction_voting.min_votes = 3 has no effect: {IMAGES_ASKED}");
+        assert_eq!(by_images, [no_votes]);
         let with = |background: &'static str, set: &'static str| {
             told(&["distill.field=trained", background, set])
         };

@@ -85,11 +85,13 @@ pub struct PaperBackEndCounts {
     pub junctions: usize,
     /// Junctions left after the refinement.
     pub refined_junctions: usize,
-    /// Junctions with at least one vote.
+    /// Junctions with at least one vote; with [`ImageRefinementConfig::enabled`] the places
+    /// that ends speak for.
     pub voted_junctions: usize,
     /// Distinct junctions with enough votes.
     pub kept_junctions: usize,
-    /// Edges after the attraction.
+    /// Edges after the attraction; with [`ImageRefinementConfig::enabled`] the pairs of
+    /// junctions that were asked.
     pub attracted_edges: usize,
     /// Edges seen in enough views.
     pub visible_edges: usize,
@@ -101,8 +103,8 @@ pub struct PaperWireframe {
     /// Distinct junctions, sorted by x, y and z; distinct edges `[i, j]` with
     /// `i ≤ j`, sorted.
     pub wireframe: Wireframe3d,
-    /// Votes of each junction; with [`ImageRefinementConfig::enabled`] the number of 2D
-    /// segments that observe it.
+    /// Votes of each junction; with [`ImageRefinementConfig::enabled`] the number of views
+    /// with a 2D segment that ends there.
     pub junction_votes: Vec<usize>,
     /// In how many views each edge is seen.
     pub visible_views: Vec<usize>,
