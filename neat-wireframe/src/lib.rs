@@ -44,6 +44,7 @@ pub mod validity;
 
 mod interval_cover;
 mod observation;
+mod point_index;
 mod segment_grid;
 mod signed_distance;
 mod solve;

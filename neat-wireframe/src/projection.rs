@@ -1,7 +1,7 @@
 //! Projection of world points that lie in front of a camera, with derivatives.
 
 use nalgebra::{Matrix2x3, Vector2, Vector3};
-use neat_core::Camera;
+use neat_core::{Camera, LineSegment2, LineSegment3};
 
 /// Points nearer to the camera plane than this have no useful projection.
 const MIN_DEPTH: f64 = 1e-6;
@@ -11,6 +11,15 @@ const MIN_DEPTH: f64 = 1e-6;
 pub fn project_in_front(camera: &Camera, point_in_world: &Vector3<f64>) -> Option<Vector2<f64>> {
     let projection = camera.project(point_in_world);
     (projection.depth > MIN_DEPTH).then_some(projection.pixel)
+}
+
+/// The projection of a segment, if both of its ends lie in front of the camera.
+pub(crate) fn project_segment_in_front(
+    camera: &Camera,
+    segment: &LineSegment3,
+) -> Option<LineSegment2> {
+    let [start, end] = segment.ends().map(|end| project_in_front(camera, &end));
+    Some(LineSegment2::new(start?, end?))
 }
 
 /// [`project_in_front`] with the derivative of the pixel by the world point,

@@ -1,7 +1,7 @@
 //! Where a 3D line ought to show in the images, and whether edgels are there.
 
 use super::view_segments::PreparedView;
-use crate::projection::project_in_front;
+use crate::projection::{project_in_front, project_segment_in_front};
 use crate::statistics::upper_median;
 use nalgebra::Vector2;
 use neat_core::{EdgelMap, LineSegment2, LineSegment3};
@@ -206,10 +206,7 @@ pub(super) fn are_enough(samples: &[Sample], count: usize) -> bool {
 
 /// The projection of a 3D segment, `None` unless it lies in front of the camera.
 pub(super) fn project_segment(view: &PreparedView, line: &LineSegment3) -> Option<LineSegment2> {
-    Some(LineSegment2::new(
-        project_in_front(&view.camera, &line.start)?,
-        project_in_front(&view.camera, &line.end)?,
-    ))
+    project_segment_in_front(&view.camera, line)
 }
 
 /// Length and unit normal of a 2D segment of a useful length.

@@ -2,20 +2,15 @@
 //! Tables 1, 4 and 5 (`evaluation/eval-lsr-bmvs.py`).
 
 use super::MetricsError;
+use crate::point_index::{PointIndex, TooManyPoints};
 use crate::validity::is_finite;
-use kiddo::leaf_strategies::VecOfArenas;
-use kiddo::{EytzingerNoPf, KdTree, SquaredEuclidean};
 use nalgebra::Vector3;
 use neat_core::LineSegment3;
 use rayon::prelude::*;
 
-/// Kiddo's usual tree but for its prefetching, which computes addresses outside of what it owns.
-type Tree = KdTree<f64, u32, EytzingerNoPf, VecOfArenas<f64, u32, 3, 32>, 3, 32>;
-
 /// Points that can be asked for the nearest of them.
 pub struct PointCloud {
-    /// `None` without points: there is no nearest one.
-    tree: Option<Tree>,
+    index: PointIndex,
 }
 
 impl PointCloud {
@@ -27,25 +22,17 @@ impl PointCloud {
         if let Some(point) = points.iter().position(|p| !is_finite(p)) {
             return Err(MetricsError::NonFiniteSurface { point });
         }
-        if points.is_empty() {
-            return Ok(Self { tree: None });
-        }
-        let coordinates: Vec<[f64; 3]> = points.iter().map(|p| [p.x, p.y, p.z]).collect();
-        let tree = Tree::new_from_slice(&coordinates).map_err(|_| MetricsError::TooManyPoints {
-            points: points.len(),
-        })?;
-        Ok(Self { tree: Some(tree) })
+        let index =
+            PointIndex::new(points).map_err(|TooManyPoints| MetricsError::TooManyPoints {
+                points: points.len(),
+            })?;
+        Ok(Self { index })
     }
 
     /// Distance from `point` to the nearest point of the cloud; `None` if the
     /// cloud is empty.
     pub fn distance(&self, point: &Vector3<f64>) -> Option<f64> {
-        let tree = self.tree.as_ref()?;
-        let nearest = tree
-            .query(&[point.x, point.y, point.z])
-            .nearest_one::<SquaredEuclidean<f64>>()
-            .execute();
-        Some(nearest.distance.sqrt())
+        self.index.distance(point)
     }
 }
 
