@@ -7,7 +7,7 @@
 //! rendered one by several.
 
 use super::edge_candidates::{Candidate, Search, candidates};
-use super::edge_choice::{edge_evidence, shown};
+use super::edge_choice::{edge_evidence, needed_views, shown, views_holding};
 use super::neat_lines::NeatLine;
 use super::rendered_lines::{RenderedLine, rendered_lines};
 use super::settling::{Attracted, Ends, SettledJunction};
@@ -158,8 +158,11 @@ impl FieldScene<'_> {
         } = *self.visibility;
         let attracted = self.ends.attracted(&places);
         let settled = self.ends.settled(&places, &attracted);
-        // What fewer views show than an edge is no end of one.
-        let is_shown = |junction: &SettledJunction| junction.views >= min_views;
+        // Of a corner that ends do not speak for, one view more than of an edge.
+        let is_shown = |junction: &SettledJunction| {
+            let more = usize::from(junction.corner_evidence <= 0.0);
+            junction.views.len() >= min_views + more
+        };
         let asked: Vec<usize> = (0..places.len())
             .filter(|junction| is_shown(&settled[*junction]))
             .collect();
@@ -177,16 +180,19 @@ impl FieldScene<'_> {
             places[*junction] = place;
         }
         let junctions = of_asked(&self.ends.settled(&places, &self.ends.attracted(&places)));
-        edges.retain(|(edge, _)| {
+        edges.retain(|(edge, views)| {
             let ends = edge.junctions.map(|junction| &junctions[junction]);
-            ends.into_iter().all(is_shown) && self.evidence(edge, ends) > 0.0
+            ends.into_iter().all(is_shown) && self.is_edge(edge, *views, ends)
         });
         let graph = ImageGraph {
             wireframe: Wireframe3d {
                 junctions: junctions.iter().map(|junction| junction.place).collect(),
                 edges: edges.iter().map(|(edge, _)| edge.junctions).collect(),
             },
-            junction_views: junctions.iter().map(|junction| junction.views).collect(),
+            junction_views: junctions
+                .iter()
+                .map(|junction| junction.views.len())
+                .collect(),
             edge_views: edges.iter().map(|(_, views)| *views).collect(),
             settled: places.len(),
             candidates: number,
@@ -243,16 +249,19 @@ impl FieldScene<'_> {
         bundle_adjust(&observed, &starts, LOSS).junctions
     }
 
-    /// What speaks for an edge: its line and, if none of its ends is a corner, that too.
-    fn evidence(&self, edge: &Candidate, [a, b]: [&SettledJunction; 2]) -> f64 {
+    /// Whether an edge that `views` show is one: of those that might show it enough do, and
+    /// their 2D segments lie on it.
+    fn is_edge(&self, edge: &Candidate, views: usize, [a, b]: [&SettledJunction; 2]) -> bool {
         let line = LineSegment3::new(a.place, b.place);
-        edge_evidence(
-            &line,
-            &edge.observations,
-            self.lines,
-            self.views,
-            MAX_OFFSET,
-        ) + a.corner_evidence.max(b.corner_evidence).min(0.0)
+        let asked = views_holding(&line, self.views);
+        views as f64 >= needed_views(asked, a.views.intersection(&b.views).count())
+            && edge_evidence(
+                &line,
+                &edge.observations,
+                self.lines,
+                self.views,
+                MAX_OFFSET,
+            ) > 0.0
     }
 }
 
@@ -396,6 +405,22 @@ mod tests {
         assert!(corner_evidence(&distances, 6.0, 0.5) < 0.0);
         junctions.push(end);
         let graph = refined(junctions, &views, &lines, 2);
+        assert_eq!(graph.wireframe.edges.len(), 13);
+    }
+
+    #[test]
+    fn two_views_of_many_that_see_both_corners_show_no_edge() {
+        let (mut views, mut lines) = field_of_cube(0.005);
+        let (corners, _) = cube();
+        for (view, lines) in views.iter_mut().zip(&mut lines).take(2) {
+            add(view, lines, [corners[0], corners[3]]);
+        }
+        assert_is_cube(&refined(corners.clone(), &views, &lines, 2));
+        // In half of the views it is one.
+        for (view, lines) in views.iter_mut().zip(&mut lines).skip(2).take(4) {
+            add(view, lines, [corners[0], corners[3]]);
+        }
+        let graph = refined(corners, &views, &lines, 2);
         assert_eq!(graph.wireframe.edges.len(), 13);
     }
 

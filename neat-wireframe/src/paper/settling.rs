@@ -41,7 +41,7 @@ pub(super) struct SettledJunction {
     /// Length of a pixel there, in world units: the median over its ends.
     pub(super) pixel: f64,
     /// Views with an end that it explains.
-    pub(super) views: usize,
+    pub(super) views: BTreeSet<usize>,
     /// What speaks for a corner there, in nats.
     pub(super) corner_evidence: f64,
 }
@@ -167,7 +167,7 @@ impl<'a> Ends<'a> {
             SettledJunction {
                 place: junction.place,
                 pixel: junction.pixel,
-                views: explained.len(),
+                views: explained,
                 corner_evidence: corner_evidence(&distances, self.reach, END_SCALE),
             }
         };
