@@ -1,4 +1,4 @@
-//! The arcs of which lines are chords, each found once.
+//! The arcs of which lines are chords, each found once. Chords of what does not turn are edges.
 
 use super::circle_fitting::FoundArc;
 use super::claimed_edgels::claim_edgels;
@@ -6,7 +6,8 @@ use super::coaxial_rims::coaxial_rims;
 use super::config::AssembleConfig;
 use super::curve_pieces::curve_pieces;
 use super::edge_samples::Images;
-use super::line_selection::{Chord, ChosenLine, MIN_SHOWING, Selection, select_chords};
+use super::line_evidence::LineEvidence;
+use super::line_selection::{Chord, ChosenLine, Selection, select_chords};
 use super::neighbours::neighbours;
 use super::progress::OnProgress;
 use super::proposals;
@@ -17,11 +18,8 @@ use super::wander::retain_steady;
 use nalgebra::Vector3;
 use neat_core::{CircularArc, LineSegment3};
 use rayon::prelude::*;
-use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
-/// An arc that rises over its chord by no more than this share of how far edgels are off is a line.
-const FLAT: f64 = 0.1;
 /// Nearer to an arc than so many reaches, all along, a chord is one of its own.
 const SAME: f64 = 2.0;
 
@@ -31,13 +29,13 @@ const SAME: f64 = 2.0;
 pub(super) const BESIDE_IN_PIXELS: f64 = 3.0;
 
 /// The arcs that the images show, of the chords among the lines and of those that pieces of
-/// curves propose.
+/// curves propose. Chords of what does not turn are lines.
 pub(super) fn find_arcs(
-    selection: &Selection,
+    selection: &mut Selection,
     config: &AssembleConfig,
     progress: OnProgress<'_>,
 ) -> ControlFlow<(), Vec<FoundArc>> {
-    let images = &selection.images;
+    let (images, least) = (&selection.images.clone(), config.min_evidence);
     let views: Vec<PreparedView> = (images.views.par_iter().zip(images.maps))
         .zip(&selection.taken)
         .map(|((view, map), taken)| view.with_segments(&curve_pieces(map, |edgel| !taken[edgel])))
@@ -61,17 +59,22 @@ pub(super) fn find_arcs(
         claim_edgels(images, &line.line, &mut taken);
     }
     let beside = neighbours(images.views, config.ball_margin, config.neighbours);
-    let circles = small_circles(images, &beside, config.min_evidence);
+    let circles = small_circles(images, &beside, least);
     for circle in &circles {
         images.claim_arc(circle, &mut taken);
     }
     chords.extend(rounded_corners(images, &selection.lines, &taken));
     tracing::debug!(pieces, chords = chords.len(), "curves are proposed");
-    let grown = grown_arcs(images, &circles, &chords);
-    let mut arcs = chosen_arcs(images, grown, taken.clone(), config.min_evidence);
+    let (grown, lines) = grown_arcs(images, &circles, &chords, least);
+    let lines = shown_lines(images, &lines, &mut taken, least);
+    for line in &lines {
+        claim_edgels(images, &line.line, &mut selection.taken);
+    }
+    selection.lines.extend(lines);
+    let mut arcs = chosen_arcs(images, grown, taken.clone(), least);
     let merged = images.merge_arcs(arcs.clone());
     if merged.len() < arcs.len() {
-        arcs = chosen_arcs(images, merged, taken.clone(), config.min_evidence);
+        arcs = chosen_arcs(images, merged, taken.clone(), least);
     }
     arcs.extend(circles);
     for arc in &arcs {
@@ -86,51 +89,56 @@ pub(super) fn find_arcs(
     ControlFlow::Continue(arcs)
 }
 
-/// Takes the arcs away that are straight lines, as far as the images can tell: those that these show as
-/// they do other lines.
-pub(super) fn take_straight(
+/// The arcs around chords, as far as the images show them, but for those along `known` ones; and
+/// the lines along which they do not turn.
+fn grown_arcs(
     images: &Images,
-    arcs: &mut Vec<FoundArc>,
+    known: &[FoundArc],
+    chords: &[Chord],
     least: f64,
-) -> Vec<ChosenLine> {
-    let rise = |arc: &CircularArc| arc.radius * (1.0 - (0.5 * arc.sweep()).cos());
-    let is_straight = |found: &FoundArc| {
-        found.arc.sweep() < PI && rise(&found.arc) <= FLAT * images.reach * found.pixel
-    };
-    let mut lines = Vec::new();
-    arcs.retain(|found| {
-        if !is_straight(found) {
-            return true;
+) -> (Vec<FoundArc>, Vec<LineSegment3>) {
+    let (mut grown, mut lines) = (Vec::<FoundArc>::new(), Vec::new());
+    for Chord { arc, views, line } in chords {
+        let mut all = known.iter().chain(&grown);
+        if all.any(|other| covers(images, other, arc)) {
+            continue;
         }
-        let [start, end] = found.arc.angles.map(|angle| found.arc.point_at(angle));
-        let line = LineSegment3::new(start, end);
-        let evidence = images.evidence(&line, None, least);
-        let is_shown = evidence.gain > least && evidence.showing.len() >= MIN_SHOWING;
-        if is_shown {
-            lines.push(ChosenLine {
-                line,
-                evidence,
-                placed: false,
-            });
-        }
-        !is_shown
-    });
-    lines
-}
-
-/// The arcs around chords, as far as the images show them, but for those along `known` ones.
-fn grown_arcs(images: &Images, known: &[FoundArc], chords: &[Chord]) -> Vec<FoundArc> {
-    let mut grown: Vec<FoundArc> = Vec::new();
-    for Chord { arc, views } in chords {
-        if !known
-            .iter()
-            .chain(&grown)
-            .any(|other| covers(images, other, arc))
-        {
-            grown.extend(images.follow_arc(arc, views));
+        let Some(found) = images.follow_arc(arc, views) else {
+            continue;
+        };
+        if images.gain_by_turning(&found) > least {
+            grown.push(found);
+        } else {
+            let [start, end] = found.arc.angles.map(|angle| found.arc.point_at(angle));
+            lines.push(LineSegment3::new(start, end));
+            lines.extend(*line);
         }
     }
-    grown
+    (grown, lines)
+}
+
+/// Those lines that the images show, as edges, the surest first; they take their edgels.
+fn shown_lines(
+    images: &Images,
+    lines: &[LineSegment3],
+    taken: &mut [Vec<bool>],
+    least: f64,
+) -> Vec<ChosenLine> {
+    let mut asked: Vec<(LineEvidence, &LineSegment3)> = (lines.par_iter())
+        .map(|line| (images.evidence(line, Some(taken), least), line))
+        .collect();
+    asked.sort_by(|(one, _), (other, _)| other.gain.total_cmp(&one.gain));
+    let mut shown = Vec::new();
+    for (_, line) in asked {
+        let evidence = images.evidence(line, Some(taken), least);
+        if let Some(found) = images.settle_line(line, evidence, taken, least)
+            && images.tube(&found.line, &found.evidence).is_none()
+        {
+            claim_edgels(images, &found.line, taken);
+            shown.push(found);
+        }
+    }
+    shown
 }
 
 /// The arcs that the images speak for most, one after the other, each by edgels that none before
@@ -178,30 +186,44 @@ pub(super) fn runs_beside(whole: &FoundArc, part: &CircularArc, near: f64) -> bo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assemble::circle_fitting::tests::found;
+    use crate::assemble::circle_fitting::tests::{arc, views_of_arcs};
     use crate::assemble::test_views::{TestViews, cube_edge};
 
     #[test]
-    fn an_arc_that_no_pixel_tells_from_a_line_is_one() {
+    fn the_chord_of_an_arc_that_does_not_turn_is_an_edge() {
         let cube = TestViews::of_cube(20);
         let images = cube.images();
         let edge = cube_edge(0);
-        let aside = edge.start + Vector3::repeat(0.1);
-        // By a thirtieth of a pixel, and by three.
-        let bowed = |pixels: f64| {
-            let middle = edge.point_at(0.5);
-            let out = (middle - aside).normalize() * pixels * found_pixel();
-            found(CircularArc::through([edge.start, middle + out, edge.end]).unwrap())
+        let out = (edge.point_at(0.5) - edge.start - Vector3::repeat(0.1)).normalize();
+        let points = [edge.start, edge.point_at(0.5) + 1e-4 * out, edge.end];
+        let chord = Chord {
+            arc: CircularArc::through(points).unwrap(),
+            views: (0..20).collect(),
+            line: Some(LineSegment3::new(edge.point_at(0.3), edge.point_at(0.6))),
         };
-        let mut arcs = vec![bowed(0.03), bowed(3.0)];
-        let lines = take_straight(&images, &mut arcs, 3.0);
-        assert_eq!([lines.len(), arcs.len()], [1, 1]);
-        assert!(lines[0].line.end_distances(&edge).iter().all(|d| *d < 1e-9));
-        assert!(lines[0].evidence.gain > 20.0);
+        let (grown, lines) = grown_arcs(&images, &[], &[chord], 3.0);
+        assert_eq!([grown.len(), lines.len()], [0, 2]);
+        // Both are the edge, which is found once.
+        let shown = shown_lines(&images, &lines, &mut images.nothing_taken(), 3.0);
+        assert_eq!(shown.len(), 1);
+        assert!(shown[0].evidence.gain > 20.0);
+        let off = shown[0].line.end_distances(&edge);
+        assert!(off.iter().all(|off| *off < 0.02), "{off:?}");
     }
 
-    /// The size of a pixel of the arcs of tests.
-    fn found_pixel() -> f64 {
-        found(CircularArc::through([Vector3::x(), Vector3::y(), -Vector3::x()]).unwrap()).pixel
+    #[test]
+    fn an_arc_that_turns_grows() {
+        let views = views_of_arcs(20, |_| arc(1.5));
+        let part = CircularArc {
+            angles: [0.4, 0.9],
+            ..arc(1.5)
+        };
+        let chord = Chord {
+            arc: part,
+            views: (0..20).collect(),
+            line: None,
+        };
+        let (grown, lines) = grown_arcs(&views.images(), &[], &[chord.clone(), chord], 3.0);
+        assert_eq!([grown.len(), lines.len()], [1, 0]);
     }
 }

@@ -63,6 +63,8 @@ pub(super) struct Chord {
     pub arc: CircularArc,
     /// The views that show the line.
     pub views: Vec<usize>,
+    /// The line, where it is an edge unless it is this arc's chord.
+    pub line: Option<LineSegment3>,
 }
 
 /// Lines, and how they came about.
@@ -144,7 +146,10 @@ pub(super) fn select_chords(
         noise: selection.noise,
         kind: curve_or_straight,
     };
-    let found = choose(images, &all, &wanted, selection.taken.clone(), progress)?;
+    let mut found = choose(images, &all, &wanted, selection.taken.clone(), progress)?;
+    for chord in &mut found.chords {
+        chord.line = None;
+    }
     ControlFlow::Continue(found.chords)
 }
 
@@ -252,6 +257,7 @@ fn choose<'a>(
                     chords.extend(arc.map(|arc| Chord {
                         arc,
                         views: line.evidence.views().collect(),
+                        line: Some(line.line),
                     }));
                 }
                 Kind::Outline(tube) => tubes.push(tube),
@@ -303,31 +309,14 @@ impl Chooser<'_> {
             }
             if evidence.gain < gain - STALE {
                 self.queue.push(evidence.gain, index);
-            } else if let Some(found) = self.settle(line, evidence) {
+            } else if let Some(found) =
+                self.images
+                    .settle_line(line, evidence, &self.taken, self.min_evidence)
+            {
                 self.claim(&found, *segment);
                 return Some(found);
             }
         }
-    }
-
-    /// The line through the edgels beside a candidate, as far as they reach; `None` if too
-    /// little speaks for it.
-    fn settle(&self, line: &LineSegment3, mut evidence: LineEvidence) -> Option<ChosenLine> {
-        let images = &self.images;
-        let mut line = *line;
-        for share in FITTING_REACHES {
-            line = images.fit(&line, evidence.views(), share * images.reach);
-            line = images.extent(&line, &evidence.showing, None)?;
-            evidence = images.evidence(&line, Some(&self.taken), self.min_evidence);
-            if evidence.gain <= self.min_evidence || evidence.showing.len() < MIN_SHOWING {
-                return None;
-            }
-        }
-        Some(ChosenLine {
-            line,
-            evidence,
-            placed: false,
-        })
     }
 
     /// Takes the edgels beside a line, and the 2D segments where it is shown.
@@ -350,6 +339,33 @@ impl Chooser<'_> {
     }
 }
 
+impl Images<'_> {
+    /// The line through the edgels beside one, as far as they reach; `None` if too little speaks
+    /// for it by those that are not `taken`.
+    pub(super) fn settle_line(
+        &self,
+        line: &LineSegment3,
+        mut evidence: LineEvidence,
+        taken: &[Vec<bool>],
+        least: f64,
+    ) -> Option<ChosenLine> {
+        let mut line = *line;
+        for share in FITTING_REACHES {
+            line = self.fit(&line, evidence.views(), share * self.reach);
+            line = self.extent(&line, &evidence.showing, None)?;
+            evidence = self.evidence(&line, Some(taken), least);
+            if evidence.gain <= least || evidence.showing.len() < MIN_SHOWING {
+                return None;
+            }
+        }
+        Some(ChosenLine {
+            line,
+            evidence,
+            placed: false,
+        })
+    }
+}
+
 /// Whether a 2D segment lies on another, for the most part of its length.
 fn lies_on(segment: &LineSegment2, on: &LineSegment2, reach: f64) -> bool {
     let places = segment.ends().map(|end| on.line_parameter(&end));
@@ -363,18 +379,6 @@ mod tests {
     use super::*;
     use crate::assemble::test_views::{TestViews, cube_edge};
 
-    /// One without candidates.
-    fn chooser(images: Images<'_>, taken: Vec<Vec<bool>>) -> Chooser<'_> {
-        Chooser {
-            images,
-            min_evidence: 0.0,
-            candidates: &[],
-            queue: CandidateQueue::new(&[], 0.0),
-            taken,
-            explained: Vec::new(),
-        }
-    }
-
     #[test]
     fn what_no_view_shows_with_edgels_of_its_own_is_no_line() {
         let cube = TestViews::of_cube(20);
@@ -384,8 +388,7 @@ mod tests {
             let mut taken = images.nothing_taken();
             let part = LineSegment3::new(edge.start, edge.point_at(share_of_others));
             claim_edgels(&images, &part, &mut taken);
-            let chooser = chooser(images, taken);
-            chooser.settle(&edge, images.evidence(&edge, None, 0.0))
+            images.settle_line(&edge, images.evidence(&edge, None, 0.0), &taken, 0.0)
         };
         assert!(settled(0.1).unwrap().evidence.showing.len() >= 18);
         assert!(settled(0.6).is_none());
@@ -403,10 +406,9 @@ mod tests {
             for map in &mut taken[..whole_in] {
                 map.fill(false);
             }
-            let chooser = chooser(images, taken);
-            let evidence = images.evidence(&edge, Some(&chooser.taken), 0.0);
+            let evidence = images.evidence(&edge, Some(&taken), 0.0);
             assert!(evidence.gain > 0.0);
-            chooser.settle(&edge, evidence)
+            images.settle_line(&edge, evidence, &taken, 0.0)
         };
         assert!(settled(2).is_none());
         assert!(settled(4).is_some());

@@ -80,6 +80,7 @@ mod straightness;
 mod swept_tubes;
 mod tangent_ends;
 mod touched_spheres;
+mod turning;
 mod view_segments;
 mod wander;
 
@@ -103,7 +104,7 @@ use collinear_pieces::merge_pieces;
 use common_directions::turn_to_common_directions;
 use corners::find_corners;
 use curved_edges::{add_as_arcs, take_curved_edges};
-use curves::{find_arcs, take_straight};
+use curves::find_arcs;
 use domes::{FoundDome, settled_domes, take_domes};
 use edge_completion::complete_edges;
 use edge_cutting::{cut_edges, in_order};
@@ -228,16 +229,16 @@ pub fn assemble_with_progress(
         report.poses_moved_in_pixels = poses.pixels;
         report.pose_reliability = poses.reliability;
     }
-    let selection = {
+    let mut selection = {
         let progress = &mut part(progress, [SURE, SELECTED]);
         select_lines(images, &alternatives, &sure, config, progress)?
     };
     drop(alternatives);
-    note_selection(&selection, &mut report);
     let arcs = &mut {
         let progress = &mut part(progress, [SELECTED, FOLLOWED]);
-        find_arcs(&selection, config, progress)?
+        find_arcs(&mut selection, config, progress)?
     };
+    note_selection(&selection, &mut report);
     let images = selection.images;
     let progress = &mut part(progress, [FOLLOWED, 1.0]);
     let domes = take_domes(&images, arcs, config.min_evidence);
@@ -350,8 +351,6 @@ fn graph_of(
 ) -> ControlFlow<(), (Wireframe3d, Vec<Spline>)> {
     let images = selection.images;
     let least = config.min_evidence;
-    selection.lines.extend(take_straight(&images, arcs, least));
-    report.lines = selection.lines.len();
     let known = &KnownArcs::new(arcs, domes);
     selection.lines.retain_mut(|found| {
         let left = known.left_of(&images, &found.line, least);

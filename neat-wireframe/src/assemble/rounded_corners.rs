@@ -76,6 +76,7 @@ pub(super) fn rounded_corners(
             (touches(one) && touches(other)).then_some(Chord {
                 arc: guess.arc,
                 views,
+                line: None,
             })
         })
         .collect()
