@@ -83,7 +83,6 @@ fn turn(from: &Vector2<f64>, to: &Vector2<f64>) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::assemble::circle_fitting::tests::{arc, views_of_arcs};
     use crate::assemble::test_views::{TestViews, cube_edge};
     use nalgebra::Vector3;
